@@ -1,0 +1,41 @@
+"""Errors that a user can cause and mend; the command line prints them as one line and exits with 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class ClearwayError(Exception):
+    """Bad input or a missing requirement. The message says what, where and the remedy, in one line."""
+
+
+class SceneError(ClearwayError):
+    """A scene that cannot be used.
+
+    Args:
+        source: the file (or the name, for a scene made in memory) that holds the fault.
+        problem: what was expected and what was found.
+        remedy: what the user can do about it.
+        dataset: the array or HDF5 dataset at fault; empty where the whole file is.
+    """
+
+    def __init__(self, source: str | Path, problem: str, remedy: str, dataset: str = "") -> None:
+        where = f"{source}, dataset '{dataset}'" if dataset else f"{source}"
+        super().__init__(f"{where}: {problem}. {remedy}")
+        self.source, self.dataset, self.problem, self.remedy = str(source), dataset, problem, remedy
+
+    def __reduce__(self) -> tuple:
+        """Pickle by the constructor's arguments, so that the error crosses process borders whole."""
+        return type(self), (self.source, self.problem, self.remedy, self.dataset)
+
+
+class EncoderError(ClearwayError):
+    """A picture encoder that cannot be loaded or does not fit the scene."""
+
+
+class RenderError(ClearwayError):
+    """Rendering is not possible on this machine."""
+
+
+class RunError(ClearwayError):
+    """A run folder, checkpoint or training configuration that cannot be used."""

@@ -1,0 +1,19 @@
+"""The four actions and headings, in the order of the published dumps (axis A everywhere)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Action(IntEnum):
+    """Column of a scene's graph."""
+
+    MOVE_FORWARD = 0
+    TURN_RIGHT = 1
+    TURN_LEFT = 2
+    MOVE_BACKWARD = 3
+
+
+ACTION_COUNT = len(Action)
+ACTION_NAMES = ("move forward", "turn right", "turn left", "move backward")
+BLOCKED = -1  # in a graph: the move is blocked and the agent stays where it is

@@ -1,0 +1,144 @@
+"""`Scene`: one room as the agent knows it. Every part of the project starts from this object.
+
+Axis letters, here and everywhere: S states (poses), A actions, F features.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from clearway.scenes import graph as graphs
+
+
+class Observations(Protocol):
+    """The pictures of a scene: an array, or a file read on demand. Index with an int, a slice or an int array."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(S, height, width, 3)."""
+
+    def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
+        """The pictures asked for, uint8 RGB."""
+
+
+@dataclass(frozen=True)
+class TopView:
+    """A picture of the room from above, for maps.
+
+    Attributes:
+        image: (height, width, 3) uint8 RGB; row 0 is the largest z, column 0 the smallest x.
+        x_min_m, x_max_m, z_min_m, z_max_m: the rectangle of the floor that the picture covers, metres.
+    """
+
+    image: np.ndarray
+    x_min_m: float
+    x_max_m: float
+    z_min_m: float
+    z_max_m: float
+
+
+@dataclass(frozen=True)
+class EncoderRecord:
+    """Which encoder made a scene's features, with all that is needed to make them again.
+
+    Attributes:
+        name: what the user asked for and every table prints, for example "random-resnet50".
+        identity: short hash of weights and preprocessing; scenes trained together must agree in it.
+        settings: seed, model name, picture size and the like (JSON values).
+        arrays: the statistics that the settings do not determine, for example calibrated batch norms.
+    """
+
+    name: str
+    identity: str
+    settings: Mapping[str, object] = field(default_factory=dict)
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What made a scene.
+
+    Attributes:
+        source: "room" for our own rooms, else the importer's name, for example "thor_v1".
+        room: name of the room builder, or None.
+        seed: seed of the room builder, or None.
+        versions: package versions that shaped the content, for example {"clearway": "0.1.0", "mujoco": "3.3.0"}.
+        notes: whatever else the maker wants to keep (JSON values).
+    """
+
+    source: str
+    room: str | None = None
+    seed: int | None = None
+    versions: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One room: the picture, the features and the neighbours of every pose.
+
+    Attributes:
+        name: for example "bathroom" or "bathroom_02".
+        observations: (S, height, width, 3) uint8 RGB first-person pictures, read lazily; None if the file has none.
+        features: (S, F) float32 frozen features of the pictures; None until they are encoded.
+        locations_m: (S, 2) float64, x and z of the agent on the floor, metres.
+        headings_deg: (S,) int64, 0 looks along +z, 90 along +x (a right turn adds 90).
+        graph: (S, A) int32, next state by action (`actions.Action`); -1 where the move is blocked.
+        made_by: what made the scene.
+        encoder: what made the features; None where features is None.
+        cell_size_m: step length of a move, metres.
+        top_view: picture from above for maps, or None.
+    """
+
+    name: str
+    observations: Observations | None
+    features: np.ndarray | None
+    locations_m: np.ndarray
+    headings_deg: np.ndarray
+    graph: np.ndarray
+    made_by: Provenance
+    encoder: EncoderRecord | None = None
+    cell_size_m: float = 0.5
+    top_view: TopView | None = None
+
+    @property
+    def state_count(self) -> int:
+        """S, the number of poses."""
+        return len(self.graph)
+
+    @cached_property
+    def cells(self) -> np.ndarray:
+        """Cell of each state, (S,) int64: states at one location share a cell; numbered by first appearance."""
+        keys = np.round(self.locations_m / self.cell_size_m * 1000).astype(np.int64)
+        _, first, cell = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        rank = np.empty(len(first), np.int64)
+        rank[np.argsort(first, kind="stable")] = np.arange(len(first))
+        return rank[cell.reshape(-1)]
+
+    @property
+    def cell_count(self) -> int:
+        """Number of distinct locations."""
+        return int(self.cells.max()) + 1
+
+    @cached_property
+    def distances(self) -> np.ndarray:
+        """(S, S) int32 shortest-path steps from row to column, from the graph alone; -1 where there is no path."""
+        return graphs.distances(self.graph)
+
+    def distances_to(self, targets: np.ndarray) -> np.ndarray:
+        """(len(targets), S) int32 shortest-path steps to each target; -1 where there is no path."""
+        return graphs.distances_to(self.graph, targets)
+
+    @cached_property
+    def components(self) -> np.ndarray:
+        """(S,) int, strongly connected component of each state; 0 is the largest."""
+        return graphs.components(self.graph)
+
+    def with_features(self, features: np.ndarray, encoder: EncoderRecord) -> Scene:
+        """The same scene with other features, (S, F) float32, and the record of what made them."""
+        return replace(self, features=features, encoder=encoder)
