@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from clearway.scenes import graph as graphs
+from clearway.scenes.actions import BLOCKED, Action
+from made import corridor_scene, graph_of_cells, grid_scene
+
+
+def test_a_blocked_move_stays() -> None:
+    corridor = corridor_scene(2)
+    ahead = graphs.next_states(corridor.graph)
+    assert ahead.dtype == np.int64
+    assert ahead[0].tolist() == [4, 1, 3, 0]  # forward, right, left, and backward into the wall
+    assert ahead[1].tolist() == [1, 2, 0, 1]  # looking across the corridor, both moves are blocked
+
+
+def test_corridor_distances_by_hand() -> None:
+    steps = corridor_scene(5).distances
+    assert steps.dtype == np.int32
+    assert steps[0, 16] == 4  # straight ahead
+    assert steps[16, 0] == 4  # backwards, without turning
+    assert steps[0, 17] == 5  # and one right turn
+    assert steps[1, 18] == 5  # turn right, walk four backwards
+    assert steps[1, 19] == 6  # and turn right again
+    assert np.diagonal(steps).max() == 0
+
+
+def test_distances_to_is_the_transposed_column() -> None:
+    scene = grid_scene(3)
+    targets = np.array([1, scene.state_count - 1])
+    assert np.array_equal(scene.distances_to(targets), scene.distances[:, targets].T)
+
+
+def test_separate_parts_are_unreachable_and_the_largest_is_component_0() -> None:
+    graph = graph_of_cells(np.array([[5, 5], [0, 0], [0, 1]]))
+    steps = graphs.distances(graph)
+    assert steps[0, 4] == steps[4, 0] == graphs.UNREACHABLE
+    assert graphs.components(graph).tolist() == [1] * 4 + [0] * 8
+
+
+def test_one_way_doors_make_two_strong_components() -> None:
+    graph = graph_of_cells(np.array([[0, 0], [0, 1]]))
+    graph[4:, [Action.MOVE_FORWARD, Action.MOVE_BACKWARD]] = BLOCKED  # nothing leads out of cell 1
+    steps = graphs.distances(graph)
+    assert steps[0, 4] == 1
+    assert steps[4, 0] == graphs.UNREACHABLE
+    assert len(set(graphs.components(graph).tolist())) == 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_distances_obey_every_edge(seed: int) -> None:
+    scene = grid_scene(seed)
+    ahead = graphs.next_states(scene.graph)
+    assert (scene.distances >= 0).all()
+    for target in (0, scene.state_count // 2):
+        to_go = scene.distances[:, target]
+        best = to_go[ahead].min(axis=1)
+        away = np.arange(scene.state_count) != target
+        assert np.array_equal(best[away], to_go[away] - 1)
+
+
+def test_cells_are_numbered_by_first_appearance() -> None:
+    scene = grid_scene(1)
+    assert np.array_equal(scene.cells, np.repeat(np.arange(scene.cell_count), 4))
