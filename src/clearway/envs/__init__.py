@@ -1,0 +1,1 @@
+"""Environments: the transition rule in batches (`navigation`), and Gymnasium's single and vector environments on it."""

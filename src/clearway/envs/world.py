@@ -1,0 +1,191 @@
+"""`World`: the look-up tables of a scene set and its targets. States of all scenes share one numbering.
+
+Axis letters: S states of all scenes, A actions, F features, M targets, C scenes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from clearway.errors import SceneError
+from clearway.scenes.actions import BLOCKED
+from clearway.scenes.graph import UNREACHABLE, next_states
+from clearway.scenes.scene import Scene
+from clearway.zones import ZoneLevel, scene_zones
+
+FEWEST_STARTS = 1
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Tables of a scene set; all tensors on one device.
+
+    Attributes:
+        scene_names: name of each scene.
+        scene_offset: (C + 1,) int64, first state of each scene, and S at the end.
+        next_state: (S, A) int64; a blocked move leads back to its own state.
+        blocked: (S, A) bool.
+        zone: (S,) int64 (`zones.Zone`).
+        features: (S, F) float32, or None where the scenes have none.
+        target_state: (M,) int64, in the numbering of all scenes.
+        target_scene: (M,) int64, ascending.
+        start_state: (K,) int64, for target after target all states from which it can be reached, itself excluded.
+        start_steps: (K,) int64, the shortest-path distance of each of those starts.
+        start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
+    """
+
+    scene_names: tuple[str, ...]
+    scene_offset: Tensor
+    next_state: Tensor
+    blocked: Tensor
+    zone: Tensor
+    features: Tensor | None
+    target_state: Tensor
+    target_scene: Tensor
+    start_state: Tensor
+    start_steps: Tensor
+    start_offset: Tensor
+    start_count: Tensor
+
+    @property
+    def scene_count(self) -> int:
+        """C."""
+        return len(self.scene_names)
+
+    @property
+    def target_count(self) -> int:
+        """M."""
+        return len(self.target_state)
+
+    @property
+    def state_count(self) -> int:
+        """S."""
+        return len(self.next_state)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the tables lie."""
+        return self.next_state.device
+
+    def mean_shortest_path(self) -> Tensor:
+        """Mean distance from all starts to each target, (M,) float64 steps."""
+        target = torch.repeat_interleave(torch.arange(self.target_count), self.start_count.cpu())
+        total = torch.zeros(self.target_count, dtype=torch.float64)
+        return total.index_add_(0, target, self.start_steps.cpu().double()) / self.start_count.cpu()
+
+    def distance_table(self) -> Tensor:
+        """Steps from every state to every target, (M, S) int64; 0 at the target, -1 where there is no path."""
+        table = torch.full((self.target_count, self.state_count), UNREACHABLE, dtype=torch.int64)
+        target = torch.repeat_interleave(torch.arange(self.target_count), self.start_count.cpu())
+        table[target, self.start_state.cpu()] = self.start_steps.cpu()
+        table[torch.arange(self.target_count), self.target_state.cpu()] = 0
+        return table.to(self.device)
+
+    def scene_state(self, target: int) -> int:
+        """The target's state in its own scene's numbering."""
+        return int(self.target_state[target] - self.scene_offset[self.target_scene[target]])
+
+    def to(self, device: torch.device | str) -> World:
+        """The same tables on another device."""
+        moved = {f.name: getattr(self, f.name) for f in fields(self)}
+        moved = {name: value.to(device) for name, value in moved.items() if isinstance(value, Tensor)}
+        return replace(self, **moved)
+
+
+def make_world(
+    scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zone_level: ZoneLevel = "pose"
+) -> World:
+    """The tables of some scenes with their targets.
+
+    Args:
+        scenes: scenes with distinct names.
+        targets: state ids of each scene's targets by scene name, in the scene's own numbering.
+        zone_level: whether zones are those of poses or of cells.
+
+    Raises:
+        SceneError: names repeat, a scene has no target, a target is out of range, repeated or out of reach,
+            or the scenes' features do not belong together.
+    """
+    _check_set(scenes, targets)
+    offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
+    graph = np.concatenate([_shifted(scene.graph, first) for scene, first in zip(scenes, offset, strict=False)])
+    starts = [_starts(scene, targets[scene.name]) for scene in scenes]
+    counts = np.array([len(state) for scene_starts in starts for state, _ in scene_starts], np.int64)
+    per_scene = [len(targets[scene.name]) for scene in scenes]
+    return World(
+        scene_names=tuple(scene.name for scene in scenes),
+        scene_offset=torch.from_numpy(offset),
+        next_state=torch.from_numpy(next_states(graph)),
+        blocked=torch.from_numpy(graph == BLOCKED),
+        zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
+        features=_joined_features(scenes),
+        target_state=_joined([np.asarray(targets[s.name]) + o for s, o in zip(scenes, offset, strict=False)]),
+        target_scene=torch.from_numpy(np.repeat(np.arange(len(scenes)), per_scene)),
+        start_state=_joined([state + o for st, o in zip(starts, offset, strict=False) for state, _ in st]),
+        start_steps=_joined([steps for scene_starts in starts for _, steps in scene_starts]),
+        start_offset=torch.from_numpy(np.cumsum(counts) - counts),
+        start_count=torch.from_numpy(counts),
+    )
+
+
+def _joined(parts: list[np.ndarray]) -> Tensor:
+    return torch.from_numpy(np.concatenate(parts).astype(np.int64))
+
+
+def _shifted(graph: np.ndarray, first: int) -> np.ndarray:
+    return np.where(graph == BLOCKED, BLOCKED, graph.astype(np.int64) + first)
+
+
+def _starts(scene: Scene, targets: Sequence[int]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each target: the states from which it can be reached (itself excluded) and their distances."""
+    found = []
+    for target, steps in zip(targets, scene.distances_to(np.asarray(targets)), strict=True):
+        state = np.flatnonzero(steps > 0)
+        if len(state) < FEWEST_STARTS:
+            raise SceneError(
+                scene.name, f"no state leads to target {target}", "Choose a target in the largest component", "graph"
+            )
+        found.append((state, steps[state]))
+    return found
+
+
+def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) -> None:
+    names = [scene.name for scene in scenes]
+    for name in names:
+        if names.count(name) > 1:
+            raise SceneError(name, "two scenes have this name", "Rename one of the files")
+    for scene in scenes:
+        chosen = list(targets.get(scene.name, ()))
+        if not chosen:
+            raise SceneError(scene.name, "the scene has no target", "Give at least one state id as its target")
+        for target in chosen:
+            if not 0 <= target < scene.state_count:
+                valid = f"states are 0 to {scene.state_count - 1}"
+                raise SceneError(scene.name, f"target {target} is out of range ({valid})", "Choose another target")
+        if len(set(chosen)) < len(chosen):
+            raise SceneError(scene.name, "a target is named twice", "Name every target once")
+
+
+def _joined_features(scenes: Sequence[Scene]) -> Tensor | None:
+    if all(scene.features is None for scene in scenes):
+        return None
+    first = scenes[0]
+    for scene in scenes:
+        if scene.features is None or first.features is None:
+            raise SceneError(scene.name, "only some of the scenes have features", "Encode all scenes together")
+        if scene.features.shape[1] != first.features.shape[1]:
+            sizes = f"{scene.features.shape[1]} features a state, {first.name} has {first.features.shape[1]}"
+            raise SceneError(scene.name, sizes, "Encode all scenes with the same encoder", "resnet_feature")
+        if _identity(scene) != _identity(first):
+            problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
+            raise SceneError(scene.name, problem, "Encode all scenes together with one encoder", "resnet_feature")
+    return torch.from_numpy(np.concatenate([np.asarray(s.features, np.float32) for s in scenes]))
+
+
+def _identity(scene: Scene) -> str:
+    return f"{scene.encoder.name} ({scene.encoder.identity})" if scene.encoder else "an unknown encoder"
