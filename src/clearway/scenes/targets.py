@@ -1,0 +1,48 @@
+"""Which states of a scene are targets: those that Zhu et al. published, else a seeded choice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.errors import SceneError
+from clearway.scenes.scene import Scene
+
+ZHU_TARGETS: dict[str, tuple[int, ...]] = {
+    "bathroom_02": (26, 37, 43, 53, 69),
+    "bedroom_04": (134, 264, 320, 384, 387),
+    "kitchen_02": (90, 136, 157, 207, 329),
+    "living_room_08": (92, 135, 193, 228, 254),
+}
+"""State ids of the five targets a scene of the published dumps of those names (the paper's, too)."""
+
+TARGETS_PER_SCENE = 5
+
+
+def seeded_targets(scene: Scene, count: int = TARGETS_PER_SCENE, seed: int = 0) -> tuple[int, ...]:
+    """`count` distinct states of the scene's largest component, ascending, the same for the same seed.
+
+    They lie in distinct cells as long as there are cells enough.
+
+    Raises:
+        SceneError: the component has fewer than `count` states.
+    """
+    states = np.flatnonzero(scene.components == 0)
+    if count < 1 or count > len(states) - 1:
+        raise SceneError(
+            scene.name,
+            f"{count} targets asked for, the largest component has {len(states)} states",
+            f"Ask for 1 to {len(states) - 1} targets",
+        )
+    order = np.random.default_rng([seed, scene.state_count]).permutation(states)
+    _, first_of_cell = np.unique(scene.cells[order], return_index=True)
+    one_a_cell = order[np.sort(first_of_cell)]
+    others = np.delete(order, np.sort(first_of_cell))
+    return tuple(sorted(int(state) for state in np.concatenate([one_a_cell, others])[:count]))
+
+
+def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
+    """Zhu's targets for a scene of one of the four published names and sizes, else five seeded ones."""
+    published = ZHU_TARGETS.get(scene.name)
+    if published and max(published) < scene.state_count:
+        return published
+    return seeded_targets(scene, min(TARGETS_PER_SCENE, scene.state_count - 1), seed)
