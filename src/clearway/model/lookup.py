@@ -1,0 +1,206 @@
+"""The siamese actor-critic computed from tables: same outputs, same gradients, a fraction of the operations.
+
+Features are frozen and states finite, so the first layer needs no picture twice:
+
+    W_k f(s)             one matrix product of all S states' features an update, then K rows are summed per sample;
+    target branch        one row a target (M of them), not one a sample;
+    dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once.
+
+Nothing is approximated. Gradients are written by hand into `.grad`; the tests hold them against autograd on `network`.
+
+Axis letters: B rows, K history, S states, F features, H width, M targets, C scenes, A actions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import embedding_bag
+
+from clearway.model.network import OUTPUTS, SiameseActorCritic
+from clearway.scenes.actions import ACTION_COUNT
+
+
+def _relu_backward_(grad: Tensor, result: Tensor) -> Tensor:
+    """Set to 0, in place, the gradient (B, H) where ReLU's result (B, H) is 0."""
+    return torch.ops.aten.threshold_backward.grad_input(grad, result, 0, grad_input=grad)
+
+
+@dataclass(frozen=True)
+class Activations:
+    """What the forward pass leaves for the backward pass; rows are ordered by scene.
+
+    Attributes:
+        seen: (B, H) observation branch after ReLU.
+        fused: (B, H).
+        special: (B, H) the scene layer.
+        output: (B, A + 1) action scores and value.
+    """
+
+    seen: Tensor
+    fused: Tensor
+    special: Tensor
+    output: Tensor
+
+    @property
+    def scores(self) -> Tensor:
+        """(B, A) action scores before the softmax."""
+        return self.output[:, :ACTION_COUNT]
+
+    @property
+    def value(self) -> Tensor:
+        """(B,)."""
+        return self.output[:, ACTION_COUNT]
+
+    @classmethod
+    def empty(cls, rows: int, width: int, device: torch.device) -> Activations:
+        """Memory for `rows` rows."""
+        hidden = (torch.empty(rows, width, device=device) for _ in range(3))
+        return cls(*hidden, torch.empty(rows, OUTPUTS, device=device))
+
+    def rows(self, first: int, last: int) -> Activations:
+        """A view of the rows first to last, last excluded."""
+        return Activations(
+            self.seen[first:last],
+            self.fused[first:last],
+            self.special[first:last],
+            self.output[first:last],
+        )
+
+
+class LookupNetwork:
+    """`SiameseActorCritic` on the states of a world.
+
+    Args:
+        network: the parameters; shared, not copied. Call `refresh` after every change of them.
+        features: (S, F) float32, prepared features of all states.
+        target_state: (M,) int64.
+    """
+
+    def __init__(self, network: SiameseActorCritic, features: Tensor, target_state: Tensor) -> None:
+        shape = network.shape
+        assert features.shape[1] == shape.feature_count, "features do not fit the network"
+        self.network, self.features, self.target_state = network, features.contiguous(), target_state
+        self.width, self.history_length = shape.width, shape.history_length
+        self.slot = torch.arange(shape.history_length, device=features.device)
+        columns = shape.history_length * shape.width
+        self.projected = torch.empty(len(features), columns, device=features.device)
+        self.workspace = torch.empty(0, self.width, device=features.device)
+        for parameter in network.parameters():
+            parameter.grad = torch.zeros_like(parameter)
+        self.refresh()
+
+    @torch.no_grad()
+    def refresh(self) -> None:
+        """Project all states and targets with the parameters as they are now."""
+        net = self.network
+        torch.mm(self.features, net.siamese_weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
+        slots = self.projected[self.target_state].view(-1, self.history_length, self.width)
+        self.wanted = slots.sum(1).add_(net.siamese_bias).relu_()  # (M, H)
+        self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
+
+    @torch.no_grad()
+    def forward(
+        self, history: Tensor, target: Tensor, rows_per_scene: Sequence[int], out: Activations | None = None
+    ) -> Activations:
+        """Policy and value of B rows.
+
+        Args:
+            history: (B, K) int64 states, newest last.
+            target: (B,) int64 index of the target.
+            rows_per_scene: number of rows of each scene, in order; rows are ordered by scene.
+            out: where to write; new memory by default.
+        """
+        net = self.network
+        out = out or Activations.empty(len(history), self.width, history.device)
+        rows = self.projected.view(-1, self.width)
+        torch.add(embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen).relu_()
+        torch.addmm(self.target_term[target], out.seen, net.fusion_weight[0].T, out=out.fused).relu_()
+        first = 0
+        for scene, count in enumerate(rows_per_scene):
+            if count:
+                part = out.rows(first, first + count)
+                torch.addmm(net.scene_bias[scene], part.fused, net.scene_weight[scene].T, out=part.special).relu_()
+                torch.addmm(net.output_bias[scene], part.special, net.output_weight[scene].T, out=part.output)
+            first += count
+        return out
+
+    @torch.no_grad()
+    def backward(
+        self,
+        history: Tensor,
+        target: Tensor,
+        rows_per_scene: Sequence[int],
+        kept: Activations,
+        grad_output: Tensor,
+    ) -> None:
+        """Set every parameter's `.grad` from the loss's gradient with respect to the output, (B, A + 1)."""
+        net = self.network
+        grad_fused, grad_seen = self._work(2, len(history))
+        self._backward_scenes(rows_per_scene, kept, grad_output, grad_seen, grad_fused)
+        _relu_backward_(grad_fused, kept.fused)
+        torch.sum(grad_fused, 0, out=_grad(net.fusion_bias))
+        torch.mm(grad_fused.T, kept.seen, out=_grad(net.fusion_weight)[0])
+        grad_term = self._sum_by_target(target, grad_fused)  # (M, H)
+        torch.mm(grad_term.T, self.wanted, out=_grad(net.fusion_weight)[1])
+        grad_wanted = _relu_backward_(grad_term @ net.fusion_weight[1], self.wanted)
+        torch.mm(grad_fused, net.fusion_weight[0], out=grad_seen)
+        _relu_backward_(grad_seen, kept.seen)
+        torch.sum(grad_seen, 0, out=_grad(net.siamese_bias)).add_(grad_wanted.sum(0))
+        self._backward_siamese(history, grad_seen, grad_wanted)
+
+    def _work(self, blocks: int, rows: int) -> list[Tensor]:
+        """Memory for some (rows, H) blocks, kept between calls: fresh pages cost as much as the arithmetic on them."""
+        if len(self.workspace) < blocks * rows:
+            self.workspace = torch.empty(blocks * rows, self.width, device=self.features.device)
+        return list(self.workspace[: blocks * rows].view(blocks, rows, self.width))
+
+    def _backward_scenes(
+        self,
+        rows_per_scene: Sequence[int],
+        kept: Activations,
+        grad_output: Tensor,
+        grad_special: Tensor,
+        grad_fused: Tensor,
+    ) -> None:
+        """Gradients of the scenes' own layers; writes dL/d(special), dL/d(fused after ReLU), both (B, H)."""
+        net = self.network
+        first = 0
+        for scene, count in enumerate(rows_per_scene):
+            rows = slice(first, first + count)
+            grad_out = grad_output[rows]
+            torch.mm(grad_out.T, kept.special[rows], out=_grad(net.output_weight)[scene])
+            torch.sum(grad_out, 0, out=_grad(net.output_bias)[scene])
+            torch.mm(grad_out, net.output_weight[scene], out=grad_special[rows])
+            _relu_backward_(grad_special[rows], kept.special[rows])
+            torch.mm(grad_special[rows].T, kept.fused[rows], out=_grad(net.scene_weight)[scene])
+            torch.sum(grad_special[rows], 0, out=_grad(net.scene_bias)[scene])
+            torch.mm(grad_special[rows], net.scene_weight[scene], out=grad_fused[rows])
+            first += count
+
+    def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:
+        """Rows (B, H) added up by target, (M, H)."""
+        count = torch.bincount(target, minlength=len(self.target_state))
+        return embedding_bag(torch.argsort(target), rows, count.cumsum(0) - count, mode="sum")
+
+    def _backward_siamese(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor) -> None:
+        """dL/dW_k: gradients added up by state and slot, then one product with the features."""
+        bag = self._table_row(history).flatten()
+        count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
+        sample = torch.argsort(bag) // self.history_length
+        by_state = embedding_bag(sample, grad_seen, count.cumsum(0) - count, mode="sum")  # (S * K, H)
+        columns = by_state.view(len(self.features), -1)  # (S, K * H)
+        columns.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
+        torch.mm(columns.T, self.features, out=_grad(self.network.siamese_weight).flatten(0, 1))
+
+    def _table_row(self, states: Tensor) -> Tensor:
+        """Row of `projected`, seen as (S * K, H), for states (B, K) in their slots."""
+        return states * self.history_length + self.slot
+
+
+def _grad(parameter: Tensor) -> Tensor:
+    assert parameter.grad is not None
+    return parameter.grad

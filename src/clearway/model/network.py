@@ -1,0 +1,123 @@
+"""The siamese actor-critic (paper, figure 2; Zhu et al., ICRA 2017), written plainly.
+
+    observation history (K x F) --siamese--> H --+
+                                                 +--fusion--> H --scene layer--> H --> 4 action scores, 1 value
+    target, tiled K times (K x F) --siamese--> H -+
+
+ReLU after every hidden layer; the scene layer and the outputs belong to a scene. `lookup` computes the same function
+much faster where states are few; this is the definition that it is checked against, and the one to deploy.
+
+Axis letters: B batch, K history (newest last), F features, H hidden width, C scenes, A actions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import linear, relu
+
+from clearway.scenes.actions import ACTION_COUNT
+
+OUTPUTS = ACTION_COUNT + 1  # action scores, then the value
+
+
+@dataclass(frozen=True)
+class NetworkShape:
+    """Sizes that determine the parameters."""
+
+    scene_count: int
+    feature_count: int
+    width: int = 512
+    history_length: int = 4
+
+
+class SiameseActorCritic(nn.Module):
+    """Policy and value for a history of features and a target's features.
+
+    Parameters are drawn from U(+-1/sqrt(fan_in)), weights and biases alike, as PyTorch's Linear does.
+
+    Args:
+        shape: the sizes.
+        seed: of the initial parameters.
+    """
+
+    def __init__(self, shape: NetworkShape, seed: int = 0) -> None:
+        super().__init__()
+        self.shape = shape
+        scenes, features, width, history = (
+            shape.scene_count,
+            shape.feature_count,
+            shape.width,
+            shape.history_length,
+        )
+        generator = torch.Generator().manual_seed(seed)
+
+        def drawn(*size: int, fan_in: int) -> nn.Parameter:
+            bound = 1 / math.sqrt(fan_in)
+            return nn.Parameter(torch.empty(size).uniform_(-bound, bound, generator=generator))
+
+        self.siamese_weight = drawn(history, width, features, fan_in=history * features)  # (K, H, F)
+        self.siamese_bias = drawn(width, fan_in=history * features)
+        self.fusion_weight = drawn(2, width, width, fan_in=2 * width)  # observation half, target half
+        self.fusion_bias = drawn(width, fan_in=2 * width)
+        self.scene_weight = drawn(scenes, width, width, fan_in=width)
+        self.scene_bias = drawn(scenes, width, fan_in=width)
+        self.output_weight = drawn(scenes, OUTPUTS, width, fan_in=width)
+        self.output_bias = drawn(scenes, OUTPUTS, fan_in=width)
+
+    def forward(self, history: Tensor, target: Tensor, scene: Tensor) -> tuple[Tensor, Tensor]:
+        """Action scores (B, A) before the softmax, and values (B,).
+
+        Args:
+            history: (B, K, F) features of the last K poses, newest last, prepared by `FeatureScale`.
+            target: (B, F) features of the target pose, prepared likewise; tiled K times here.
+            scene: (B,) int64, whose head to use.
+        """
+        seen = self._siamese(history)
+        wanted = self._siamese(target[:, None].expand_as(history))
+        fused = relu(
+            linear(seen, self.fusion_weight[0]) + linear(wanted, self.fusion_weight[1]) + self.fusion_bias
+        )
+        output = fused.new_empty(len(fused), OUTPUTS)
+        for head in scene.unique().tolist():
+            rows = scene == head
+            special = relu(linear(fused[rows], self.scene_weight[head], self.scene_bias[head]))
+            output[rows] = linear(special, self.output_weight[head], self.output_bias[head])
+        return output[:, :ACTION_COUNT], output[:, ACTION_COUNT]
+
+    def _siamese(self, features: Tensor) -> Tensor:
+        """(B, K, F) -> (B, H)."""
+        weight = self.siamese_weight.transpose(0, 1).flatten(1)  # (H, K * F)
+        return relu(linear(features.flatten(1), weight, self.siamese_bias))
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureScale:
+    """The fixed affine map from a scene's features to the network's input: (x - mean) * factor.
+
+    Attributes:
+        mean: (F,) float32.
+        factor: scalar float32 tensor.
+    """
+
+    mean: Tensor
+    factor: Tensor
+
+    @classmethod
+    def centred(cls, features: Tensor) -> FeatureScale:
+        """Centre on the mean over all states (S, F), then one global factor to a root mean square of 1."""
+        mean = features.mean(0)
+        spread = (features - mean).square().mean().sqrt()
+        return cls(mean, torch.where(spread > 0, 1 / spread.clamp_min(1e-12), torch.ones_like(spread)))
+
+    @classmethod
+    def identity(cls, features: Tensor) -> FeatureScale:
+        """Leave the features as they are, as the paper does."""
+        return cls(torch.zeros_like(features[0]), features.new_ones(()))
+
+    def __call__(self, features: Tensor) -> Tensor:
+        """Prepared features, of the same shape (..., F)."""
+        return (features - self.mean) * self.factor
