@@ -1,0 +1,151 @@
+"""How far the agent's body is from the obstacles of a room: measured by MuJoCo, standing and on a move.
+
+Coordinates: x is MuJoCo's x, z (across the floor) is MuJoCo's y, and the height is MuJoCo's z. Only the
+collision geoms of the room count: the boxes, cylinders, capsules, spheres and ellipsoids of group 3, direct
+children of the world body, placed by pos and quat. A plane (the floor) blocks nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import mujoco
+import numpy as np
+
+COLLISION_GROUP = 3
+OBSTACLE_SHAPES = (
+    mujoco.mjtGeom.mjGEOM_BOX,
+    mujoco.mjtGeom.mjGEOM_CYLINDER,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+)
+MARGIN_REACH_M = 0.1  # distances to obstacles are measured up to this far beyond the threshold
+
+
+class CollisionRoom(Protocol):
+    """What the navigation grid needs to know of a room."""
+
+    @property
+    def name(self) -> str:
+        """Name for error messages."""
+
+    @property
+    def width_m(self) -> float:
+        """Extent of the floor along x, from 0."""
+
+    @property
+    def depth_m(self) -> float:
+        """Extent of the floor along z (MuJoCo's y), from 0."""
+
+    @property
+    def spec(self) -> mujoco.MjSpec:
+        """The room; its geoms of group 3 are the obstacles."""
+
+    @property
+    def grid_origin_m(self) -> tuple[float, float]:
+        """A point of the grid, (x, z)."""
+
+
+@dataclass(frozen=True)
+class AgentShape:
+    """The agent's body, a standing capsule, and how it moves.
+
+    Attributes:
+        radius_m: radius of the capsule.
+        height_m: length of the capsule with its caps.
+        step_m: length of a move, and the pitch of the grid.
+        clearance_m: a place or a move is free where every obstacle is farther from the body than this
+            (an exact touch would be decided by rounding).
+        lift_m: height of the capsule's foot above the floor.
+    """
+
+    radius_m: float = 0.2
+    height_m: float = 1.5
+    step_m: float = 0.5
+    clearance_m: float = 0.01
+    lift_m: float = 0.03
+
+
+class Obstacles:
+    """The collision geoms of a room and the agent's body, to measure the gaps between them with MuJoCo.
+
+    The agent's geoms (the standing capsule, and the boxes it sweeps on a move along x and along z) are put to
+    their places by writing their world positions; nothing else in the model moves.
+    """
+
+    def __init__(self, room: CollisionRoom, agent: AgentShape) -> None:
+        spec = mujoco.MjSpec()
+        half_m, radius_m, step_m = agent.height_m / 2, agent.radius_m, agent.step_m
+        for name, kind, size_m in (
+            ("standing", mujoco.mjtGeom.mjGEOM_CAPSULE, (radius_m, half_m - radius_m, 0.0)),
+            ("moving along x", mujoco.mjtGeom.mjGEOM_BOX, (step_m / 2, radius_m, half_m)),
+            ("moving along z", mujoco.mjtGeom.mjGEOM_BOX, (radius_m, step_m / 2, half_m)),
+        ):
+            spec.worldbody.add_geom(name=name, type=kind, size=size_m)
+        for geom in room.spec.geoms:
+            if geom.group == COLLISION_GROUP and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
+                _add_obstacle(spec, geom)
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
+        self._standing = self._model.geom("standing").id
+        self._moving = np.array([self._model.geom(f"moving along {axis}").id for axis in "xz"])
+        self._centre_height_m = agent.lift_m + half_m
+        self._reach_m = agent.clearance_m + MARGIN_REACH_M
+        lowest_m, highest_m = (
+            agent.lift_m - agent.clearance_m,
+            agent.lift_m + agent.height_m + agent.clearance_m,
+        )
+        self._centres_m, self._halves_m = _bounding_boxes(self._model, self._data)
+        tops_m, bottoms_m = (self._centres_m + sign * self._halves_m for sign in (1, -1))
+        in_reach = (tops_m[:, 2] > lowest_m) & (bottoms_m[:, 2] < highest_m)
+        in_reach[[self._standing, *self._moving]] = False
+        self._candidates = np.nonzero(in_reach)[0]
+
+    def standing_gaps_m(self, points_m: np.ndarray) -> np.ndarray:
+        """Gap between the agent at (N, 2) points and the nearest obstacle, (N,); negative: overlap."""
+        return self._gaps_m(points_m, np.full(len(points_m), self._standing))
+
+    def moving_gaps_m(self, middles_m: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        """Gap between the nearest obstacle and the space swept by a move, (N,); negative: overlap.
+
+        Args:
+            middles_m: (N, 2) the middles of the moves, x and z.
+            axes: (N,) 0 for a move along x, 1 for one along z.
+        """
+        return self._gaps_m(middles_m, self._moving[axes])
+
+    def _gaps_m(self, points_m: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+        apart_m = np.abs(points_m[:, None] - self._centres_m[None, self._candidates, :2])
+        sum_m = self._halves_m[bodies, None, :2] + self._halves_m[None, self._candidates, :2]
+        near = np.all(apart_m < sum_m + self._reach_m, axis=2)
+        gaps_m = np.full(len(points_m), self._reach_m)
+        for index, (point_m, body) in enumerate(zip(points_m, bodies, strict=True)):
+            self._data.geom_xpos[body] = (*point_m, self._centre_height_m)
+            for obstacle in self._candidates[near[index]]:
+                gap_m = mujoco.mj_geomDistance(self._model, self._data, body, obstacle, self._reach_m, None)
+                gaps_m[index] = min(gaps_m[index], gap_m)
+        return gaps_m
+
+
+def _add_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+    """Copy a collision geom into the agent's own model, which has no meshes and compiles in milliseconds."""
+    placed_plainly = (
+        geom.parent.name == "world"
+        and geom.frame is None
+        and geom.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
+        and np.isnan(geom.fromto[0])
+    )
+    assert placed_plainly, f"collision geom '{geom.name}' must hang on the world body by pos and quat"
+    assert geom.type in OBSTACLE_SHAPES, f"collision geom '{geom.name}' must be one of {OBSTACLE_SHAPES}"
+    copy = spec.worldbody.add_geom(type=geom.type, pos=geom.pos, quat=geom.quat)
+    copy.size[:] = geom.size
+
+
+def _bounding_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Centres and half sizes, both (geoms, 3) metres, of the boxes along the axes that hold each geom."""
+    rotations = data.geom_xmat.reshape(-1, 3, 3)
+    centres_m = data.geom_xpos + np.einsum("gij,gj->gi", rotations, model.geom_aabb[:, :3])
+    return centres_m, np.einsum("gij,gj->gi", np.abs(rotations), model.geom_aabb[:, 3:])
