@@ -62,7 +62,8 @@ class TargetChoice:
         self.reweigh(weights)
 
     def reweigh(self, weights: Tensor) -> None:
-        """Set the weights (G, J)."""
+        """Set the weights (G, J); 0 keeps a target from being drawn."""
+        self.weights = weights
         self.bounds = weights.cumsum(1) / weights.sum(1, keepdim=True)
 
     def draw(self, uniform: Tensor, index: Tensor) -> Tensor:

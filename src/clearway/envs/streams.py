@@ -35,7 +35,7 @@ def _mix(x: Tensor) -> Tensor:
 
 def stream_keys(seeds: Tensor, purpose: int) -> Tensor:
     """One key an environment, int64: seeds (N,) int64 mixed with a small number that tells streams of one seed apart."""
-    return _mix(_mix(seeds + _signed(_INCREMENT)) + purpose * _signed(_INCREMENT))
+    return _mix(_mix(seeds + _signed(_INCREMENT)) + _signed(purpose * _INCREMENT))
 
 
 class Streams:

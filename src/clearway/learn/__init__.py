@@ -1,0 +1,1 @@
+"""Learning: rollouts, returns and losses as pure functions, the synchronous trainer, run folders and checkpoints."""

@@ -1,0 +1,131 @@
+"""The learner's settings and the two named sets of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from clearway.errors import RunError
+
+Algorithm = Literal["ppo", "a2c"]
+PresetName = Literal["default", "paper"]
+
+
+@dataclass(frozen=True)
+class Learner:
+    """Everything that shapes learning apart from scenes, targets, reward and seed."""
+
+    # How much experience, and how it is gathered
+    frames: int = 1_600_000
+    """Training frames over all environments; schedules end here."""
+    envs: int = 400
+    """Environments side by side, divided evenly among the scenes."""
+    rollout_steps: int = 20
+    """Steps of every environment between updates."""
+    step_limit: int = 200
+    """Steps after which a training episode is cut."""
+    bootstrap_cut: bool = True
+    """Add the value of the pose where an episode was cut; False treats the cut as an end, as Zhu's code does."""
+
+    # What is learnt from
+    reward_scale: float = 0.1
+    """Rewards are multiplied by this, so that the target is worth 1 without clipping."""
+    clip_rewards: bool = False
+    """Clip rewards to [-1, 1] (before scaling), as Zhu's training loop does."""
+    centre_features: bool = True
+    """Centre features and give them a root mean square of 1, by one global factor."""
+    discount: float = 0.97
+    gae_lambda: float = 0.95
+    """Lambda of generalised advantage estimation; 1 gives n-step returns."""
+    hindsight: bool = True
+    """Learn also from passing other targets of the scene by, with truncated importance ratios."""
+    balance: float = 3.0
+    """A target's weight at reset is 1 + balance * (1 - its recent success); 0 draws all alike."""
+
+    # The loss
+    algorithm: Algorithm = "ppo"
+    epochs: int = 2
+    """Passes over each rollout (1 with one minibatch is plain A2C)."""
+    minibatches: int = 4
+    """Parts that each pass is divided into."""
+    ratio_clip: float = 0.2
+    """PPO's clip of the probability ratio."""
+    value_weight: float = 0.5
+    """Factor of the mean squared value error, halved: weight * 0.5 * (R - V)^2."""
+    entropy_start: float = 0.01
+    entropy_end: float = 0.001
+    """The entropy bonus falls geometrically from start to end."""
+    sum_loss: bool = False
+    """Sum the loss over a batch, as A3C does, rather than average it."""
+
+    # The step
+    optimiser: Literal["adam", "rmsprop"] = "adam"
+    """rmsprop is the paper's: epsilon inside the root, mean square starting at 1."""
+    lr_start: float = 1e-3
+    lr_end: float = 5e-5
+    """The learning rate falls linearly from start to end."""
+    clip_norm: float = 0.5
+    """Largest norm of the gradient."""
+    clip_each_tensor: bool = False
+    """Clip every parameter tensor by itself, as Zhu's code does, rather than all together."""
+
+    # The network
+    width: int = 512
+    history_length: int = 4
+
+    def __post_init__(self) -> None:
+        """Refuse settings that cannot work.
+
+        Raises:
+            RunError: a value is out of range.
+        """
+        at_least_one = ("frames", "envs", "rollout_steps", "step_limit", "epochs", "minibatches", "width")
+        for name in (*at_least_one, "history_length"):
+            if getattr(self, name) < 1:
+                raise RunError(f"{name} is {getattr(self, name)}, expected at least 1. Give a larger {name}")
+        for name in ("discount", "gae_lambda"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise RunError(f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range")
+        for name in ("entropy_start", "entropy_end", "lr_start", "clip_norm", "reward_scale"):
+            if not getattr(self, name) > 0:
+                raise RunError(f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}")
+        if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):
+            raise RunError("a2c makes one pass over each rollout. Set epochs and minibatches to 1, or use ppo")
+
+    def as_a2c(self) -> Learner:
+        """The same settings with one update a rollout."""
+        return replace(self, algorithm="a2c", epochs=1, minibatches=1)
+
+
+DEFAULT = Learner()
+"""PPO with hindsight and balanced targets; why each part is there, with figures: docs/learning.md."""
+
+PAPER_A2C = Learner(
+    frames=10_000_000,
+    envs=100,
+    rollout_steps=5,
+    step_limit=5000,
+    bootstrap_cut=False,
+    reward_scale=1.0,
+    clip_rewards=True,
+    centre_features=False,
+    discount=0.99,
+    gae_lambda=1.0,
+    hindsight=False,
+    balance=0.0,
+    algorithm="a2c",
+    epochs=1,
+    minibatches=1,
+    value_weight=0.5,
+    entropy_start=0.01,
+    entropy_end=0.01,
+    sum_loss=True,
+    optimiser="rmsprop",
+    lr_start=7.0e-4,
+    lr_end=0.0,
+    clip_norm=40.0,
+    clip_each_tensor=True,
+)
+"""The published settings, synchronous: 5-step returns, discount 0.99, entropy 0.01, RMSProp, rewards clipped."""
+
+PRESETS: dict[PresetName, Learner] = {"default": DEFAULT, "paper": PAPER_A2C}

@@ -1,0 +1,112 @@
+"""The loss that A2C and PPO share, as a pure function of a batch.
+
+    L = mean( -min(ratio A, clip(ratio, 1 - c, 1 + c) A) - entropy_weight H(pi) + value_weight / 2 (R - V)^2 )
+
+(Schulman et al., 2017, equation 9.) On the first pass over a rollout the ratio is 1 and its gradient is A2C's,
+-A grad log pi, so A2C is the case of one pass. Zhu's 0.25 (R - V)^2 is value_weight 0.5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from clearway.scenes.actions import ACTION_COUNT
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Rows to learn from, ordered by scene.
+
+    Attributes:
+        history: (B, K) int64 states.
+        target: (B,) int64.
+        action: (B,) int64.
+        log_prob: (B,) of the action when it was taken.
+        advantage, value_target: (B,).
+        rows_per_scene: number of rows of each scene.
+    """
+
+    history: Tensor
+    target: Tensor
+    action: Tensor
+    log_prob: Tensor
+    advantage: Tensor
+    value_target: Tensor
+    rows_per_scene: tuple[int, ...]
+
+    def __len__(self) -> int:
+        """B."""
+        return len(self.action)
+
+    def rows(self, index: Tensor, rows_per_scene: tuple[int, ...]) -> Batch:
+        """The rows in index (b,) int64, which must keep the order of scenes."""
+        return Batch(
+            self.history[index],
+            self.target[index],
+            self.action[index],
+            self.log_prob[index],
+            self.advantage[index],
+            self.value_target[index],
+            rows_per_scene,
+        )
+
+
+@dataclass(frozen=True)
+class LossTerms:
+    """The loss and its parts, scalars; `total` carries the gradient."""
+
+    total: Tensor
+    policy: Tensor
+    value: Tensor
+    entropy: Tensor
+    clipped: Tensor
+    """Share of rows whose ratio lies outside the clip."""
+
+
+def actor_critic_loss(
+    output: Tensor,
+    batch: Batch,
+    *,
+    entropy_weight: float,
+    value_weight: float,
+    ratio_clip: float,
+    sum_loss: bool,
+) -> LossTerms:
+    """The loss of network outputs (B, A + 1): action scores, then the value."""
+    log_pi = torch.log_softmax(output[:, :ACTION_COUNT], 1)
+    entropy = -(log_pi.exp() * log_pi).sum(1)
+    ratio = (log_pi.gather(1, batch.action[:, None])[:, 0] - batch.log_prob).exp()
+    limited = ratio.clamp(1 - ratio_clip, 1 + ratio_clip)
+    policy = -torch.minimum(ratio * batch.advantage, limited * batch.advantage)
+    value = 0.5 * (batch.value_target - output[:, ACTION_COUNT]).square()
+    each = policy - entropy_weight * entropy + value_weight * value
+    total = each.sum() if sum_loss else each.mean()
+    clipped = (ratio != limited).float().mean()
+    return LossTerms(total, policy.mean(), value.mean(), entropy.mean(), clipped)
+
+
+def loss_gradient(
+    output: Tensor,
+    batch: Batch,
+    *,
+    entropy_weight: float,
+    value_weight: float,
+    ratio_clip: float,
+    sum_loss: bool,
+) -> tuple[LossTerms, Tensor]:
+    """The loss and its gradient with respect to the outputs, (B, A + 1)."""
+    leaf = output.detach().requires_grad_()
+    with torch.enable_grad():
+        terms = actor_critic_loss(
+            leaf,
+            batch,
+            entropy_weight=entropy_weight,
+            value_weight=value_weight,
+            ratio_clip=ratio_clip,
+            sum_loss=sum_loss,
+        )
+        (gradient,) = torch.autograd.grad(terms.total, leaf)
+    return terms, gradient

@@ -1,0 +1,99 @@
+"""The two optimisers, and the clipping of gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import torch
+from torch import Tensor, nn
+
+
+class Optimiser(Protocol):
+    """Changes parameters along their `.grad`."""
+
+    def step(self, lr: float) -> None:
+        """One step with the given learning rate."""
+
+    def tensors(self) -> dict[str, Tensor]:
+        """All that `load_tensors` needs to go on from here."""
+
+    def load_tensors(self, tensors: dict[str, Tensor]) -> None:
+        """Go on from where `tensors` was called."""
+
+
+class Adam:
+    """PyTorch's fused Adam (Kingma & Ba, 2015)."""
+
+    def __init__(self, network: nn.Module, epsilon: float = 1e-8) -> None:
+        self.named = dict(network.named_parameters())
+        self.adam = torch.optim.Adam(list(self.named.values()), lr=0.0, eps=epsilon, fused=True)
+        for parameter in self.named.values():
+            self.adam.state[parameter] = {
+                "step": torch.zeros((), dtype=torch.float32, device=parameter.device),
+                "exp_avg": torch.zeros_like(parameter),
+                "exp_avg_sq": torch.zeros_like(parameter),
+            }
+
+    def step(self, lr: float) -> None:
+        """One step with the given learning rate."""
+        self.adam.param_groups[0]["lr"] = lr
+        self.adam.step()
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Moments and step counts by parameter."""
+        return {
+            f"{key}.{name}": value
+            for name, parameter in self.named.items()
+            for key, value in self.adam.state[parameter].items()
+        }
+
+    def load_tensors(self, tensors: dict[str, Tensor]) -> None:
+        """Set moments and step counts."""
+        for name, parameter in self.named.items():
+            for key, value in self.adam.state[parameter].items():
+                value.copy_(tensors[f"{key}.{name}"])
+
+
+class SharedRMSProp:
+    """The RMSProp of A3C (Mnih et al., 2016) as Zhu et al. set it: epsilon inside the root, mean square starting at 1.
+
+    ms <- alpha ms + (1 - alpha) g^2;   parameter <- parameter - lr g / sqrt(ms + epsilon)
+    """
+
+    def __init__(self, network: nn.Module, alpha: float = 0.99, epsilon: float = 0.1) -> None:
+        self.named = dict(network.named_parameters())
+        self.alpha, self.epsilon = alpha, epsilon
+        self.mean_square = {name: torch.ones_like(parameter) for name, parameter in self.named.items()}
+
+    @torch.no_grad()
+    def step(self, lr: float) -> None:
+        """One step with the given learning rate."""
+        for name, parameter in self.named.items():
+            gradient, mean_square = parameter.grad, self.mean_square[name]
+            assert gradient is not None
+            mean_square.mul_(self.alpha).addcmul_(gradient, gradient, value=1 - self.alpha)
+            parameter.addcdiv_(gradient, (mean_square + self.epsilon).sqrt_(), value=-lr)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Mean squares by parameter."""
+        return {f"mean_square.{name}": value for name, value in self.mean_square.items()}
+
+    def load_tensors(self, tensors: dict[str, Tensor]) -> None:
+        """Set the mean squares."""
+        for name, value in self.mean_square.items():
+            value.copy_(tensors[f"mean_square.{name}"])
+
+
+@torch.no_grad()
+def clip_gradients(parameters: Sequence[nn.Parameter], limit: float, each_tensor: bool) -> Tensor:
+    """Scale gradients down to a norm of at most `limit`; returns the norm of all together before that, a scalar.
+
+    With `each_tensor` every parameter tensor is clipped by itself, as TensorFlow's clip_by_norm in Zhu's code.
+    """
+    gradients = [parameter.grad for parameter in parameters if parameter.grad is not None]
+    norms = torch.stack([torch.linalg.vector_norm(gradient) for gradient in gradients])
+    norm = torch.linalg.vector_norm(norms)
+    for gradient, own in zip(gradients, norms, strict=True):
+        gradient.mul_((limit / (own if each_tensor else norm).clamp_min(1e-12)).clamp(max=1.0))
+    return norm

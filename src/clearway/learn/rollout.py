@@ -1,0 +1,132 @@
+"""Rollouts: all environments walk some steps under the current policy.
+
+Axis letters: T steps, N environments, C scenes, E environments a scene (N = C * E), K history, A actions.
+Environments are ordered by scene. What the network reads is kept as (C, T, E, ...), so that flattened rows are ordered
+by scene too; what returns are computed from is (T, N).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from clearway.envs.navigation import Navigation
+from clearway.envs.streams import Streams
+from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.lookup import Activations, LookupNetwork
+from clearway.scenes.actions import ACTION_COUNT
+
+ACTION_STREAM = 3
+
+
+def sample_actions(scores: Tensor, uniform: Tensor) -> Tensor:
+    """Actions (B,) int64 drawn from softmax(scores (B, A)) with uniform numbers (B,) in [0, 1)."""
+    bounds = torch.softmax(scores, 1).cumsum(1)
+    threshold = uniform.to(bounds.dtype)[:, None] * bounds[:, -1:]
+    return (threshold >= bounds).sum(1).clamp_(max=ACTION_COUNT - 1)
+
+
+def by_scene(values: Tensor, scene_count: int) -> Tensor:
+    """(T, N, ...) rearranged to (C * T * E, ...), rows ordered by scene."""
+    steps, envs = values.shape[:2]
+    split = values.view(steps, scene_count, envs // scene_count, *values.shape[2:])
+    return split.transpose(0, 1).reshape(steps * envs, *values.shape[2:])
+
+
+def by_step(rows: Tensor, steps: int, scene_count: int) -> Tensor:
+    """(C * T * E, ...) rearranged to (T, N, ...); the inverse of `by_scene`."""
+    split = rows.view(scene_count, steps, -1, *rows.shape[1:])
+    return split.transpose(0, 1).reshape(steps, -1, *rows.shape[1:])
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """T steps of N environments.
+
+    Attributes:
+        history: (T, N, K) int64, what the agent knew before each step.
+        target: (T, N) int64.
+        action: (T, N) int64.
+        arrived: (T, N) int64, the pose each step led to.
+        reward: (T, N) float32 as the reward table has it.
+        reached, truncated: (T, N) bool.
+        last_history: (T, N, K) int64, the history after each step, before any new episode began.
+        kept: activations of all rows, ordered by scene; only the output where they are not to be used again.
+        history_after, target_after: (N, K), (N,) int64, where the environments stand now.
+    """
+
+    history: Tensor
+    target: Tensor
+    action: Tensor
+    arrived: Tensor
+    reward: Tensor
+    reached: Tensor
+    truncated: Tensor
+    last_history: Tensor
+    kept: Activations
+    history_after: Tensor
+    target_after: Tensor
+
+
+class Collector:
+    """Gathers rollouts, one after the other.
+
+    Args:
+        navigation: the environments, ordered by scene, as many in each.
+        network: the policy.
+        action_stream: one random stream an environment.
+        steps: T.
+        keep_hidden: keep the hidden activations too, for an update that follows at once.
+    """
+
+    def __init__(
+        self,
+        navigation: Navigation,
+        network: LookupNetwork,
+        action_stream: Streams,
+        steps: int,
+        keep_hidden: bool,
+    ) -> None:
+        self.navigation, self.network, self.action_stream = navigation, network, action_stream
+        self.steps, self.keep_hidden = steps, keep_hidden
+        self.scene_count = navigation.world.scene_count
+        device, count = navigation.world.device, len(navigation.target)
+        self.rows_per_scene = (count // self.scene_count,) * self.scene_count
+        self.one_step = Activations.empty(count, network.width, device)
+        self.kept = Activations.empty(count * steps, network.width if keep_hidden else 0, device)
+
+    @torch.no_grad()
+    def collect(self, statistics: EpisodeStatistics) -> Rollout:
+        """Walk T steps from where the environments stand; ended episodes begin anew at once."""
+        nav = self.navigation
+        seen: list[tuple[Tensor, ...]] = []
+        for t in range(self.steps):
+            history, target = nav.history, nav.target.clone()
+            self.network.forward(history, target, self.rows_per_scene, self.one_step)
+            self._keep(t)
+            action = sample_actions(self.one_step.scores, self.action_stream.uniform())
+            step = nav.step(action)
+            statistics.add(target, step)
+            seen.append(
+                (history, target, action, step.state, step.reward, step.reached, step.truncated, nav.history)
+            )
+            nav.history = nav.history.clone()
+            nav.reset(torch.nonzero(step.ended)[:, 0])
+        columns = [torch.stack(column) for column in zip(*seen, strict=True)]
+        return Rollout(*columns, kept=self.kept, history_after=nav.history, target_after=nav.target.clone())
+
+    def _keep(self, t: int) -> None:
+        """Copy the activations of step t to their rows, which are ordered by scene first."""
+        self._step_rows(self.kept.output, t).copy_(self._scene_rows(self.one_step.output))
+        if self.keep_hidden:
+            for name in ("seen", "fused", "special"):
+                rows = self._step_rows(getattr(self.kept, name), t)
+                rows.copy_(self._scene_rows(getattr(self.one_step, name)))
+
+    def _step_rows(self, rows: Tensor, t: int) -> Tensor:
+        return rows.view(self.scene_count, self.steps, -1, rows.shape[1])[:, t]
+
+    def _scene_rows(self, rows: Tensor) -> Tensor:
+        return rows.view(self.scene_count, -1, rows.shape[1])

@@ -1,0 +1,326 @@
+"""The synchronous trainer: rollout, advantages, update; one call an update, no files and no printing.
+
+Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from clearway.envs.navigation import Navigation, TargetChoice
+from clearway.envs.streams import Streams
+from clearway.envs.world import World
+from clearway.errors import RunError
+from clearway.learn.config import Learner
+from clearway.learn.hindsight import hindsight_batch
+from clearway.learn.losses import Batch, LossTerms, loss_gradient
+from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp, clip_gradients
+from clearway.learn.returns import generalised_advantages
+from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, by_scene, by_step
+from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.lookup import Activations, LookupNetwork
+from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.reward import Reward
+
+SHUFFLE_SALT = 1_000_003
+
+
+@dataclass(frozen=True)
+class Update:
+    """Figures of one update, means over its minibatches; floats.
+
+    Attributes:
+        loss, policy_loss, value_loss, entropy: see `losses`.
+        clipped: share of rows whose probability ratio lies outside PPO's clip.
+        gradient_norm: before clipping.
+        explained_variance: 1 - Var(R - V) / Var(R) of the rollout.
+        hindsight_rows: rows that hindsight added.
+        lr, entropy_weight: as used.
+    """
+
+    loss: float
+    policy_loss: float
+    value_loss: float
+    entropy: float
+    clipped: float
+    gradient_norm: float
+    explained_variance: float
+    hindsight_rows: int
+    lr: float
+    entropy_weight: float
+
+
+class Trainer:
+    """Learns a policy for a world.
+
+    Args:
+        world: tables of the scenes and targets; must hold features.
+        learner: the settings.
+        reward: what is earned.
+        seed: of parameters, environments, actions and shuffling.
+
+    Raises:
+        RunError: features are missing or not finite, or there are fewer environments than scenes.
+    """
+
+    def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
+        features = _checked_features(world)
+        self.world, self.learner, self.seed = world, learner, seed
+        self.frames, self.updates = 0, 0
+        per_scene = learner.envs // world.scene_count
+        if per_scene < 1:
+            raise RunError(
+                f"{learner.envs} environments for {world.scene_count} scenes. Give at least one a scene"
+            )
+        self.env_count = per_scene * world.scene_count
+        device = world.device
+        self.scale = FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
+        shape = NetworkShape(world.scene_count, features.shape[1], learner.width, learner.history_length)
+        self.network = SiameseActorCritic(shape, seed).to(device)
+        self.lookup = LookupNetwork(self.network, self.scale(features), world.target_state)
+        self.optimiser: Optimiser = (
+            Adam(self.network) if learner.optimiser == "adam" else SharedRMSProp(self.network)
+        )
+        seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
+        scenes = torch.arange(world.scene_count, device=device).repeat_interleave(per_scene)
+        self.navigation = Navigation(
+            world,
+            replace(reward, clip=reward.clip or learner.clip_rewards),
+            seeds,
+            choice=TargetChoice.by_scene(world, scenes),
+            step_limit=learner.step_limit,
+            history_length=learner.history_length,
+        )
+        self.statistics = EpisodeStatistics(self.env_count, world.target_count, device)
+        self.action_stream = Streams(seeds, ACTION_STREAM)
+        self.one_pass = learner.epochs * learner.minibatches == 1
+        self.collector = Collector(
+            self.navigation, self.lookup, self.action_stream, learner.rollout_steps, self.one_pass
+        )
+        self._begin_staggered()
+
+    @property
+    def frames_per_update(self) -> int:
+        """Frames that one update uses."""
+        return self.env_count * self.learner.rollout_steps
+
+    @property
+    def finished(self) -> bool:
+        """All frames of the settings are used."""
+        return self.frames >= self.learner.frames
+
+    def update(self) -> Update:
+        """Gather one rollout and learn from it.
+
+        Raises:
+            RunError: the loss or a gradient is not finite.
+        """
+        learner, progress = self.learner, self.frames / self.learner.frames
+        lr = learner.lr_start + (learner.lr_end - learner.lr_start) * min(progress, 1.0)
+        entropy_weight = learner.entropy_start * (learner.entropy_end / learner.entropy_start) ** min(progress, 1.0)
+        self.lookup.refresh()
+        rollout = self.collector.collect(self.statistics)
+        batch, explained = self._batch(rollout)
+        rows = len(batch)
+        if learner.hindsight:
+            batch = self._with_hindsight(rollout, batch)
+        kept = self.collector.kept if self.one_pass and len(batch) == rows else None
+        terms, norms = self._learn(batch, kept, lr, entropy_weight)
+        self.frames += self.frames_per_update
+        self.updates += 1
+        self._rebalance()
+        figures = torch.stack([torch.stack(list(vars(t).values())) for t in terms]).mean(0).tolist()
+        norm = float(torch.stack(norms).mean())
+        self._check_finite(figures[0], norm)
+        return Update(*self._figures(figures), norm, explained, len(batch) - rows, lr, entropy_weight)
+
+    @staticmethod
+    def _figures(values: list[float]) -> tuple[float, float, float, float, float]:
+        total, policy, value, entropy, clipped = values
+        return total, policy, value, entropy, clipped
+
+    def _begin_staggered(self) -> None:
+        """Begin all episodes, targets in turn, with clocks spread so that cuts do not fall together."""
+        nav, world = self.navigation, self.world
+        order = torch.arange(self.env_count, device=world.device)
+        place = order % (self.env_count // world.scene_count)
+        counts = torch.bincount(world.target_scene, minlength=world.scene_count)
+        group = nav.choice.groups
+        nav.reset(target=nav.choice.members[group, place % counts[group]])
+        nav.elapsed = (nav.start_stream.uniform() * self.learner.step_limit).long()
+
+    @torch.no_grad()
+    def _batch(self, rollout: Rollout) -> tuple[Batch, float]:
+        """The rollout's rows with their advantages, and the explained variance of the values."""
+        learner, scenes = self.learner, self.world.scene_count
+        log_pi = torch.log_softmax(rollout.kept.scores, 1)
+        action = by_scene(rollout.action, scenes)
+        log_prob = log_pi.gather(1, action[:, None])[:, 0]
+        value = by_step(rollout.kept.value, learner.rollout_steps, scenes)
+        rows_per_scene = self.collector.rows_per_scene
+        after = self.lookup.forward(rollout.history_after, rollout.target_after, rows_per_scene).value
+        ended = rollout.reached | rollout.truncated
+        advantage = generalised_advantages(
+            rollout.reward * learner.reward_scale + self._value_at_cuts(rollout),
+            learner.discount * (~ended),
+            value,
+            after,
+            learner.gae_lambda,
+        )
+        value_target = advantage + value
+        explained = 1 - advantage.var() / value_target.var().clamp_min(1e-12)
+        batch = Batch(
+            by_scene(rollout.history, scenes),
+            by_scene(rollout.target, scenes),
+            action,
+            log_prob,
+            by_scene(advantage, scenes),
+            by_scene(value_target, scenes),
+            tuple(count * learner.rollout_steps for count in rows_per_scene),
+        )
+        return batch, float(explained)
+
+    def _value_at_cuts(self, rollout: Rollout) -> Tensor:
+        """(T, N) discounted value of the pose where an episode was cut, to be added to that step's reward; else 0."""
+        bonus = torch.zeros_like(rollout.reward)
+        if not self.learner.bootstrap_cut:
+            return bonus
+        scenes = self.world.scene_count
+        cut = by_scene(rollout.truncated, scenes).nonzero()[:, 0]  # rows ordered by scene
+        if len(cut):
+            rows_of_scene = len(rollout.truncated) * self.env_count // scenes
+            rows_per_scene = torch.bincount(cut // rows_of_scene, minlength=scenes).tolist()
+            history = by_scene(rollout.last_history, scenes)[cut]
+            target = by_scene(rollout.target, scenes)[cut]
+            rows = by_scene(bonus, scenes)
+            rows[cut] = self.learner.discount * self.lookup.forward(history, target, rows_per_scene).value
+            bonus = by_step(rows, len(rollout.truncated), scenes)
+        return bonus
+
+    def _with_hindsight(self, rollout: Rollout, batch: Batch) -> Batch:
+        """The batch with hindsight's rows put among those of their scene."""
+        learner = self.learner
+        told = hindsight_batch(
+            rollout,
+            by_step(batch.log_prob, learner.rollout_steps, self.world.scene_count),
+            self.navigation,
+            self.lookup,
+            discount=learner.discount,
+            reward_scale=learner.reward_scale,
+            trace_lambda=learner.gae_lambda,
+        )
+        return batch if told is None else merged(batch, told)
+
+    def _learn(
+        self, batch: Batch, kept: Activations | None, lr: float, entropy_weight: float
+    ) -> tuple[list[LossTerms], list[Tensor]]:
+        """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
+        learner = self.learner
+        terms, norms = [], []
+        for number, part in enumerate(self._minibatches(batch)):
+            if number:
+                self.lookup.refresh()
+            rows = part.history, part.target, part.rows_per_scene
+            activations = kept or self.lookup.forward(*rows)
+            loss, gradient = loss_gradient(
+                activations.output,
+                part,
+                entropy_weight=entropy_weight,
+                value_weight=learner.value_weight,
+                ratio_clip=learner.ratio_clip,
+                sum_loss=learner.sum_loss,
+            )
+            self.lookup.backward(*rows, activations, gradient)
+            norms.append(
+                clip_gradients(list(self.network.parameters()), learner.clip_norm, learner.clip_each_tensor)
+            )
+            self.optimiser.step(lr)
+            terms.append(loss)
+        return terms, norms
+
+    def _minibatches(self, batch: Batch) -> Iterator[Batch]:
+        """Every epoch's minibatches: each scene's rows shuffled and dealt out evenly."""
+        if self.one_pass:
+            yield batch
+            return
+        device, parts = self.world.device, self.learner.minibatches
+        generator = torch.Generator(device).manual_seed(self.seed * SHUFFLE_SALT + self.updates)
+        for _ in range(self.learner.epochs):
+            first, orders = 0, []
+            for count in batch.rows_per_scene:
+                orders.append(first + torch.randperm(count, generator=generator, device=device))
+                first += count
+            for part in range(parts):
+                dealt = [order[len(order) * part // parts : len(order) * (part + 1) // parts] for order in orders]
+                yield batch.rows(torch.cat(dealt), tuple(len(rows) for rows in dealt))
+
+    def _rebalance(self) -> None:
+        """Draw targets more often that are reached less often."""
+        self.statistics.refresh_success()
+        if self.learner.balance:
+            choice = self.navigation.choice
+            weight = 1 + self.learner.balance * (1 - self.statistics.recent_success)
+            choice.reweigh(torch.where(choice.weights > 0, weight[choice.members], 0.0))
+
+    def _check_finite(self, loss: float, norm: float) -> None:
+        for name, value in (("loss", loss), ("gradient norm", norm)):
+            if not torch.isfinite(torch.tensor(value)):
+                raise RunError(
+                    f"the {name} is {value} after {self.frames} frames. Training stopped; "
+                    "lower the learning rate or check the features"
+                )
+
+    def tensors(self) -> dict[str, Tensor]:
+        """All that `load_tensors` needs to go on bit for bit, besides `frames` and `updates`."""
+        parts = {
+            "network": dict(self.network.named_parameters()),
+            "optimiser": self.optimiser.tensors(),
+            "navigation": self.navigation.tensors(),
+            "statistics": self.statistics.tensors(),
+            "actions": {"drawn": self.action_stream.drawn},
+            "choice": {"weights": self.navigation.choice.weights},
+        }
+        return {f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()}
+
+    @torch.no_grad()
+    def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
+        """Go on from where `tensors` was called, after that many frames and updates."""
+
+        def part(name: str) -> dict[str, Tensor]:
+            prefix = f"{name}."
+            return {key[len(prefix) :]: value for key, value in tensors.items() if key.startswith(prefix)}
+
+        for name, parameter in self.network.named_parameters():
+            parameter.copy_(tensors[f"network.{name}"])
+        self.optimiser.load_tensors(part("optimiser"))
+        self.navigation.load_tensors(part("navigation"))
+        self.statistics.load_tensors(part("statistics"))
+        self.action_stream.drawn = tensors["actions.drawn"].to(self.world.device).clone()
+        self.navigation.choice.reweigh(tensors["choice.weights"].to(self.world.device).clone())
+        self.frames, self.updates = frames, updates
+        self.lookup.refresh()
+
+
+def merged(first: Batch, second: Batch) -> Batch:
+    """The rows of two batches, each ordered by scene, as one batch ordered by scene."""
+    scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
+    scene = torch.cat(
+        [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
+    )
+    order = torch.argsort(scene, stable=True)
+    names = ("history", "target", "action", "log_prob", "advantage", "value_target")
+    joined = [torch.cat([getattr(first, name), getattr(second, name)])[order] for name in names]
+    counts = [a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)]
+    return Batch(*joined, rows_per_scene=tuple(counts))
+
+
+def _checked_features(world: World) -> Tensor:
+    if world.features is None:
+        raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
+    if not torch.isfinite(world.features).all():
+        raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
+    return world.features
