@@ -37,5 +37,9 @@ class RenderError(ClearwayError):
     """Rendering is not possible on this machine."""
 
 
+class EnvError(ClearwayError, ValueError):
+    """An environment that cannot be made as asked, or an action or a reset option that it does not know."""
+
+
 class RunError(ClearwayError):
     """A run folder, checkpoint or training configuration that cannot be used."""

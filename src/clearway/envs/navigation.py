@@ -28,7 +28,7 @@ class Transition:
 
     Attributes:
         state: (N,) int64, the pose arrived in.
-        reward: (N,) float32.
+        reward: (N,) float32 (or the `reward_dtype` asked for).
         reached: (N,) bool, the pose is the target.
         truncated: (N,) bool, the step limit was met first.
         blocked: (N,) bool, the move was blocked: one collision.
@@ -64,7 +64,8 @@ class TargetChoice:
     def reweigh(self, weights: Tensor) -> None:
         """Set the weights (G, J); 0 keeps a target from being drawn."""
         self.weights = weights
-        self.bounds = weights.cumsum(1) / weights.sum(1, keepdim=True)
+        total = weights.cumsum(1)
+        self.bounds = total / total[:, -1:]  # the last bound is exactly 1, above every uniform number
 
     def draw(self, uniform: Tensor, index: Tensor) -> Tensor:
         """Targets (B,) int64 for the environments in index (B,), from uniform numbers (B,) in [0, 1)."""
@@ -99,6 +100,7 @@ class Navigation:
         choice: how targets are drawn; by default uniformly from all.
         step_limit: steps after which an episode is truncated; None for no limit.
         history_length: K.
+        reward_dtype: precision of the rewards.
     """
 
     def __init__(
@@ -110,11 +112,12 @@ class Navigation:
         choice: TargetChoice | None = None,
         step_limit: int | None = None,
         history_length: int = HISTORY_LENGTH,
+        reward_dtype: torch.dtype = torch.float32,
     ) -> None:
         count = len(seeds)
         self.world, self.reward, self.step_limit = world, reward, step_limit
         self.choice = choice or TargetChoice.uniform(world, count)
-        self.reward_table = torch.from_numpy(reward.table()).to(world.device, torch.float32)
+        self.reward_table = torch.from_numpy(reward.table()).to(world.device, reward_dtype)
         seeds = seeds.to(world.device)
         self.start_stream, self.target_stream = Streams(seeds, START_STREAM), Streams(seeds, TARGET_STREAM)
         self.history = torch.zeros(count, history_length, dtype=torch.int64, device=world.device)
@@ -143,6 +146,11 @@ class Navigation:
         self.target[index] = target
         self.history[index] = start[:, None]
         self.elapsed[index] = 0
+
+    def reseed(self, seeds: Tensor, index: Tensor) -> None:
+        """Begin the random streams of the environments in index (B,) anew, from seeds (B,) int64."""
+        self.start_stream.reseed(seeds, index)
+        self.target_stream.reseed(seeds, index)
 
     def step(self, action: Tensor) -> Transition:
         """Move every agent by its action (N,) int64 and say what happened. Ended episodes wait for their `reset`."""

@@ -47,8 +47,14 @@ class Streams:
     """
 
     def __init__(self, seeds: Tensor, purpose: int) -> None:
+        self.purpose = purpose
         self.keys = stream_keys(seeds, purpose)
         self.drawn = torch.zeros_like(self.keys)
+
+    def reseed(self, seeds: Tensor, index: Tensor) -> None:
+        """Begin the streams in index (B,) anew, from seeds (B,) int64; the others go on."""
+        self.keys[index] = stream_keys(seeds, self.purpose)
+        self.drawn[index] = 0
 
     def uniform(self, used: Tensor | None = None) -> Tensor:
         """The next number of every stream, (N,) float64 in [0, 1); streams where `used` (N,) is False do not advance."""
