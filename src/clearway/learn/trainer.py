@@ -78,7 +78,9 @@ class Trainer:
             )
         self.env_count = per_scene * world.scene_count
         device = world.device
-        self.scale = FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
+        self.scale = (
+            FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
+        )
         shape = NetworkShape(world.scene_count, features.shape[1], learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
         self.lookup = LookupNetwork(self.network, self.scale(features), world.target_state)
@@ -121,7 +123,9 @@ class Trainer:
         """
         learner, progress = self.learner, self.frames / self.learner.frames
         lr = learner.lr_start + (learner.lr_end - learner.lr_start) * min(progress, 1.0)
-        entropy_weight = learner.entropy_start * (learner.entropy_end / learner.entropy_start) ** min(progress, 1.0)
+        entropy_weight = learner.entropy_start * (learner.entropy_end / learner.entropy_start) ** min(
+            progress, 1.0
+        )
         self.lookup.refresh()
         rollout = self.collector.collect(self.statistics)
         batch, explained = self._batch(rollout)
@@ -255,7 +259,9 @@ class Trainer:
                 orders.append(first + torch.randperm(count, generator=generator, device=device))
                 first += count
             for part in range(parts):
-                dealt = [order[len(order) * part // parts : len(order) * (part + 1) // parts] for order in orders]
+                dealt = [
+                    order[len(order) * part // parts : len(order) * (part + 1) // parts] for order in orders
+                ]
                 yield batch.rows(torch.cat(dealt), tuple(len(rows) for rows in dealt))
 
     def _rebalance(self) -> None:
@@ -284,7 +290,9 @@ class Trainer:
             "actions": {"drawn": self.action_stream.drawn},
             "choice": {"weights": self.navigation.choice.weights},
         }
-        return {f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()}
+        return {
+            f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()
+        }
 
     @torch.no_grad()
     def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
@@ -309,7 +317,10 @@ def merged(first: Batch, second: Batch) -> Batch:
     """The rows of two batches, each ordered by scene, as one batch ordered by scene."""
     scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
     scene = torch.cat(
-        [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
+        [
+            scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device))
+            for b in (first, second)
+        ]
     )
     order = torch.argsort(scene, stable=True)
     names = ("history", "target", "action", "log_prob", "advantage", "value_target")
@@ -320,7 +331,9 @@ def merged(first: Batch, second: Batch) -> Batch:
 
 def _checked_features(world: World) -> Tensor:
     if world.features is None:
-        raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
+        raise RunError(
+            "the scenes have no features. Encode them first, for example with clearway scenes import"
+        )
     if not torch.isfinite(world.features).all():
         raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
     return world.features

@@ -117,13 +117,17 @@ class LookupNetwork:
         net = self.network
         out = out or Activations.empty(len(history), self.width, history.device)
         rows = self.projected.view(-1, self.width)
-        torch.add(embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen).relu_()
+        torch.add(
+            embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen
+        ).relu_()
         torch.addmm(self.target_term[target], out.seen, net.fusion_weight[0].T, out=out.fused).relu_()
         first = 0
         for scene, count in enumerate(rows_per_scene):
             if count:
                 part = out.rows(first, first + count)
-                torch.addmm(net.scene_bias[scene], part.fused, net.scene_weight[scene].T, out=part.special).relu_()
+                torch.addmm(
+                    net.scene_bias[scene], part.fused, net.scene_weight[scene].T, out=part.special
+                ).relu_()
                 torch.addmm(net.output_bias[scene], part.special, net.output_weight[scene].T, out=part.output)
             first += count
         return out

@@ -1,0 +1,149 @@
+"""Checkpoints: safetensors with a JSON manifest of SHA-256 sums, written whole or not at all. Never pickle.
+
+A checkpoint is a folder:
+
+    network.safetensors    parameters, and the mean and factor that prepare features
+    training.safetensors   everything else that training needs to go on bit for bit
+    checkpoint.json        format version, frames, updates, seconds, SHA-256 of both files
+
+It is written under a temporary name and renamed, so a folder of the right name is complete.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from clearway.errors import RunError
+
+FORMAT_VERSION = 1
+NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE = "network.safetensors", "training.safetensors", "checkpoint.json"
+KEPT = 2  # newest checkpoints that stay
+_NAME = re.compile(r"frames-(\d{12})")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far training had come."""
+
+    frames: int
+    updates: int
+    seconds: float
+
+
+def write_checkpoint(
+    folder: Path, network: Mapping[str, Tensor], training: Mapping[str, Tensor], progress: Progress
+) -> Path:
+    """Write a checkpoint into `folder` and remove all but the newest few; returns its path.
+
+    Raises:
+        RunError: the disk is full or the folder cannot be written; earlier checkpoints stay as they are.
+    """
+    final = folder / f"frames-{progress.frames:012d}"
+    part = folder / f".{final.name}.part"
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        sums = {}
+        for name, tensors in ((NETWORK_FILE, network), (TRAINING_FILE, training)):
+            save_file(
+                {key: tensor.detach().cpu().contiguous() for key, tensor in tensors.items()}, part / name
+            )
+            sums[name] = _sha256(part / name)
+        manifest = {"format_version": FORMAT_VERSION, **vars(progress), "sha256": sums}
+        (part / MANIFEST_FILE).write_text(json.dumps(manifest, indent=2) + "\n")
+        _to_disk(part)
+        shutil.rmtree(final, ignore_errors=True)
+        part.rename(final)
+        _to_disk(folder)
+    except (OSError, SafetensorError) as error:
+        shutil.rmtree(part, ignore_errors=True)
+        raise RunError(
+            f"{final}: cannot write the checkpoint ({error}). Free some space, then resume"
+        ) from error
+    for old in _found(folder)[:-KEPT]:
+        shutil.rmtree(old)
+    return final
+
+
+def newest_checkpoint(folder: Path) -> Path:
+    """The newest checkpoint in `folder` whose files are as they were written; damaged ones are passed over.
+
+    Warns:
+        UserWarning: a newer checkpoint is damaged.
+
+    Raises:
+        RunError: there is none.
+    """
+    for path in reversed(_found(folder)):
+        try:
+            _checked_manifest(path)
+            return path
+        except RunError as error:
+            warnings.warn(f"{error}; an earlier checkpoint is used", stacklevel=2)
+    raise RunError(f"{folder}: no checkpoint found. Train first, or name another run")
+
+
+def read_progress(path: Path) -> Progress:
+    """How far training had come when the checkpoint was written."""
+    manifest = _checked_manifest(path)
+    return Progress(int(manifest["frames"]), int(manifest["updates"]), float(manifest["seconds"]))
+
+
+def read_network(path: Path) -> dict[str, Tensor]:
+    """The tensors of `network.safetensors`, checked against the manifest."""
+    _checked_manifest(path)
+    return load_file(path / NETWORK_FILE)
+
+
+def read_training(path: Path) -> dict[str, Tensor]:
+    """The tensors of `training.safetensors`, checked against the manifest."""
+    _checked_manifest(path)
+    return load_file(path / TRAINING_FILE)
+
+
+def _found(folder: Path) -> list[Path]:
+    """Checkpoints in `folder`, oldest first."""
+    return sorted(path for path in folder.glob("frames-*") if _NAME.fullmatch(path.name))
+
+
+def _checked_manifest(path: Path) -> dict:
+    try:
+        manifest = json.loads((path / MANIFEST_FILE).read_text())
+        version, sums = int(manifest["format_version"]), dict(manifest["sha256"])
+        actual = {name: _sha256(path / name) for name in (NETWORK_FILE, TRAINING_FILE)}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{path}: the checkpoint is incomplete ({error}). Use another one") from error
+    if version > FORMAT_VERSION:
+        raise RunError(f"{path}: written by a newer clearway (format {version}). Upgrade clearway")
+    for name, digest in actual.items():
+        if sums.get(name) != digest:
+            raise RunError(f"{path / name}: its SHA-256 differs from the manifest's. Use another checkpoint")
+    return manifest
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _to_disk(folder: Path) -> None:
+    """Flush the folder's files and the folder itself."""
+    for path in [*folder.iterdir(), folder]:
+        if path.is_file() or path == folder:
+            handle = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)

@@ -1,0 +1,110 @@
+"""A trained agent from its run folder: scenes, world, network and policy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from clearway.envs.world import World, make_world
+from clearway.errors import RunError
+from clearway.learn.checkpoint import newest_checkpoint, read_network
+from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
+from clearway.model.lookup import LookupNetwork
+from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene
+
+Policy = Callable[[Tensor, Tensor], Tensor]
+
+
+@dataclass(frozen=True)
+class Agent:
+    """A trained network with what it needs to act.
+
+    Attributes:
+        record: of its run.
+        network: the parameters.
+        scale: prepares features for it.
+    """
+
+    record: RunRecord
+    network: SiameseActorCritic
+    scale: FeatureScale
+
+    def policy(self, world: World) -> Policy:
+        """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
+        if world.features is None:
+            raise RunError("the scenes have no features. Encode them as for training")
+        lookup = LookupNetwork(self.network, self.scale(world.features), world.target_state)
+        scene_of_target = world.target_scene
+
+        def probabilities(history: Tensor, target: Tensor) -> Tensor:
+            order = torch.argsort(scene_of_target[target], stable=True)
+            counts = torch.bincount(scene_of_target[target], minlength=world.scene_count).tolist()
+            scores = lookup.forward(history[order], target[order], counts).scores
+            placed = torch.empty_like(scores)
+            placed[order] = torch.softmax(scores, 1)
+            return placed
+
+        return probabilities
+
+
+def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
+    """The agent of a run, from its newest checkpoint or the one given.
+
+    Raises:
+        RunError: there is no such run or checkpoint, or it is damaged.
+    """
+    run = RunFolder(folder)
+    record = run.read_record()
+    path = checkpoint or newest_checkpoint(run.checkpoints)
+    tensors = read_network(path)
+    try:
+        scale = FeatureScale(tensors["scale.mean"], tensors["scale.factor"])
+        shape = NetworkShape(
+            len(record.scenes), len(scale.mean), record.learner.width, record.learner.history_length
+        )
+        network = SiameseActorCritic(shape)
+        prefix = "network."
+        network.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
+    except (KeyError, RuntimeError) as error:
+        raise RunError(f"{path}: does not fit its run ({error}). Use another checkpoint") from error
+    return Agent(record, network, scale)
+
+
+def run_scenes(record: RunRecord, files: Sequence[Path] | None = None) -> list[Scene]:
+    """The scenes of a run, in its order, from the files it names or from those given.
+
+    Raises:
+        RunError: a scene is missing or is not the one the run was trained on.
+    """
+    by_name = {scene.name: scene for scene in (read_scene(path) for path in files)} if files else None
+    scenes = []
+    for wanted in record.scenes:
+        scene = _found(wanted.name, wanted.path, by_name)
+        if scene_digest(scene) != wanted.digest:
+            raise RunError(
+                f"{wanted.path or wanted.name}: not the scene that the run was trained on (graph or features differ). "
+                "Give the right file with --scenes"
+            )
+        scenes.append(scene)
+    return scenes
+
+
+def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Scene:
+    if given is not None:
+        if name not in given:
+            raise RunError(f"scene {name} of the run is not among the files given. Add it to --scenes")
+        return given[name]
+    if path is None or not Path(path).exists():
+        raise RunError(f"{path or name}: the run's scene file is missing. Give it with --scenes")
+    return read_scene(Path(path), name=name)
+
+
+def run_world(record: RunRecord, scenes: Sequence[Scene]) -> World:
+    """The world of a run."""
+    return make_world(scenes, record.targets, record.zone_level)

@@ -1,0 +1,75 @@
+"""Figures of a training run as JSON lines, and to TensorBoard where it is installed. Names: docs/metrics.md."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
+from clearway.learn.trainer import Trainer, Update
+
+
+def metrics_row(trainer: Trainer, update: Update, seconds: float) -> dict[str, float]:
+    """One row of figures: the episodes ended since the last row, and the latest update's.
+
+    seconds: training time so far, checkpoints and evaluation left out.
+    """
+    totals = trainer.statistics.take()
+    return {
+        "frames": trainer.frames,
+        "updates": trainer.updates,
+        "seconds": round(seconds, 3),
+        **episode_figures(totals),
+        "solved_targets": trainer.statistics.solved,
+        **{name: _short(value) for name, value in vars(update).items()},
+    }
+
+
+def episode_figures(totals: Tensor) -> dict[str, float]:
+    """Means over ended episodes from totals (M, 4); 0 where none ended."""
+    sums = totals.sum(0).tolist()
+    episodes = max(sums[EPISODES], 1.0)
+    return {
+        "episodes": int(sums[EPISODES]),
+        "success": _short(sums[REACHED] / episodes),
+        "steps": _short(sums[STEPS] / episodes),
+        "collisions": _short(sums[COLLISIONS] / episodes),
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+class MetricsLog:
+    """Appends rows to a file; every row reaches the file at once.
+
+    Args:
+        path: of the JSON lines.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.file = path.open("a")
+        self.board: Any = None
+        if importlib.util.find_spec("tensorboard"):
+            from torch.utils.tensorboard import SummaryWriter
+
+            self.board = SummaryWriter(str(path.parent / "tensorboard"))
+
+    def write(self, row: dict[str, float]) -> None:
+        """Append one row."""
+        self.file.write(json.dumps(row) + "\n")
+        self.file.flush()
+        if self.board:
+            for name, value in row.items():
+                self.board.add_scalar(name, value, row["frames"])
+
+    def close(self) -> None:
+        """Close the files."""
+        self.file.close()
+        if self.board:
+            self.board.close()

@@ -1,0 +1,252 @@
+"""A run folder: what was asked for, how it went, and its checkpoints.
+
+run.json         learner, reward, seed, zone level, scenes with their targets and digests, versions, hardware, command
+metrics.jsonl    one row of figures a line (docs/metrics.md)
+checkpoints/     see `checkpoint`
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from clearway.errors import RunError
+from clearway.files import written_whole
+from clearway.learn.config import Learner
+from clearway.reward import Reward
+from clearway.scenes.scene import Scene
+from clearway.version import __version__
+from clearway.zones import ZoneLevel
+
+FORMAT_VERSION = 1
+RUN_FILE, METRICS_FILE, CHECKPOINTS = "run.json", "metrics.jsonl", "checkpoints"
+_PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
+Settings = TypeVar("Settings", Learner, Reward)
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """A scene as a run used it.
+
+    Attributes:
+        name: of the scene.
+        path: of its file, or None for a scene made in memory.
+        digest: of its graph, poses and features (`scene_digest`).
+        encoder: name of what made the features.
+        targets: state ids.
+    """
+
+    name: str
+    path: str | None
+    digest: str
+    encoder: str
+    targets: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Everything that determines a run, and where it was made."""
+
+    learner: Learner
+    reward: Reward
+    seed: int
+    zone_level: ZoneLevel
+    scenes: tuple[SceneRecord, ...]
+    versions: Mapping[str, str]
+    hardware: Mapping[str, Any]
+    command: tuple[str, ...]
+
+    @property
+    def targets(self) -> dict[str, tuple[int, ...]]:
+        """Targets by scene name."""
+        return {scene.name: scene.targets for scene in self.scenes}
+
+    def same_experiment(self, other: RunRecord) -> bool:
+        """Both would give the same agent: all but versions, hardware, paths and command agree."""
+
+        def essence(run: RunRecord) -> tuple:
+            scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
+            return run.learner, run.reward, run.seed, run.zone_level, scenes
+
+        return essence(self) == essence(other)
+
+
+def scene_digest(scene: Scene) -> str:
+    """Short SHA-256 of what training sees of a scene: graph, poses, features."""
+    digest = hashlib.sha256()
+    for array in (scene.graph, scene.locations_m, scene.headings_deg, scene.features):
+        if array is not None:
+            digest.update(str((array.shape, array.dtype.str)).encode())
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def record_of(
+    scenes: Sequence[Scene],
+    paths: Mapping[str, Path],
+    targets: Mapping[str, Sequence[int]],
+    learner: Learner,
+    reward: Reward,
+    seed: int,
+    zone_level: ZoneLevel,
+) -> RunRecord:
+    """The record of a run that is about to start; paths: file of each scene by name, where it has one."""
+    return RunRecord(
+        learner=learner,
+        reward=reward,
+        seed=seed,
+        zone_level=zone_level,
+        scenes=tuple(
+            SceneRecord(
+                name=scene.name,
+                path=str(paths[scene.name].resolve()) if scene.name in paths else None,
+                digest=scene_digest(scene),
+                encoder=scene.encoder.name if scene.encoder else "unknown",
+                targets=tuple(int(target) for target in targets[scene.name]),
+            )
+            for scene in scenes
+        ),
+        versions=package_versions(),
+        hardware=hardware(),
+        command=tuple(sys.argv),
+    )
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of Python, clearway and the packages that shape results."""
+    found = {"python": platform.python_version(), "clearway": __version__}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def hardware() -> dict[str, Any]:
+    """Processor, usable cores and threads of this machine."""
+    import torch
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "machine": platform.machine(),
+        "system": platform.system(),
+        "cores": cores,
+        "threads": torch.get_num_threads(),
+    }
+
+
+class RunFolder:
+    """The files of one run.
+
+    Args:
+        path: the folder; made when the run starts.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.checkpoints = path / CHECKPOINTS
+        self.metrics_path = path / METRICS_FILE
+
+    @property
+    def exists(self) -> bool:
+        """A run was started here."""
+        return (self.path / RUN_FILE).exists()
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep other processes from training in this folder.
+
+        Raises:
+            RunError: another process trains here.
+        """
+        from filelock import FileLock, Timeout
+
+        self.path.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(self.path / ".lock", timeout=0)
+        try:
+            lock.acquire()
+        except Timeout as error:
+            raise RunError(
+                f"{self.path}: another process trains here. Choose another folder with --out"
+            ) from error
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def write_record(self, record: RunRecord) -> None:
+        """Write run.json."""
+        content = {"format_version": FORMAT_VERSION, **asdict(record)}
+        with written_whole(self.path / RUN_FILE) as part:
+            part.write_text(json.dumps(content, indent=2) + "\n")
+
+    def read_record(self) -> RunRecord:
+        """Read run.json.
+
+        Raises:
+            RunError: there is no run here, or it is damaged, or a newer clearway wrote it.
+        """
+        path = self.path / RUN_FILE
+        try:
+            content = json.loads(path.read_text())
+            found = int(content["format_version"])
+        except FileNotFoundError as error:
+            raise RunError(
+                f"{self.path}: no run here ({RUN_FILE} is missing). Name a folder that clearway train made"
+            ) from error
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise RunError(f"{path}: not readable ({error}). Restore it or train again") from error
+        if found > FORMAT_VERSION:
+            raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
+        try:
+            return _record_from(content)
+        except (KeyError, TypeError) as error:
+            raise RunError(
+                f"{path}: a setting is missing or unknown ({error}). Restore it or train again"
+            ) from error
+
+    def metrics(self) -> list[dict[str, float]]:
+        """All rows of metrics.jsonl; a last line that was cut off is left out."""
+        if not self.metrics_path.exists():
+            return []
+        lines = self.metrics_path.read_text().splitlines(keepends=True)
+        return [json.loads(line) for line in lines if line.endswith("\n")]
+
+    def forget_metrics_after(self, frames: int) -> None:
+        """Drop rows that training will write again when it resumes from a checkpoint at `frames`."""
+        rows = [row for row in self.metrics() if row["frames"] <= frames]
+        with written_whole(self.metrics_path) as part:
+            part.write_text("".join(json.dumps(row) + "\n" for row in rows))
+
+
+def _record_from(content: Mapping[str, Any]) -> RunRecord:
+    return RunRecord(
+        learner=_settings(Learner, content["learner"]),
+        reward=_settings(Reward, content["reward"]),
+        seed=content["seed"],
+        zone_level=content["zone_level"],
+        scenes=tuple(SceneRecord(**{**s, "targets": tuple(s["targets"])}) for s in content["scenes"]),
+        versions=content["versions"],
+        hardware=content["hardware"],
+        command=tuple(content["command"]),
+    )
+
+
+def _settings(kind: type[Settings], content: Mapping[str, Any]) -> Settings:
+    """A settings object from JSON that has exactly its fields."""
+    expected = {field.name for field in fields(kind)}
+    if set(content) != expected:
+        raise KeyError(", ".join(sorted(set(content) ^ expected)))
+    return kind(**content)

@@ -1,0 +1,186 @@
+"""A training run from start (or checkpoint) to end: files, progress, interruption."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+
+from clearway.envs.world import make_world
+from clearway.errors import RunError
+from clearway.learn.checkpoint import (
+    Progress,
+    newest_checkpoint,
+    read_network,
+    read_progress,
+    read_training,
+    write_checkpoint,
+)
+from clearway.learn.config import Learner
+from clearway.learn.metrics_log import MetricsLog, metrics_row
+from clearway.learn.progress import ProgressView, progress_view
+from clearway.learn.run_folder import RunFolder, RunRecord, record_of
+from clearway.learn.trainer import Trainer
+from clearway.reward import Reward
+from clearway.scenes.scene import Scene
+from clearway.zones import ZoneLevel
+
+ROWS_A_RUN = 200  # rows of metrics.jsonl, about
+SECONDS_BETWEEN_CHECKPOINTS = 60.0
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What to train, on what, where.
+
+    Attributes:
+        scenes: with features, distinct names.
+        targets: state ids by scene name.
+        learner, reward, seed, zone_level: see there.
+        paths: file of each scene by name, where it has one.
+        device: torch device, for example "cpu" or "cuda".
+    """
+
+    scenes: Sequence[Scene]
+    targets: Mapping[str, Sequence[int]]
+    learner: Learner
+    reward: Reward
+    seed: int = 0
+    zone_level: ZoneLevel = "pose"
+    paths: Mapping[str, Path] | None = None
+    device: str = "cpu"
+
+    def record(self) -> RunRecord:
+        """The record to be written to the run folder."""
+        return record_of(
+            self.scenes, self.paths or {}, self.targets, self.learner, self.reward, self.seed, self.zone_level
+        )
+
+    def trainer(self) -> Trainer:
+        """A trainer at its first frame."""
+        world = make_world(self.scenes, self.targets, self.zone_level).to(self.device)
+        return Trainer(world, self.learner, self.reward, self.seed)
+
+
+def train(request: RunRequest, out: Path, *, resume: bool = False, show_progress: bool = False) -> RunFolder:
+    """Train until all frames are used and leave a run folder behind.
+
+    Args:
+        request: what to train.
+        out: the run folder.
+        resume: go on from the newest checkpoint in `out`; without one, or without a run, begin.
+        show_progress: draw a progress bar.
+
+    Raises:
+        RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
+        KeyboardInterrupt: the user interrupted; the run can be resumed.
+    """
+    folder = RunFolder(out)
+    with folder.held():
+        trainer = request.trainer()
+        seconds = _prepare(folder, request.record(), trainer, resume)
+        with progress_view(trainer.learner.frames, show_progress) as view, _interruption() as interrupted:
+            _run(trainer, folder, view, interrupted, seconds)
+    return folder
+
+
+def _prepare(folder: RunFolder, record: RunRecord, trainer: Trainer, resume: bool) -> float:
+    """Begin a new run or load the newest checkpoint; returns the seconds trained so far."""
+    if not folder.exists:
+        folder.write_record(record)
+        return 0.0
+    if not resume:
+        raise RunError(
+            f"{folder.path}: holds a run already. Give --resume to go on with it, or another --out"
+        )
+    before = folder.read_record()
+    longer = replace(before, learner=replace(before.learner, frames=record.learner.frames))
+    if not longer.same_experiment(record):
+        raise RunError(
+            f"{folder.path}: holds another experiment (see its run.json). Give the same settings, or another --out"
+        )
+    if not before.same_experiment(record):
+        raise RunError(
+            f"{folder.path}: was started for {before.learner.frames} frames, and its schedules end there. "
+            f"Give --frames {before.learner.frames}, or another --out"
+        )
+    if not any(folder.checkpoints.glob("frames-*")):
+        folder.forget_metrics_after(-1)
+        return 0.0
+    checkpoint = newest_checkpoint(folder.checkpoints)
+    progress = read_progress(checkpoint)
+    tensors = {**read_training(checkpoint), **read_network(checkpoint)}
+    trainer.load_tensors(tensors, progress.frames, progress.updates)
+    folder.forget_metrics_after(progress.frames)
+    return progress.seconds
+
+
+def _run(
+    trainer: Trainer, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float
+) -> None:
+    """Update until the frames are used or the user interrupts; ends with a checkpoint either way."""
+    updates = -(-trainer.learner.frames // trainer.frames_per_update)
+    updates_a_row = max(1, updates // ROWS_A_RUN)
+    log = MetricsLog(folder.metrics_path)
+    saved_at = time.monotonic()
+    try:
+        while not trainer.finished and not interrupted.is_set():
+            started = time.monotonic()
+            update = trainer.update()
+            seconds += time.monotonic() - started
+            if trainer.updates % updates_a_row == 0 or trainer.finished:
+                log.write(metrics_row(trainer, update, seconds))
+            view.show(trainer.frames, trainer.statistics.solved, trainer.world.target_count)
+            if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
+                save(trainer, folder, seconds)
+                saved_at = time.monotonic()
+        save(trainer, folder, seconds)
+    finally:
+        log.close()
+    if not trainer.finished:
+        raise KeyboardInterrupt
+
+
+def save(trainer: Trainer, folder: RunFolder, seconds: float) -> None:
+    """Write a checkpoint of the trainer as it stands."""
+    tensors = trainer.tensors()
+    network = {key: value for key, value in tensors.items() if key.startswith("network.")}
+    network |= {"scale.mean": trainer.scale.mean, "scale.factor": trainer.scale.factor}
+    training = {key: value for key, value in tensors.items() if not key.startswith("network.")}
+    progress = Progress(trainer.frames, trainer.updates, seconds)
+    write_checkpoint(folder.checkpoints, network, training, progress)
+
+
+@contextmanager
+def _interruption() -> Iterator[threading.Event]:
+    """An event that Ctrl+C or SIGTERM sets, so that an update is finished and saved; a second Ctrl+C stops at once."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def handler(number: int, frame: object) -> None:
+        if event.is_set():
+            raise KeyboardInterrupt
+        event.set()
+
+    for number in before:
+        signal.signal(number, handler)
+    try:
+        yield event
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+def set_threads(count: int | None) -> None:
+    """Let torch use `count` threads; None leaves its own choice. Results repeat bit for bit at one thread count."""
+    if count is not None:
+        torch.set_num_threads(count)
