@@ -1,0 +1,1 @@
+"""Evaluation by the paper's protocol: policies walk batched episodes; metrics, intervals, tables."""

@@ -1,0 +1,128 @@
+"""The metrics, each written down once: for a target a quotient of two sums over its episodes.
+
+A scene's value is the plain mean over its targets, the average the plain mean over scenes, as in the paper.
+Failed episodes count with the capped steps; nothing is left out. `docs/metrics.md` explains every name.
+
+Axis letters: N episodes, J metrics, M targets, C scenes, R resamples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from clearway.evaluate.episodes import EpisodeTable
+from clearway.zones import Zone
+
+SC_STEPS = 500
+Column = Callable[[EpisodeTable], np.ndarray]
+
+
+def steps(table: EpisodeTable) -> np.ndarray:
+    """Steps of each episode, (N,)."""
+    return table.steps
+
+
+def collisions(table: EpisodeTable) -> np.ndarray:
+    """Blocked moves of each episode, (N,)."""
+    return table.collisions
+
+
+def shortest_path_steps(table: EpisodeTable) -> np.ndarray:
+    """Fewest steps possible in each episode, (N,)."""
+    return table.shortest_path_steps
+
+
+def success(table: EpisodeTable) -> np.ndarray:
+    """1 where the target was reached before the cap, (N,)."""
+    return table.reached.astype(np.float64)
+
+
+def sc(table: EpisodeTable) -> np.ndarray:
+    """1 where the target was reached in under 500 steps (the paper's success score), (N,)."""
+    return (table.reached & (table.steps < SC_STEPS)).astype(np.float64)
+
+
+def spl(table: EpisodeTable) -> np.ndarray:
+    """Success weighted by path length, S l / max(p, l) (Anderson et al. 2018, arXiv:1807.06757), (N,)."""
+    return success(table) * table.shortest_path_steps / np.maximum(table.steps, table.shortest_path_steps)
+
+
+def collision_free(table: EpisodeTable) -> np.ndarray:
+    """1 where no move was blocked, whether or not the target was reached, (N,)."""
+    return (table.collisions == 0).astype(np.float64)
+
+
+def collision_free_spl(table: EpisodeTable) -> np.ndarray:
+    """SPL, 0 where any move was blocked, (N,)."""
+    return spl(table) * collision_free(table)
+
+
+def _steps_in(zone: Zone) -> Column:
+    return lambda table: table.zone_steps[:, zone]
+
+
+def _hundred_collisions(table: EpisodeTable) -> np.ndarray:
+    return 100.0 * table.collisions
+
+
+def _one(table: EpisodeTable) -> np.ndarray:
+    return np.ones(len(table))
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A target's value is sum(numerator) / sum(denominator) over its episodes; over 1 each it is a mean."""
+
+    numerator: Column
+    denominator: Column = _one
+
+
+METRICS: dict[str, Metric] = {
+    "steps": Metric(steps),
+    "shortest_path_steps": Metric(shortest_path_steps),
+    "path_ratio": Metric(steps, shortest_path_steps),
+    "collisions": Metric(collisions),
+    "collisions_per_100_steps": Metric(_hundred_collisions, steps),
+    "collision_free": Metric(collision_free),
+    "success": Metric(success),
+    "sc": Metric(sc),
+    "spl": Metric(spl),
+    "collision_free_spl": Metric(collision_free_spl),
+    "share_free": Metric(_steps_in(Zone.FREE), steps),
+    "share_precollision": Metric(_steps_in(Zone.PRECOLLISION), steps),
+    "share_collision": Metric(_steps_in(Zone.COLLISION), steps),
+}
+METRIC_NAMES = tuple(METRICS)
+
+
+def columns(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray]:
+    """Numerators and denominators of all metrics, two (N, J) float64 arrays in the order of METRIC_NAMES."""
+    numerator = np.stack([metric.numerator(table) for metric in METRICS.values()], axis=1)
+    denominator = np.stack([metric.denominator(table) for metric in METRICS.values()], axis=1)
+    return numerator.astype(np.float64), denominator.astype(np.float64)
+
+
+def by_target(table: EpisodeTable, target_count: int) -> np.ndarray:
+    """Value of every metric for each target, (M, J) float64."""
+    numerator, denominator = columns(table)
+    return _sums(numerator, table.target, target_count) / _sums(denominator, table.target, target_count)
+
+
+def by_scene(target_values: np.ndarray, target_scene: np.ndarray) -> np.ndarray:
+    """Plain means over each scene's targets: (..., M, J) -> (..., C, J); target_scene: (M,) int."""
+    scenes = range(int(target_scene.max()) + 1)
+    return np.stack([target_values[..., target_scene == scene, :].mean(axis=-2) for scene in scenes], axis=-2)
+
+
+def average(scene_values: np.ndarray) -> np.ndarray:
+    """Plain means over scenes: (..., C, J) -> (..., J)."""
+    return scene_values.mean(axis=-2)
+
+
+def _sums(values: np.ndarray, target: np.ndarray, target_count: int) -> np.ndarray:
+    total = np.zeros((target_count, values.shape[1]))
+    np.add.at(total, target, values)
+    return total

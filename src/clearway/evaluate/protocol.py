@@ -1,0 +1,55 @@
+"""The whole protocol for some agents: sampled and argmax, with the random and the shortest-path agent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from clearway.envs.navigation import HISTORY_LENGTH
+from clearway.envs.world import World
+from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP, run_episodes
+from clearway.evaluate.policies import Policy, argmax, random_policy, shortest_path_policy
+from clearway.evaluate.report import ActionSelection, Evaluation, Protocol, summarise
+
+RANDOM, SHORTEST_PATH = "random", "shortest path"
+
+
+def evaluate_agents(
+    world: World,
+    agents: Mapping[str, Policy],
+    *,
+    encoder: str,
+    episodes_per_target: int = EPISODES_PER_TARGET,
+    step_cap: int = STEP_CAP,
+    seed: int = 0,
+    history_length: int = HISTORY_LENGTH,
+) -> list[Evaluation]:
+    """Every agent with sampled actions and with argmax, then the random and the shortest-path agent.
+
+    All face the same starts. Order: "sampled" and "argmax" of each agent in turn, "random", "shortest path".
+
+    Args:
+        world: scenes and targets.
+        agents: policies by the agent's name.
+        encoder: name of the encoder whose features the agents see.
+        episodes_per_target: how many each.
+        step_cap: steps after which an episode has failed.
+        seed: of starts, chances and bootstrap.
+        history_length: K, as the policies expect it.
+    """
+    rows: list[tuple[str, ActionSelection, Policy]] = []
+    for name, policy in agents.items():
+        rows += [(name, "sampled", policy), (name, "argmax", argmax(policy))]
+    rows += [(RANDOM, "sampled", random_policy()), (SHORTEST_PATH, "sampled", shortest_path_policy(world))]
+    evaluations = []
+    for name, selection, policy in rows:
+        table = run_episodes(
+            world,
+            policy,
+            episodes_per_target=episodes_per_target,
+            step_cap=step_cap,
+            seed=seed,
+            history_length=history_length,
+        )
+        protocol = Protocol(episodes_per_target, step_cap, seed, selection)
+        evaluations.append(summarise(world, table, name, encoder, protocol))
+    return evaluations

@@ -1,0 +1,174 @@
+"""Evaluations as tables for people: the same rows for the terminal, Markdown and the demo's page.
+
+A target that was not reached in every episode is marked, and so is every row of means it is part of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from clearway.evaluate.report import Evaluation, Result
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Level = Literal["average", "scenes", "targets"]
+MARK = "✗"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A figure as text.
+
+    Attributes:
+        text: the figure.
+        below: what belongs under it or behind it: a figure's interval, an agent's way of acting.
+        failed: there is a failed target in it.
+    """
+
+    text: str
+    below: str = ""
+    failed: bool = False
+
+
+@dataclass(frozen=True)
+class TableText:
+    """A table as text: headings, rows of cells, and the notes that belong under it."""
+
+    headings: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Column:
+    heading: str
+    metric: str
+    digits: int
+    percent: bool = False
+    main: bool = False
+
+    def cell(self, result: Result) -> Cell:
+        """The figure of this column. Large figures lose decimals, the ends of the interval keep as many."""
+        scale = 100 if self.percent else 1
+        value = scale * result.values[self.metric]
+        low, high = (scale * end for end in result.intervals[self.metric])
+        digits = max(0, self.digits - (value >= 10) - (value >= 100))
+        return Cell(f"{value:.{digits}f}", f"{low:.{digits}f}–{high:.{digits}f}")
+
+
+COLUMNS = (
+    _Column("steps", "steps", 2, main=True),
+    _Column("× shortest", "path_ratio", 2),
+    _Column("collisions", "collisions", 3, main=True),
+    _Column("per 100 steps", "collisions_per_100_steps", 2),
+    _Column("no collision %", "collision_free", 2, percent=True),
+    _Column("sc %", "sc", 2, percent=True, main=True),
+    _Column("SPL %", "spl", 2, percent=True, main=True),
+    _Column("collision-free SPL %", "collision_free_spl", 2, percent=True),
+    _Column("in collision zone %", "share_collision", 2, percent=True),
+)
+
+
+def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, narrow: bool = False) -> TableText:
+    """The rows of a table of one or more evaluations.
+
+    Args:
+        evaluations: at least one.
+        level: one row an evaluation ("average"), or one for each of its "scenes" or "targets".
+        narrow: the main figures alone, which fit a terminal.
+    """
+    assert evaluations, "a table needs at least one evaluation"
+    columns = [column for column in COLUMNS if column.main or not narrow]
+    where = {"average": (), "scenes": ("scene",), "targets": ("scene", "target")}[level]
+    headings = (*where, "agent", "solved", *(column.heading for column in columns))
+    rows = tuple(
+        (
+            *_place(result, level),
+            Cell(evaluation.agent, evaluation.protocol.action_selection),
+            _solved(result),
+            *(column.cell(result) for column in columns),
+        )
+        for result, evaluation in _results(evaluations, level)
+    )
+    return TableText(headings, rows, tuple(_notes(evaluations)))
+
+
+def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average") -> str:
+    """The table in Markdown, its notes under it."""
+    table = table_text(evaluations, level)
+    lines = [_pipes(table.headings), _pipes("---" for _ in table.headings)]
+    lines += [_pipes(_one_line(cell) for cell in row) for row in table.rows]
+    return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"
+
+
+def rich_table(evaluations: Sequence[Evaluation], level: Level = "average") -> Table:
+    """The main figures for the terminal: intervals dim below them, failures in red, notes as the caption."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    content = table_text(evaluations, level, narrow=True)
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), caption="\n".join(content.notes), caption_justify="left")
+    first_figure = content.headings.index("solved")
+    for index, heading in enumerate(content.headings):
+        table.add_column(heading, justify="left" if index < first_figure else "right", overflow="fold")
+    for row in content.rows:
+        texts = []
+        for cell in row:
+            text = Text(cell.text, style="bold red" if cell.failed else "")
+            if cell.below:
+                text.append(f"\n{cell.below}", style="dim")
+            texts.append(text)
+        table.add_row(*texts)
+    return table
+
+
+def _results(evaluations: Sequence[Evaluation], level: Level) -> list[tuple[Result, Evaluation]]:
+    """Results place after place, within a place agent after agent."""
+    if level == "average":
+        return [(evaluation.average, evaluation) for evaluation in evaluations]
+    by_agent = [evaluation.scenes if level == "scenes" else evaluation.targets for evaluation in evaluations]
+    return [pair for place in zip(*by_agent, strict=True) for pair in zip(place, evaluations, strict=True)]
+
+
+def _place(result: Result, level: Level) -> tuple[Cell, ...]:
+    names = {"average": (), "scenes": (result.scene,), "targets": (result.scene, str(result.target))}[level]
+    return tuple(Cell(name) for name in names)
+
+
+def _solved(result: Result) -> Cell:
+    """How many targets are solved; for a single target the share of its episodes."""
+    failed = bool(result.failed_targets)
+    if result.target is None:
+        text = f"{result.solved_targets}/{result.target_count}"
+    else:
+        text = f"{100 * result.values['success']:.0f} %"
+    return Cell(f"{MARK} {text}" if failed else text, failed=failed)
+
+
+def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
+    protocol = evaluations[0].protocol
+    encoders = ", ".join(dict.fromkeys(evaluation.encoder for evaluation in evaluations))
+    notes = [
+        f"Encoder: {encoders}.",
+        f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_cap:,} "
+        f"steps, seed {protocol.seed}. Ranges: 95 % bootstrap intervals over episodes.",
+    ]
+    if any(evaluation.average.failed_targets for evaluation in evaluations):
+        notes.append(
+            f"{MARK} Not every episode reached its target; a failed episode counts with all its "
+            f"{protocol.step_cap:,} steps in every mean it is part of."
+        )
+    return notes
+
+
+def _one_line(cell: Cell) -> str:
+    text = f"**{cell.text}**" if cell.failed else cell.text
+    return f"{text} ({cell.below})" if cell.below else text
+
+
+def _pipes(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
