@@ -46,9 +46,23 @@ class Reward:
         table[1] = self.terminal
         return np.clip(table, -1.0, 1.0) if self.clip else table
 
-    def with_changes(self, **changes: float | bool | None) -> Reward:
-        """The same reward with the given fields changed; a None changes nothing."""
-        return replace(self, **{key: value for key, value in changes.items() if value is not None})
+    def with_changes(
+        self,
+        alpha: float | None = None,
+        beta: float | None = None,
+        gamma: float | None = None,
+        terminal: float | None = None,
+        clip: bool | None = None,
+    ) -> Reward:
+        """The same reward with the given values changed; None changes nothing."""
+        return replace(
+            self,
+            alpha=self.alpha if alpha is None else alpha,
+            beta=self.beta if beta is None else beta,
+            gamma=self.gamma if gamma is None else gamma,
+            terminal=self.terminal if terminal is None else terminal,
+            clip=self.clip if clip is None else clip,
+        )
 
 
 COLLISION_AWARE = Reward("collision-aware")

@@ -57,9 +57,7 @@ def write_checkpoint(
         part.mkdir(parents=True)
         sums = {}
         for name, tensors in ((NETWORK_FILE, network), (TRAINING_FILE, training)):
-            save_file(
-                {key: tensor.detach().cpu().contiguous() for key, tensor in tensors.items()}, part / name
-            )
+            save_file({key: tensor.detach().cpu().contiguous() for key, tensor in tensors.items()}, part / name)
             sums[name] = _sha256(part / name)
         manifest = {"format_version": FORMAT_VERSION, **vars(progress), "sha256": sums}
         (part / MANIFEST_FILE).write_text(json.dumps(manifest, indent=2) + "\n")
@@ -69,9 +67,7 @@ def write_checkpoint(
         _to_disk(folder)
     except (OSError, SafetensorError) as error:
         shutil.rmtree(part, ignore_errors=True)
-        raise RunError(
-            f"{final}: cannot write the checkpoint ({error}). Free some space, then resume"
-        ) from error
+        raise RunError(f"{final}: cannot write the checkpoint ({error}). Free some space, then resume") from error
     for old in _found(folder)[:-KEPT]:
         shutil.rmtree(old)
     return final

@@ -85,18 +85,12 @@ class Learner:
                 raise RunError(f"{name} is {getattr(self, name)}, expected at least 1. Give a larger {name}")
         for name in ("discount", "gae_lambda"):
             if not 0 <= getattr(self, name) <= 1:
-                raise RunError(
-                    f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range"
-                )
+                raise RunError(f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range")
         for name in ("entropy_start", "entropy_end", "lr_start", "clip_norm", "reward_scale"):
             if not getattr(self, name) > 0:
-                raise RunError(
-                    f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}"
-                )
+                raise RunError(f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}")
         if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):
-            raise RunError(
-                "a2c makes one pass over each rollout. Set epochs and minibatches to 1, or use ppo"
-            )
+            raise RunError("a2c makes one pass over each rollout. Set epochs and minibatches to 1, or use ppo")
 
     def as_a2c(self) -> Learner:
         """The same settings with one update a rollout."""

@@ -1,4 +1,4 @@
-"""Hindsight: what a rollout teaches about targets that it passed by (Andrychowicz et al., 2017, for targets of a scene).
+"""Hindsight: what a rollout teaches about other targets that it passed by (after Andrychowicz et al., 2017).
 
 Where a stretch of an episode arrives at another training target of its scene, its steps are told again as if that had
 been the target. The actions came from the policy for the original target, so advantages and values are corrected by
@@ -110,9 +110,7 @@ def hindsight_batch(
         trace_lambda,
     )
     picked = rows.step, column
-    return Batch(
-        history, rows.target, action, log_pi, advantage[picked], value_target[picked], rows.rows_per_scene
-    )
+    return Batch(history, rows.target, action, log_pi, advantage[picked], value_target[picked], rows.rows_per_scene)
 
 
 def _reward(rollout: Rollout, rows: Segments, navigation: Navigation) -> Tensor:

@@ -65,9 +65,7 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     tensors = read_network(path)
     try:
         scale = FeatureScale(tensors["scale.mean"], tensors["scale.factor"])
-        shape = NetworkShape(
-            len(record.scenes), len(scale.mean), record.learner.width, record.learner.history_length
-        )
+        shape = NetworkShape(len(record.scenes), len(scale.mean), record.learner.width, record.learner.history_length)
         network = SiameseActorCritic(shape)
         prefix = "network."
         network.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})

@@ -56,7 +56,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class LossTerms:
-    """The loss and its parts, scalars; `total` carries the gradient."""
+    """The loss and its parts, scalars."""
 
     total: Tensor
     policy: Tensor
@@ -109,4 +109,4 @@ def loss_gradient(
             sum_loss=sum_loss,
         )
         (gradient,) = torch.autograd.grad(terms.total, leaf)
-    return terms, gradient
+    return LossTerms(**{name: value.detach() for name, value in vars(terms).items()}), gradient

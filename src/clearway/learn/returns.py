@@ -45,8 +45,9 @@ def vtrace(
 ) -> tuple[Tensor, Tensor]:
     """V-trace targets and advantages for segments that another policy acted out (Espeholt et al., 2018, equation 1).
 
-        delta_t = rho_t (r_t + discount_t V(s_{t+1}) - V(s_t));  v_t - V(s_t) = delta_t + discount_t lambda rho_t (v_{t+1} - V(s_{t+1}))
-        A_t = rho_t (r_t + discount_t v_{t+1} - V(s_t)),         rho_t = min(1, ratio_t)
+        rho_t = min(1, ratio_t);  delta_t = rho_t (r_t + discount_t V(s_{t+1}) - V(s_t))
+        v_t - V(s_t) = delta_t + discount_t lambda rho_t (v_{t+1} - V(s_{t+1}))
+        A_t = rho_t (r_t + discount_t v_{t+1} - V(s_t))
 
     Every segment must end in a step with discount 0, so that nothing after it counts.
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation
+from clearway.envs.navigation import Navigation, Transition
 from clearway.envs.streams import Streams
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.lookup import Activations, LookupNetwork
@@ -101,7 +101,7 @@ class Collector:
     def collect(self, statistics: EpisodeStatistics) -> Rollout:
         """Walk T steps from where the environments stand; ended episodes begin anew at once."""
         nav = self.navigation
-        seen: list[tuple[Tensor, ...]] = []
+        seen: list[tuple[Tensor, Tensor, Tensor, Transition, Tensor]] = []
         for t in range(self.steps):
             history, target = nav.history, nav.target.clone()
             self.network.forward(history, target, self.rows_per_scene, self.one_step)
@@ -109,13 +109,23 @@ class Collector:
             action = sample_actions(self.one_step.scores, self.action_stream.uniform())
             step = nav.step(action)
             statistics.add(target, step)
-            seen.append(
-                (history, target, action, step.state, step.reward, step.reached, step.truncated, nav.history)
-            )
+            seen.append((history, target, action, step, nav.history))
             nav.history = nav.history.clone()
             nav.reset(torch.nonzero(step.ended)[:, 0])
-        columns = [torch.stack(column) for column in zip(*seen, strict=True)]
-        return Rollout(*columns, kept=self.kept, history_after=nav.history, target_after=nav.target.clone())
+        histories, targets, actions, steps, last_histories = zip(*seen, strict=True)
+        return Rollout(
+            history=torch.stack(histories),
+            target=torch.stack(targets),
+            action=torch.stack(actions),
+            arrived=torch.stack([step.state for step in steps]),
+            reward=torch.stack([step.reward for step in steps]),
+            reached=torch.stack([step.reached for step in steps]),
+            truncated=torch.stack([step.truncated for step in steps]),
+            last_history=torch.stack(last_histories),
+            kept=self.kept,
+            history_after=nav.history,
+            target_after=nav.target.clone(),
+        )
 
     def _keep(self, t: int) -> None:
         """Copy the activations of step t to their rows, which are ordered by scene first."""

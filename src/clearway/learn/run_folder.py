@@ -178,9 +178,7 @@ class RunFolder:
         try:
             lock.acquire()
         except Timeout as error:
-            raise RunError(
-                f"{self.path}: another process trains here. Choose another folder with --out"
-            ) from error
+            raise RunError(f"{self.path}: another process trains here. Choose another folder with --out") from error
         try:
             yield
         finally:
@@ -213,9 +211,7 @@ class RunFolder:
         try:
             return _record_from(content)
         except (KeyError, TypeError) as error:
-            raise RunError(
-                f"{path}: a setting is missing or unknown ({error}). Restore it or train again"
-            ) from error
+            raise RunError(f"{path}: a setting is missing or unknown ({error}). Restore it or train again") from error
 
     def metrics(self) -> list[dict[str, float]]:
         """All rows of metrics.jsonl; a last line that was cut off is left out."""

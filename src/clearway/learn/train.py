@@ -96,9 +96,7 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Trainer, resume: boo
         folder.write_record(record)
         return 0.0
     if not resume:
-        raise RunError(
-            f"{folder.path}: holds a run already. Give --resume to go on with it, or another --out"
-        )
+        raise RunError(f"{folder.path}: holds a run already. Give --resume to go on with it, or another --out")
     before = folder.read_record()
     longer = replace(before, learner=replace(before.learner, frames=record.learner.frames))
     if not longer.same_experiment(record):
@@ -121,9 +119,7 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Trainer, resume: boo
     return progress.seconds
 
 
-def _run(
-    trainer: Trainer, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float
-) -> None:
+def _run(trainer: Trainer, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float) -> None:
     """Update until the frames are used or the user interrupts; ends with a checkpoint either way."""
     updates = -(-trainer.learner.frames // trainer.frames_per_update)
     updates_a_row = max(1, updates // ROWS_A_RUN)

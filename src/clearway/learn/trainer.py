@@ -5,6 +5,7 @@ Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -73,20 +74,14 @@ class Trainer:
         self.frames, self.updates = 0, 0
         per_scene = learner.envs // world.scene_count
         if per_scene < 1:
-            raise RunError(
-                f"{learner.envs} environments for {world.scene_count} scenes. Give at least one a scene"
-            )
+            raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give at least one a scene")
         self.env_count = per_scene * world.scene_count
         device = world.device
-        self.scale = (
-            FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
-        )
+        self.scale = FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
         shape = NetworkShape(world.scene_count, features.shape[1], learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
         self.lookup = LookupNetwork(self.network, self.scale(features), world.target_state)
-        self.optimiser: Optimiser = (
-            Adam(self.network) if learner.optimiser == "adam" else SharedRMSProp(self.network)
-        )
+        self.optimiser: Optimiser = Adam(self.network) if learner.optimiser == "adam" else SharedRMSProp(self.network)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         scenes = torch.arange(world.scene_count, device=device).repeat_interleave(per_scene)
         self.navigation = Navigation(
@@ -123,9 +118,7 @@ class Trainer:
         """
         learner, progress = self.learner, self.frames / self.learner.frames
         lr = learner.lr_start + (learner.lr_end - learner.lr_start) * min(progress, 1.0)
-        entropy_weight = learner.entropy_start * (learner.entropy_end / learner.entropy_start) ** min(
-            progress, 1.0
-        )
+        entropy_weight = learner.entropy_start * (learner.entropy_end / learner.entropy_start) ** min(progress, 1.0)
         self.lookup.refresh()
         rollout = self.collector.collect(self.statistics)
         batch, explained = self._batch(rollout)
@@ -137,15 +130,20 @@ class Trainer:
         self.frames += self.frames_per_update
         self.updates += 1
         self._rebalance()
-        figures = torch.stack([torch.stack(list(vars(t).values())) for t in terms]).mean(0).tolist()
-        norm = float(torch.stack(norms).mean())
-        self._check_finite(figures[0], norm)
-        return Update(*self._figures(figures), norm, explained, len(batch) - rows, lr, entropy_weight)
-
-    @staticmethod
-    def _figures(values: list[float]) -> tuple[float, float, float, float, float]:
-        total, policy, value, entropy, clipped = values
-        return total, policy, value, entropy, clipped
+        result = Update(
+            loss=_mean([loss.total for loss in terms]),
+            policy_loss=_mean([loss.policy for loss in terms]),
+            value_loss=_mean([loss.value for loss in terms]),
+            entropy=_mean([loss.entropy for loss in terms]),
+            clipped=_mean([loss.clipped for loss in terms]),
+            gradient_norm=_mean(norms),
+            explained_variance=explained,
+            hindsight_rows=len(batch) - rows,
+            lr=lr,
+            entropy_weight=entropy_weight,
+        )
+        self._check_finite(result)
+        return result
 
     def _begin_staggered(self) -> None:
         """Begin all episodes, targets in turn, with clocks spread so that cuts do not fall together."""
@@ -239,9 +237,7 @@ class Trainer:
                 sum_loss=learner.sum_loss,
             )
             self.lookup.backward(*rows, activations, gradient)
-            norms.append(
-                clip_gradients(list(self.network.parameters()), learner.clip_norm, learner.clip_each_tensor)
-            )
+            norms.append(clip_gradients(list(self.network.parameters()), learner.clip_norm, learner.clip_each_tensor))
             self.optimiser.step(lr)
             terms.append(loss)
         return terms, norms
@@ -259,9 +255,7 @@ class Trainer:
                 orders.append(first + torch.randperm(count, generator=generator, device=device))
                 first += count
             for part in range(parts):
-                dealt = [
-                    order[len(order) * part // parts : len(order) * (part + 1) // parts] for order in orders
-                ]
+                dealt = [order[len(order) * part // parts : len(order) * (part + 1) // parts] for order in orders]
                 yield batch.rows(torch.cat(dealt), tuple(len(rows) for rows in dealt))
 
     def _rebalance(self) -> None:
@@ -272,9 +266,9 @@ class Trainer:
             weight = 1 + self.learner.balance * (1 - self.statistics.recent_success)
             choice.reweigh(torch.where(choice.weights > 0, weight[choice.members], 0.0))
 
-    def _check_finite(self, loss: float, norm: float) -> None:
-        for name, value in (("loss", loss), ("gradient norm", norm)):
-            if not torch.isfinite(torch.tensor(value)):
+    def _check_finite(self, update: Update) -> None:
+        for name, value in (("loss", update.loss), ("gradient norm", update.gradient_norm)):
+            if not math.isfinite(value):
                 raise RunError(
                     f"the {name} is {value} after {self.frames} frames. Training stopped; "
                     "lower the learning rate or check the features"
@@ -282,17 +276,15 @@ class Trainer:
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on bit for bit, besides `frames` and `updates`."""
-        parts = {
-            "network": dict(self.network.named_parameters()),
+        parts: dict[str, dict[str, Tensor]] = {
+            "network": {name: p.data for name, p in self.network.named_parameters()},
             "optimiser": self.optimiser.tensors(),
             "navigation": self.navigation.tensors(),
             "statistics": self.statistics.tensors(),
             "actions": {"drawn": self.action_stream.drawn},
             "choice": {"weights": self.navigation.choice.weights},
         }
-        return {
-            f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()
-        }
+        return {f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()}
 
     @torch.no_grad()
     def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
@@ -317,23 +309,31 @@ def merged(first: Batch, second: Batch) -> Batch:
     """The rows of two batches, each ordered by scene, as one batch ordered by scene."""
     scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
     scene = torch.cat(
-        [
-            scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device))
-            for b in (first, second)
-        ]
+        [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
     )
     order = torch.argsort(scene, stable=True)
-    names = ("history", "target", "action", "log_prob", "advantage", "value_target")
-    joined = [torch.cat([getattr(first, name), getattr(second, name)])[order] for name in names]
-    counts = [a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)]
-    return Batch(*joined, rows_per_scene=tuple(counts))
+
+    def joined(name: str) -> Tensor:
+        return torch.cat([getattr(first, name), getattr(second, name)])[order]
+
+    return Batch(
+        history=joined("history"),
+        target=joined("target"),
+        action=joined("action"),
+        log_prob=joined("log_prob"),
+        advantage=joined("advantage"),
+        value_target=joined("value_target"),
+        rows_per_scene=tuple(a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)),
+    )
+
+
+def _mean(scalars: list[Tensor]) -> float:
+    return float(torch.stack(scalars).mean())
 
 
 def _checked_features(world: World) -> Tensor:
     if world.features is None:
-        raise RunError(
-            "the scenes have no features. Encode them first, for example with clearway scenes import"
-        )
+        raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
     if not torch.isfinite(world.features).all():
         raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
     return world.features

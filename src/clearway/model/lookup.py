@@ -58,8 +58,8 @@ class Activations:
     @classmethod
     def empty(cls, rows: int, width: int, device: torch.device) -> Activations:
         """Memory for `rows` rows."""
-        hidden = (torch.empty(rows, width, device=device) for _ in range(3))
-        return cls(*hidden, torch.empty(rows, OUTPUTS, device=device))
+        seen, fused, special = (torch.empty(rows, width, device=device) for _ in range(3))
+        return cls(seen, fused, special, torch.empty(rows, OUTPUTS, device=device))
 
     def rows(self, first: int, last: int) -> Activations:
         """A view of the rows first to last, last excluded."""
@@ -117,17 +117,13 @@ class LookupNetwork:
         net = self.network
         out = out or Activations.empty(len(history), self.width, history.device)
         rows = self.projected.view(-1, self.width)
-        torch.add(
-            embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen
-        ).relu_()
+        torch.add(embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen).relu_()
         torch.addmm(self.target_term[target], out.seen, net.fusion_weight[0].T, out=out.fused).relu_()
         first = 0
         for scene, count in enumerate(rows_per_scene):
             if count:
                 part = out.rows(first, first + count)
-                torch.addmm(
-                    net.scene_bias[scene], part.fused, net.scene_weight[scene].T, out=part.special
-                ).relu_()
+                torch.addmm(net.scene_bias[scene], part.fused, net.scene_weight[scene].T, out=part.special).relu_()
                 torch.addmm(net.output_bias[scene], part.special, net.output_weight[scene].T, out=part.output)
             first += count
         return out
@@ -157,7 +153,7 @@ class LookupNetwork:
         self._backward_siamese(history, grad_seen, grad_wanted)
 
     def _work(self, blocks: int, rows: int) -> list[Tensor]:
-        """Memory for some (rows, H) blocks, kept between calls: fresh pages cost as much as the arithmetic on them."""
+        """Memory for some (rows, H) blocks, kept between calls: fresh pages cost more than the arithmetic."""
         if len(self.workspace) < blocks * rows:
             self.workspace = torch.empty(blocks * rows, self.width, device=self.features.device)
         return list(self.workspace[: blocks * rows].view(blocks, rows, self.width))

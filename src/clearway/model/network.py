@@ -1,11 +1,11 @@
 """The siamese actor-critic (paper, figure 2; Zhu et al., ICRA 2017), written plainly.
 
     observation history (K x F) --siamese--> H --+
-                                                 +--fusion--> H --scene layer--> H --> 4 action scores, 1 value
+                                                 +--fusion--> H --scene--> H --> 4 action scores, 1 value
     target, tiled K times (K x F) --siamese--> H -+
 
-ReLU after every hidden layer; the scene layer and the outputs belong to a scene. `lookup` computes the same function
-much faster where states are few; this is the definition that it is checked against, and the one to deploy.
+ReLU after every hidden layer; the scene layer and the outputs belong to a scene. `lookup` computes the same
+function much faster where states are few; this is the definition that it is checked against, and the one to deploy.
 
 Axis letters: B batch, K history (newest last), F features, H hidden width, C scenes, A actions.
 """
@@ -78,9 +78,7 @@ class SiameseActorCritic(nn.Module):
         """
         seen = self._siamese(history)
         wanted = self._siamese(target[:, None].expand_as(history))
-        fused = relu(
-            linear(seen, self.fusion_weight[0]) + linear(wanted, self.fusion_weight[1]) + self.fusion_bias
-        )
+        fused = relu(linear(seen, self.fusion_weight[0]) + linear(wanted, self.fusion_weight[1]) + self.fusion_bias)
         output = fused.new_empty(len(fused), OUTPUTS)
         for head in scene.unique().tolist():
             rows = scene == head
