@@ -1,0 +1,111 @@
+"""Where the camera stands and how it sees: pictures to take, as plain data, and the taking of them.
+
+Coordinates: x is MuJoCo's x, z (across the floor) is MuJoCo's y. Heading 0 looks along +z, 90 along +x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+CAMERA_HEIGHT_M = 1.0
+VERTICAL_FOV_DEG = 60.0
+PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX = 300, 400
+FURNITURE_GROUP, CEILING_GROUP = 2, 1
+SPARE_GEOMS = 100  # the renderer adds a few of its own to the model's
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A camera in its place (MuJoCo's free camera).
+
+    Attributes:
+        look_at_m: a point in the middle of the picture, x, z and height.
+        distance_m: of the camera from that point.
+        azimuth_deg: the direction it looks in across the floor, 0 along +x, 90 along +z.
+        elevation_deg: 0 looks level, -90 straight down.
+    """
+
+    look_at_m: tuple[float, float, float]
+    distance_m: float
+    azimuth_deg: float
+    elevation_deg: float
+
+
+@dataclass(frozen=True)
+class View:
+    """The pictures to take of a room, all with one lens.
+
+    Attributes:
+        shots: one for each picture.
+        height_px, width_px: size of a picture.
+        vertical_extent: angle of view from the lower to the upper edge in degrees; metres if orthographic.
+        orthographic: without perspective, all rays of sight are parallel.
+        groups: the geom groups that show.
+    """
+
+    shots: tuple[Shot, ...]
+    height_px: int
+    width_px: int
+    vertical_extent: float
+    orthographic: bool
+    groups: tuple[int, ...]
+
+
+def first_person_view(locations_m: np.ndarray, headings_deg: np.ndarray) -> View:
+    """What the agent sees at each pose: (S, 2) x and z in metres, (S,) headings in degrees."""
+    return View(
+        shots=tuple(
+            _level_shot(float(x_m), float(z_m), float(heading_deg))
+            for (x_m, z_m), heading_deg in zip(locations_m, headings_deg, strict=True)
+        ),
+        height_px=PICTURE_HEIGHT_PX,
+        width_px=PICTURE_WIDTH_PX,
+        vertical_extent=VERTICAL_FOV_DEG,
+        orthographic=False,
+        groups=(FURNITURE_GROUP, CEILING_GROUP),
+    )
+
+
+def _level_shot(x_m: float, z_m: float, heading_deg: float) -> Shot:
+    azimuth_deg = 90.0 - heading_deg
+    azimuth = np.radians(azimuth_deg)
+    ahead_m = (x_m + float(np.cos(azimuth)), z_m + float(np.sin(azimuth)), CAMERA_HEIGHT_M)
+    return Shot(ahead_m, distance_m=1.0, azimuth_deg=azimuth_deg, elevation_deg=0.0)
+
+
+def take_pictures(model: mujoco.MjModel, view: View) -> Iterator[np.ndarray]:
+    """The pictures of a view one by one, each (height_px, width_px, 3) uint8 RGB; the array is used again.
+
+    Sets the lens in `model`. Needs a process with a working MUJOCO_GL backend (see `render`); the first
+    picture is taken after the backend has opened.
+    """
+    lens = model.vis.global_
+    lens.offheight, lens.offwidth = view.height_px, view.width_px
+    lens.fovy = view.vertical_extent
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    shown = mujoco.MjvOption()
+    shown.geomgroup[:] = 0
+    shown.geomgroup[list(view.groups)] = 1
+    picture = np.empty((view.height_px, view.width_px, 3), np.uint8)
+    max_geom = model.ngeom + SPARE_GEOMS
+    with mujoco.Renderer(model, view.height_px, view.width_px, max_geom=max_geom) as renderer:
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # the rooms' light is baked
+        for shot in view.shots:
+            renderer.update_scene(data, _free_camera(shot, view.orthographic), shown)
+            yield renderer.render(out=picture)
+
+
+def _free_camera(shot: Shot, orthographic: bool) -> mujoco.MjvCamera:
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera.lookat[:] = shot.look_at_m
+    camera.distance = shot.distance_m
+    camera.azimuth = shot.azimuth_deg
+    camera.elevation = shot.elevation_deg
+    camera.orthographic = int(orthographic)
+    return camera
