@@ -34,7 +34,7 @@ def _mix(x: Tensor) -> Tensor:
 
 
 def stream_keys(seeds: Tensor, purpose: int) -> Tensor:
-    """One key an environment, int64: seeds (N,) int64 mixed with a small number that tells streams of one seed apart."""
+    """One key an environment, (N,) int64: seeds (N,) int64 mixed with a number that tells streams of one seed apart."""
     return _mix(_mix(seeds + _signed(_INCREMENT)) + _signed(purpose * _INCREMENT))
 
 
@@ -57,7 +57,7 @@ class Streams:
         self.drawn[index] = 0
 
     def uniform(self, used: Tensor | None = None) -> Tensor:
-        """The next number of every stream, (N,) float64 in [0, 1); streams where `used` (N,) is False do not advance."""
+        """The next number of every stream, (N,) float64 in [0, 1); only streams where `used` (N,) is True advance."""
         word = _mix(self.keys + (self.drawn + 1) * _signed(_INCREMENT))
         self.drawn = self.drawn + (1 if used is None else used.to(torch.int64))
         return _shift_right(word, 11).to(torch.float64) * 2.0**-53

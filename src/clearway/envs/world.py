@@ -97,9 +97,7 @@ class World:
         return replace(self, **moved)
 
 
-def make_world(
-    scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zone_level: ZoneLevel = "pose"
-) -> World:
+def make_world(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zone_level: ZoneLevel = "pose") -> World:
     """The tables of some scenes with their targets.
 
     Args:

@@ -1,0 +1,80 @@
+"""Checks of what users hand to the environments: scenes, reward, numbers, actions, seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from clearway.envs.render import RENDER_MODES
+from clearway.errors import EnvError
+from clearway.reward import REWARDS, Reward, RewardName
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.scene import Scene
+
+SceneSource = Scene | str | Path
+Seeds = int | Sequence[int | None] | np.ndarray | None
+NO_LIMIT = -1  # how gymnasium.make spells it; None means the same
+
+
+def loaded_scenes(scenes: SceneSource | Sequence[SceneSource]) -> list[Scene]:
+    """The scenes themselves, or read from their files."""
+    sources = [scenes] if isinstance(scenes, (Scene, str, Path)) else list(scenes)
+    if not sources:
+        raise EnvError("scenes is empty. Give at least one scene or scene file")
+    return [source if isinstance(source, Scene) else _read(source) for source in sources]
+
+
+def _read(path: str | Path) -> Scene:
+    from clearway.scenes.thor_v1 import read_scene
+
+    return read_scene(Path(path))
+
+
+def chosen_reward(reward: RewardName | Reward) -> Reward:
+    """The reward itself, or the one of that name."""
+    if isinstance(reward, Reward):
+        return reward
+    if reward not in REWARDS:
+        raise EnvError(f"reward={reward!r} is unknown. Use a Reward or one of {', '.join(map(repr, REWARDS))}")
+    return REWARDS[reward]
+
+
+def check_numbers(num_envs: int, history_length: int, max_episode_steps: int | None, render_mode: str | None) -> None:
+    """Raise EnvError where one of them is out of range."""
+    if num_envs < 1:
+        raise EnvError(f"num_envs={num_envs}: expected at least 1 environment")
+    if history_length < 1:
+        raise EnvError(f"history_length={history_length}: expected at least 1 pose")
+    if max_episode_steps is not None and max_episode_steps != NO_LIMIT and max_episode_steps < 1:
+        raise EnvError(f"max_episode_steps={max_episode_steps}: expected at least 1 step, or None for no limit")
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise EnvError(f"render_mode={render_mode!r} is unknown. Use one of {', '.join(RENDER_MODES)}, or None")
+
+
+def checked_actions(actions: np.ndarray, env_count: int) -> np.ndarray:
+    """The actions as (env_count,) int64; EnvError where they are no actions."""
+    action = np.asarray(actions)
+    if not np.issubdtype(action.dtype, np.integer) or action.shape != (env_count,):
+        found = f"{action.dtype} of shape {action.shape}"
+        raise EnvError(f"actions: expected integers of shape ({env_count},), found {found}. Take action_space.sample()")
+    if action.min() < 0 or action.max() >= ACTION_COUNT:
+        wrong = action[(action < 0) | (action >= ACTION_COUNT)][0]
+        raise EnvError(f"action {wrong} is out of range. Actions are 0 to {ACTION_COUNT - 1}")
+    return action.astype(np.int64)
+
+
+def seed_words(seed: int | Sequence[int | None] | np.ndarray, env_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Seeds (N,) int64 and which environments have one, (N,) bool.
+
+    An int s means s, s + 1, ...; a sequence names each, None for none. Seeds count modulo 2^64.
+    """
+    seeds = [seed + env for env in range(env_count)] if isinstance(seed, (int, np.integer)) else list(seed)
+    if len(seeds) != env_count:
+        raise EnvError(f"seed: expected one for each of the {env_count} environments, got {len(seeds)}")
+    for one in seeds:
+        if one is not None and (not isinstance(one, (int, np.integer)) or one < 0):
+            raise EnvError(f"seed: expected integers from 0 on, got {one!r}")
+    words = np.array([0 if one is None else int(one) % 2**64 for one in seeds], np.uint64).view(np.int64)
+    return words, np.array([one is not None for one in seeds])
