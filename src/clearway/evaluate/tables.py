@@ -5,6 +5,7 @@ A target that was not reached in every episode is marked, and so is every row of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -82,7 +83,7 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, n
     """
     assert evaluations, "a table needs at least one evaluation"
     columns = [column for column in COLUMNS if column.main or not narrow]
-    where = {"average": (), "scenes": ("scene",), "targets": ("scene", "target")}[level]
+    where = () if level == "average" else ("scene",)
     headings = (*where, "agent", "solved", *(column.heading for column in columns))
     rows = tuple(
         (
@@ -135,8 +136,9 @@ def _results(evaluations: Sequence[Evaluation], level: Level) -> list[tuple[Resu
 
 
 def _place(result: Result, level: Level) -> tuple[Cell, ...]:
-    names = {"average": (), "scenes": (result.scene,), "targets": (result.scene, str(result.target))}[level]
-    return tuple(Cell(name) for name in names)
+    if level == "average":
+        return ()
+    return (Cell(result.scene, "" if result.target is None else f"target {result.target}"),)
 
 
 def _solved(result: Result) -> Cell:
@@ -145,7 +147,7 @@ def _solved(result: Result) -> Cell:
     if result.target is None:
         text = f"{result.solved_targets}/{result.target_count}"
     else:
-        text = f"{100 * result.values['success']:.0f} %"
+        text = f"{math.floor(1000 * result.values['success']) / 10:g} %"  # rounded down: 100 means all
     return Cell(f"{MARK} {text}" if failed else text, failed=failed)
 
 

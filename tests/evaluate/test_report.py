@@ -1,0 +1,103 @@
+"""Results, JSON and tables of the whole protocol."""
+
+import io
+import json
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from clearway.envs.world import make_world
+from clearway.evaluate.metrics import METRIC_NAMES
+from clearway.evaluate.policies import argmax, random_policy
+from clearway.evaluate.protocol import evaluate_agents
+from clearway.evaluate.report import Evaluation
+from clearway.evaluate.tables import MARK, markdown_table, rich_table, table_text
+from made import corridor_scene, grid_scene
+
+TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl", "shortest_path_steps"}
+TOP_KEYS = {"agent", "encoder", "episodes_per_target", "step_cap", "seed", "action_selection"}
+TARGETS = {"grid": [3, 17, 40], "corridor": [0, 19]}
+
+
+@pytest.fixture(scope="module")
+def evaluations() -> list[Evaluation]:
+    scenes = [grid_scene(2), corridor_scene(5, feature_count=32)]
+    world = make_world(scenes, TARGETS)
+    agents = {"first": random_policy(), "second": argmax(random_policy())}
+    return evaluate_agents(world, agents, encoder="made-up", episodes_per_target=40, step_cap=400)
+
+
+def test_every_agent_is_shown_both_ways_and_the_references_are_there(evaluations):
+    rows = [(e.agent, e.protocol.action_selection) for e in evaluations]
+    assert rows == [
+        ("first", "sampled"),
+        ("first", "argmax"),
+        ("second", "sampled"),
+        ("second", "argmax"),
+        ("random", "sampled"),
+        ("shortest path", "sampled"),
+    ]
+
+
+def test_the_shortest_path_agent_is_perfect(evaluations):
+    ideal = evaluations[-1]
+    for result in (*ideal.targets, *ideal.scenes, ideal.average):
+        assert result.values["steps"] == result.values["shortest_path_steps"]
+        assert result.values["spl"] == result.values["sc"] == result.values["success"] == 1.0
+        assert result.values["collisions"] == 0 and result.values["path_ratio"] == 1.0
+        assert not result.failed_targets
+
+
+def test_intervals_contain_their_value(evaluations):
+    for evaluation in evaluations:
+        for result in (*evaluation.targets, *evaluation.scenes, evaluation.average):
+            assert tuple(result.values) == tuple(result.intervals) == METRIC_NAMES
+            for name, (low, high) in result.intervals.items():
+                assert low - 1e-9 <= result.values[name] <= high + 1e-9
+
+
+def test_json_has_the_agreed_keys_and_survives_the_round_trip(evaluations):
+    for evaluation in evaluations:
+        content = evaluation.to_json()
+        assert json.loads(json.dumps(content, allow_nan=False)) == content
+        assert TOP_KEYS | {"targets", "scenes", "average"} <= set(content)
+        assert all(set(target) >= TARGET_KEYS for target in content["targets"])
+        assert [(t["scene"], t["target"]) for t in content["targets"]] == [(s, t) for s in TARGETS for t in TARGETS[s]]
+        assert [scene["scene"] for scene in content["scenes"]] == list(TARGETS)
+        by_hand = sum(scene["steps"] for scene in content["scenes"]) / 2
+        assert content["average"]["steps"] == pytest.approx(by_hand)
+
+
+def test_failed_targets_are_named_and_marked(evaluations):
+    argmax_of_random = evaluations[1]  # walks forward for ever
+    assert argmax_of_random.average.failed_targets
+    assert argmax_of_random.average.solved_targets == 5 - len(argmax_of_random.average.failed_targets)
+    for result in argmax_of_random.targets:
+        assert bool(result.failed_targets) == (result.values["success"] < 1)
+    table = table_text(evaluations, "targets")
+    solved = table.headings.index("solved")
+    for row in table.rows:
+        assert row[solved].failed == (row[solved].text != "100 %")
+        assert row[solved].text.startswith(MARK) == row[solved].failed
+    assert any(note.startswith(MARK) for note in table.notes)
+    assert not any(note.startswith(MARK) for note in table_text(evaluations[-1:]).notes)
+
+
+def test_a_success_of_nearly_all_is_not_rounded_to_all(evaluations):
+    perfect = evaluations[-1].targets[0]
+    nearly = replace(perfect, failed_targets=(("grid", 3),), values={**perfect.values, "success": 0.9998})
+    evaluation = replace(evaluations[-1], targets=(nearly,))
+    solved = table_text([evaluation], "targets").rows[0][2]
+    assert solved.failed and solved.text == f"{MARK} 99.9 %"
+
+
+@pytest.mark.parametrize(("level", "rows"), [("average", 6), ("scenes", 12), ("targets", 30)])
+def test_tables_show_every_row_and_the_encoder(evaluations, level, rows):
+    text = markdown_table(evaluations, level)
+    assert text.count("\n| ") == rows + 1  # the line of dashes and the rows follow the headings
+    assert "Encoder: made-up." in text
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(rich_table(evaluations, level))
+    shown = console.export_text()
+    assert "Encoder: made-up." in shown and "shortest path" in shown and "…" not in shown
