@@ -8,13 +8,10 @@ by the pose the agent arrives in; a blocked move arrives in the pose it left.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from clearway.zones import ZONE_COUNT, Zone
-
-RewardName = Literal["collision-aware", "shortest", "bump"]
 
 
 @dataclass(frozen=True)

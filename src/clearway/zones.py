@@ -13,15 +13,14 @@ The target comes before all zones; that is the reward's business (`clearway.rewa
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Literal
 
 import numpy as np
 
+from clearway.choices import ZoneLevel
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.graph import next_states
 from clearway.scenes.scene import Scene
 
-ZoneLevel = Literal["pose", "cell"]
 MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
 
 
@@ -67,3 +66,8 @@ def _any_of_cell(marked: np.ndarray, cells: np.ndarray) -> np.ndarray:
 def _combine(collision: np.ndarray, before_collision: np.ndarray) -> np.ndarray:
     near = np.where(before_collision, Zone.PRECOLLISION, Zone.FREE)
     return np.where(collision, Zone.COLLISION, near).astype(np.int8)
+
+
+def zone_counts(zones: np.ndarray) -> dict[str, int]:
+    """Number of poses in each zone by its name, from zones (S,)."""
+    return {name: int((zones == zone).sum()) for zone, name in enumerate(ZONE_NAMES)}

@@ -12,11 +12,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from clearway.choices import ZoneLevel
 from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import Scene
-from clearway.zones import ZoneLevel, scene_zones
+from clearway.zones import scene_zones
 
 FEWEST_STARTS = 1
 

@@ -21,13 +21,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.files import written_whole
 from clearway.learn.config import Learner
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
-from clearway.zones import ZoneLevel
 
 FORMAT_VERSION = 1
 RUN_FILE, METRICS_FILE, CHECKPOINTS = "run.json", "metrics.jsonl", "checkpoints"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import torch
 
+from clearway.choices import ZoneLevel
 from clearway.envs.world import make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import (
@@ -29,7 +30,6 @@ from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.learn.trainer import Trainer
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
-from clearway.zones import ZoneLevel
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0

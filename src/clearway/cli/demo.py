@@ -1,0 +1,42 @@
+"""`clearway demo`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from clearway.cli.console import print_json, stderr_console
+
+
+@dataclass(frozen=True)
+class Demo:
+    """See it all at once: build a bathroom, train both rewards, evaluate, and make a page of pictures.
+
+    Example: clearway demo --out demo
+    """
+
+    out: Path = Path("demo")
+    """Folder for the scene, the two runs, the pictures and index.html; a new demo replaces an older one there."""
+    seed: int = 0
+    """Of the agents; the room is the default bathroom."""
+    frames: int = 400_000
+    """Training frames of each agent."""
+    encoder: str = "auto"
+    """As for clearway scenes build."""
+    json: bool = False
+    """Print the evaluations as JSON instead of a table."""
+
+    def run(self) -> None:
+        """Run the demo."""
+        from clearway.experiments.demo import DemoRequest, run_demo
+
+        result = run_demo(DemoRequest(self.out, self.seed, self.frames, self.encoder), show_progress=True)
+        if self.json:
+            print_json([evaluation.to_json() for evaluation in result.evaluations])
+            return
+        from rich.console import Console
+
+        from clearway.evaluate.tables import rich_table
+
+        Console().print(rich_table(result.evaluations, "scenes"))
+        stderr_console().print(f"open {result.page}", highlight=False)

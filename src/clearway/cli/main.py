@@ -1,0 +1,79 @@
+"""`clearway`: reads the command line and runs one command.
+
+Exit codes: 0 success; 2 bad input, with one line that says what, where and the remedy; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from clearway.cli.console import showing_warnings
+from clearway.cli.demo import Demo
+from clearway.cli.evaluate import Evaluate
+from clearway.cli.scenes import Build, Import, Inspect
+from clearway.cli.train import Train
+from clearway.errors import ClearwayError
+
+DESCRIPTION = (
+    "Train, evaluate and look at agents that walk to the place where a picture was taken "
+    "and anticipate collisions on the way. Begin with: clearway demo"
+)
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Scene files: build rooms, import dumps, inspect."""
+
+    command: (
+        Annotated[Build, tyro.conf.subcommand("build")]
+        | Annotated[Import, tyro.conf.subcommand("import")]
+        | Annotated[Inspect, tyro.conf.subcommand("inspect")]
+    )
+
+    def run(self) -> None:
+        """Run the chosen command."""
+        self.command.run()
+
+
+Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Scenes, tyro.conf.subcommand("scenes")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command that the arguments (by default the process's own) ask for, then exit."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words == ["--version"]:
+        from clearway.version import __version__
+
+        print(f"clearway {__version__}")
+        return
+    command = tyro.cli(
+        Command,  # type: ignore[arg-type]  # a union of annotated types is not a type to mypy
+        args=words,
+        prog="clearway",
+        description=DESCRIPTION,
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+    )
+    sys.exit(_exit_code(command))
+
+
+def _exit_code(command: Demo | Scenes | Train | Evaluate) -> int:
+    try:
+        with showing_warnings():
+            command.run()
+    except ClearwayError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    return 0

@@ -1,0 +1,123 @@
+"""`clearway scenes build|import|inspect`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from clearway.choices import RoomName
+from clearway.cli.console import print_json, scene_files, stderr_console
+from clearway.errors import ClearwayError
+
+
+@dataclass(frozen=True)
+class Build:
+    """Build furnished rooms: render every view, encode it, write scene files.
+
+    Example: clearway scenes build --room bathroom --out bathroom.h5
+    """
+
+    out: Path
+    """The scene file to write; for --room all, a folder for the four of them."""
+    room: RoomName | Literal["all"] = "all"
+    """Which room."""
+    seed: int = 0
+    """Seed 0 gives the default rooms, another one other colours, textures, pictures and small furniture."""
+    encoder: str = "auto"
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Build and write."""
+        from clearway.perception import encode_scenes
+        from clearway.scenes.library import cached_room_scene
+        from clearway.scenes.rooms import ROOM_NAMES
+        from clearway.scenes.thor_v1 import write_scene
+
+        if self.room == "all" and self.out.suffix:
+            raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
+        names = ROOM_NAMES if self.room == "all" else (self.room,)
+        scenes = [cached_room_scene(name, self.seed, progress=True) for name in names]
+        for scene in encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True):
+            path = self.out if self.out.suffix else self.out / f"{scene.name}.h5"
+            write_scene(scene, path)
+            stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
+
+
+@dataclass(frozen=True)
+class Import:
+    """Read thor_v1 dumps, check them, and write them as scene files of our own.
+
+    Example: clearway scenes import dumps/bathroom_02.h5 dumps/kitchen_02.h5 --out scenes
+    """
+
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """thor_v1 HDF5 files, or folders of them."""
+    out: Path
+    """Folder for the scene files."""
+    encoder: str | None = None
+    """Encode the pictures anew, all files together, with this encoder; by default the files' features stay."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Import and write."""
+        from clearway.perception import encode_scenes
+        from clearway.scenes.thor_v1 import read_scene, write_scene
+
+        scenes = [read_scene(path) for path in scene_files(self.files)]
+        if self.encoder:
+            scenes = encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True)
+        for scene in scenes:
+            path = self.out / f"{scene.name}.h5"
+            write_scene(scene, path)
+            stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
+
+
+@dataclass(frozen=True)
+class Inspect:
+    """Say what a scene file holds, and draw its map.
+
+    Example: clearway scenes inspect bathroom.h5 --map bathroom.png
+    """
+
+    file: Annotated[Path, tyro.conf.Positional]
+    """The scene file."""
+    map: Path | None = None
+    """Write a map with the zones here (PNG)."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Print the figures."""
+        from clearway.scenes.inspect import summary
+        from clearway.scenes.thor_v1 import read_scene
+        from clearway.zones import scene_zones, zone_counts
+
+        (path,) = scene_files([self.file])
+        scene = read_scene(path)
+        zones = scene_zones(scene)
+        content = {**summary(scene).to_json(), "zones": zone_counts(zones)}
+        if self.map:
+            from clearway.viz.maps import draw_map
+
+            draw_map(scene, self.map, zones=zones)
+        if self.json:
+            print_json(content)
+        else:
+            _print_table(content)
+
+
+def _print_table(content: dict[str, object]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for key, value in content.items():
+        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else str(value)
+        table.add_row(key.replace("_", " "), text)
+    Console().print(table)

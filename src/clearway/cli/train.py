@@ -1,0 +1,151 @@
+"""`clearway train`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from clearway.choices import RewardName, ZoneLevel
+from clearway.cli.console import scene_files, stderr_console
+from clearway.errors import ClearwayError, RunError
+from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
+
+if TYPE_CHECKING:
+    from clearway.reward import Reward
+    from clearway.scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train an agent on one or more scenes.
+
+    Example: clearway train bathroom.h5 --reward collision-aware --out runs/bathroom
+    """
+
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Scene files, or folders of them."""
+    out: Path
+    """The run folder."""
+    targets: tuple[str, ...] = ()
+    """Target states: "26 37 43" for one scene, "bathroom=26,37 kitchen=90,136" for several. By default the published
+    targets for the paper's four scenes, five seeded ones elsewhere."""
+    reward: RewardName = "collision-aware"
+    """The paper's reward, or one of two baselines."""
+    alpha: float | None = None
+    """Reward of an ordinary step, instead of the reward's own."""
+    beta: float | None = None
+    """Reward of a step into the collision zone, instead of the reward's own."""
+    gamma: float | None = None
+    """Reward of a step into the precollision zone, instead of the reward's own."""
+    terminal: float | None = None
+    """Reward of reaching the target, instead of the reward's own."""
+    zones: ZoneLevel = "pose"
+    """Whether zones are those of poses or of whole cells."""
+    algorithm: Algorithm | None = None
+    """ppo or a2c, instead of the preset's own."""
+    preset: PresetName = "default"
+    """default is our recipe; paper is the published settings, synchronous."""
+    set: tuple[str, ...] = ()
+    """Single settings of the learner, for example --set envs=200 clip_rewards=true (all: clearway.learn.config)."""
+    frames: int | None = None
+    """Training frames, instead of the preset's own."""
+    seed: int = 0
+    """Of parameters, environments, actions and the choice of targets."""
+    threads: int | None = None
+    """Threads of torch; results repeat bit for bit at one number of threads."""
+    device: str = "cpu"
+    """cpu or cuda."""
+    resume: bool = False
+    """Go on with the run in --out from its newest checkpoint."""
+
+    def run(self) -> None:
+        """Train."""
+        from clearway.learn.train import RunRequest, set_threads, train
+        from clearway.scenes.thor_v1 import read_scene
+
+        set_threads(self.threads)
+        files = scene_files(self.files)
+        scenes = [read_scene(path) for path in files]
+        request = RunRequest(
+            scenes=scenes,
+            targets=chosen_targets(scenes, self.targets, self.seed),
+            learner=self._learner(),
+            reward=self._reward(),
+            seed=self.seed,
+            zone_level=self.zones,
+            paths={scene.name: path for scene, path in zip(scenes, files, strict=True)},
+            device=self.device,
+        )
+        train(request, self.out, resume=self.resume, show_progress=True)
+        stderr_console().print(f"{self.out}: trained. Next: clearway evaluate {self.out}", highlight=False)
+
+    def _reward(self) -> Reward:
+        from clearway.reward import REWARDS
+
+        return REWARDS[self.reward].with_changes(self.alpha, self.beta, self.gamma, self.terminal)
+
+    def _learner(self) -> Learner:
+        learner = PRESETS[self.preset]
+        if self.algorithm == "a2c":
+            learner = learner.as_a2c()
+        elif self.algorithm == "ppo":
+            learner = replace(learner, algorithm="ppo")
+        if self.frames is not None:
+            learner = replace(learner, frames=self.frames)
+        return with_settings(learner, self.set)
+
+
+def with_settings(learner: Learner, words: Sequence[str]) -> Learner:
+    """The learner with settings such as "envs=200" changed.
+
+    Raises:
+        RunError: a word is not name=value, or names no setting, or its value has the wrong type.
+    """
+    known = {field.name: getattr(learner, field.name) for field in fields(learner)}
+    changes: dict[str, object] = {}
+    for word in words:
+        name, equals, text = word.partition("=")
+        if not equals or name not in known:
+            raise RunError(f"--set {word}: expected name=value with a name among {', '.join(known)}. Correct it")
+        changes[name] = _parsed(word, text, known[name])
+    return replace(learner, **changes)  # type: ignore[arg-type]  # types follow the fields' own values
+
+
+def _parsed(word: str, text: str, example: object) -> object:
+    if isinstance(example, bool):
+        if text not in ("true", "false"):
+            raise RunError(f"--set {word}: expected true or false. Correct it")
+        return text == "true"
+    try:
+        return type(example)(text)  # type: ignore[call-arg]  # int, float or str
+    except ValueError as error:
+        raise RunError(f"--set {word}: expected a value of type {type(example).__name__}. Correct it") from error
+
+
+def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> dict[str, tuple[int, ...]]:
+    """Targets by scene name from the command line's words; scenes without any get their default ones.
+
+    Raises:
+        ClearwayError: a word cannot be read, names no scene given, or leaves open which scene it means.
+    """
+    from clearway.scenes.targets import default_targets
+
+    names = [scene.name for scene in scenes]
+    named: dict[str, tuple[int, ...]] = {}
+    for word in words:
+        name, equals, states = word.rpartition("=")
+        if not equals:
+            if len(scenes) > 1:
+                raise ClearwayError(f"--targets {word}: several scenes are given. Write SCENE={word}")
+            name = names[0]
+        if name not in names:
+            raise ClearwayError(f"--targets {word}: no scene of that name. Name one of {', '.join(names)}")
+        try:
+            named[name] = named.get(name, ()) + tuple(int(state) for state in states.split(","))
+        except ValueError as error:
+            raise ClearwayError(f"--targets {word}: expected state numbers such as 26,37,43. Correct it") from error
+    return {scene.name: named.get(scene.name) or default_targets(scene, seed) for scene in scenes}

@@ -1,0 +1,68 @@
+"""Evaluation of trained agents by their runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from clearway.errors import RunError
+from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluate.protocol import evaluate_agents
+from clearway.evaluate.report import Evaluation
+from clearway.learn.load import Agent, run_world
+from clearway.scenes.scene import Scene
+
+
+def evaluate_run(
+    agent: Agent,
+    scenes: Sequence[Scene],
+    *,
+    episodes_per_target: int = EPISODES_PER_TARGET,
+    step_cap: int = STEP_CAP,
+    seed: int = 0,
+) -> list[Evaluation]:
+    """The agent of a run, sampled and by argmax, beside the random and the shortest-path agent.
+
+    The first evaluation is the paper's: sampled actions.
+    """
+    return evaluate_runs(
+        {agent.record.reward.name: agent},
+        scenes,
+        episodes_per_target=episodes_per_target,
+        step_cap=step_cap,
+        seed=seed,
+    )
+
+
+def evaluate_runs(
+    agents: Mapping[str, Agent],
+    scenes: Sequence[Scene],
+    *,
+    episodes_per_target: int = EPISODES_PER_TARGET,
+    step_cap: int = STEP_CAP,
+    seed: int = 0,
+) -> list[Evaluation]:
+    """Agents of several runs on the same scenes and targets, beside the random and the shortest-path agent.
+
+    Raises:
+        RunError: the runs have other targets, or networks of another history length.
+    """
+    records = [agent.record for agent in agents.values()]
+    first = records[0]
+    for record in records:
+        if (record.targets, record.learner.history_length) != (first.targets, first.learner.history_length):
+            raise RunError("the runs differ in their targets or history length. Evaluate them one by one")
+    world = run_world(first, scenes)
+    return evaluate_agents(
+        world,
+        {name: agent.policy(world) for name, agent in agents.items()},
+        encoder=encoder_names(scenes),
+        episodes_per_target=episodes_per_target,
+        step_cap=step_cap,
+        seed=seed,
+        history_length=first.learner.history_length,
+    )
+
+
+def encoder_names(scenes: Sequence[Scene]) -> str:
+    """The encoders behind the scenes' features, for the notes under a table."""
+    return ", ".join(sorted({scene.encoder.name if scene.encoder else "unknown" for scene in scenes}))
