@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from clearway.scenes.rooms.groups import CEILING_GROUP, SEEN_GROUP
+
 CAMERA_HEIGHT_M = 1.0
 VERTICAL_FOV_DEG = 60.0
 PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX = 300, 400
-FURNITURE_GROUP, CEILING_GROUP = 2, 1
 SPARE_GEOMS = 100  # the renderer adds a few of its own to the model's
 
 
@@ -66,7 +67,7 @@ def first_person_view(locations_m: np.ndarray, headings_deg: np.ndarray) -> View
         width_px=PICTURE_WIDTH_PX,
         vertical_extent=VERTICAL_FOV_DEG,
         orthographic=False,
-        groups=(FURNITURE_GROUP, CEILING_GROUP),
+        groups=(SEEN_GROUP, CEILING_GROUP),
     )
 
 

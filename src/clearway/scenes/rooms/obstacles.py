@@ -13,7 +13,8 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-COLLISION_GROUP = 3
+from clearway.scenes.rooms.groups import OBSTACLE_GROUP
+
 OBSTACLE_SHAPES = (
     mujoco.mjtGeom.mjGEOM_BOX,
     mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -85,7 +86,7 @@ class Obstacles:
         ):
             spec.worldbody.add_geom(name=name, type=kind, size=size_m)
         for geom in room.spec.geoms:
-            if geom.group == COLLISION_GROUP and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
+            if geom.group == OBSTACLE_GROUP and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
                 _add_obstacle(spec, geom)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)

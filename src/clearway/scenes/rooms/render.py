@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from clearway.scenes.rooms.camera import View
 
 BACKEND_VARIABLE = "MUJOCO_GL"
+MESA_THREADS_VARIABLE = "LP_NUM_THREADS"  # of the software rasteriser, in each process
 MOST_WORKERS = 16  # each holds the whole room in memory
 WORKER_COMMAND = "import sys; sys.path[:] = {path!r}; from {module} import main; main()"
 WORKER_MODULE = "clearway.scenes.rooms.render_worker"
@@ -89,9 +90,10 @@ def _core_count() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _worker_environment() -> dict[str, str]:
-    """The caller's environment, with EGL (no screen) on Linux unless the caller chose a backend."""
+def _worker_environment(workers: int) -> dict[str, str]:
+    """The caller's environment; what it leaves open: EGL (no screen) on Linux, and no more threads than cores."""
     environment = dict(os.environ)
+    environment.setdefault(MESA_THREADS_VARIABLE, str(max(1, _core_count() // workers)))
     if sys.platform == "linux":
         environment.setdefault(BACKEND_VARIABLE, "egl")
     return environment
@@ -127,7 +129,7 @@ class _Worker:
     messages: IO[bytes]
 
     @classmethod
-    def start(cls, messages: IO[bytes]) -> _Worker:
+    def start(cls, messages: IO[bytes], environment: dict[str, str]) -> _Worker:
         """A process that waits for its job and writes its standard error to `messages`."""
         path = [folder or os.getcwd() for folder in sys.path]
         process = subprocess.Popen(
@@ -135,7 +137,7 @@ class _Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=messages,
-            env=_worker_environment(),
+            env=environment,
         )
         return cls(process, messages)
 
@@ -180,7 +182,7 @@ class _Worker:
         lines = self.messages.read().decode(errors="replace").strip().splitlines() or [""]
         if code == CANNOT_DRAW:
             marked = [line for line in lines if line.startswith(CANNOT_DRAW_MARK)] or lines
-            return _cannot_draw(marked[0].removeprefix(CANNOT_DRAW_MARK))
+            return cannot_draw(marked[0].removeprefix(CANNOT_DRAW_MARK))
         how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         return RenderError(
             f"a renderer process ended with {how} after {taken} of {asked} pictures: "
@@ -192,16 +194,16 @@ class _Worker:
 def _started_workers(count: int) -> Iterator[list[_Worker]]:
     """Renderer processes, ended and closed on the way out."""
     with ExitStack() as stack:
-        workers = []
+        workers: list[_Worker] = []
         for _ in range(count):
             messages = stack.enter_context(tempfile.TemporaryFile())
-            workers.append(_Worker.start(messages))
+            workers.append(_Worker.start(messages, _worker_environment(count)))
             stack.callback(workers[-1].close)
         yield workers
 
 
-def _cannot_draw(cause: str) -> RenderError:
+def cannot_draw(cause: str) -> RenderError:
     """The error for a machine whose OpenGL backend does not open."""
-    backend = _worker_environment().get(BACKEND_VARIABLE, "")
+    backend = _worker_environment(1).get(BACKEND_VARIABLE, "")
     remedy = REMEDIES.get(backend.lower().strip(), OTHER_REMEDY)
     return RenderError(f"no pictures can be rendered here with {BACKEND_VARIABLE}={backend} ({cause}). {remedy}")

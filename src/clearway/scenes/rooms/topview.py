@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from clearway.scenes.rooms.camera import FURNITURE_GROUP, Shot, View
+from clearway.scenes.rooms.camera import Shot, View
+from clearway.scenes.rooms.groups import SEEN_GROUP
 from clearway.scenes.rooms.render import render
 from clearway.scenes.scene import TopView
 
@@ -30,7 +31,7 @@ def render_top_view(model: mujoco.MjModel, width_m: float, depth_m: float) -> To
         width_px=width_px,
         vertical_extent=2 * half_z_m,
         orthographic=True,
-        groups=(FURNITURE_GROUP,),
+        groups=(SEEN_GROUP,),
     )
     return TopView(
         image=render(model, view, workers=1)[0],

@@ -1,0 +1,86 @@
+"""Build a room as a `Scene`: furniture and light, the navigation grid, and a picture of every pose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.metadata import version
+
+from clearway.scenes.scene import Provenance, Scene
+from clearway.version import __version__
+
+
+def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progress: bool = False) -> Scene:
+    """One of our own rooms as a scene with pictures, held in memory, and without features.
+
+    Args:
+        name: of the room, one of `clearway.scenes.rooms.ROOM_NAMES`.
+        seed: 0 is the default room; another gives other colours, pictures and small furniture.
+        workers: number of renderer processes; None: one a core.
+        progress: show what is going on, if standard error is a terminal.
+
+    Raises:
+        SceneError: there is no such room, or the agent fits nowhere in it.
+        RenderError: MuJoCo cannot render on this machine.
+    """
+    _check_mujoco()
+    from clearway.scenes.rooms import build_room
+    from clearway.scenes.rooms.camera import first_person_view
+    from clearway.scenes.rooms.navigation import find_grid
+    from clearway.scenes.rooms.obstacles import AgentShape
+    from clearway.scenes.rooms.render import render
+    from clearway.scenes.rooms.topview import render_top_view
+
+    title, agent = scene_name(name, seed), AgentShape()
+    with _status(f"furnishing and lighting {title}", progress):
+        room = build_room(name, seed)
+        grid = find_grid(room, agent)
+        model = room.spec.compile()
+    top_view = render_top_view(model, room.width_m, room.depth_m)
+    view = first_person_view(grid.state_locations_m, grid.state_headings_deg)
+    pictures = render(model, view, workers=workers, progress=progress, label=f"rendering {title}")
+    return Scene(
+        name=title,
+        observations=pictures,
+        features=None,
+        locations_m=grid.state_locations_m,
+        headings_deg=grid.state_headings_deg,
+        graph=grid.graph,
+        made_by=Provenance(source="room", room=name, seed=seed, versions=shaping_versions()),
+        cell_size_m=agent.step_m,
+        top_view=top_view,
+    )
+
+
+def scene_name(name: str, seed: int) -> str:
+    """What the scene of a room is called: the room's name, and the seed if it is not the default room."""
+    return name if seed == 0 else f"{name}-{seed}"
+
+
+def shaping_versions() -> dict[str, str]:
+    """Versions of the packages that shape a room's pictures."""
+    return {"clearway": __version__, "mujoco": version("mujoco"), "numpy": version("numpy")}
+
+
+def _check_mujoco() -> None:
+    """Import MuJoCo, which fails in many ways if `MUJOCO_GL` names a backend that is not there."""
+    try:
+        import_module("mujoco")
+    except (ImportError, AttributeError, RuntimeError, OSError) as error:
+        from clearway.scenes.rooms.render import cannot_draw
+
+        raise cannot_draw(f"{type(error).__name__}: {error}") from error
+
+
+@contextmanager
+def _status(message: str, wanted: bool) -> Iterator[None]:
+    """A moving line on standard error while something without countable steps goes on."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not (wanted and console.is_terminal):
+        yield
+        return
+    with console.status(message):
+        yield

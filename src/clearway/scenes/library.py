@@ -1,0 +1,98 @@
+"""The user's cache of built scenes: each room is built once, whoever asks for it and however often."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from pathlib import Path
+from typing import Protocol
+
+from clearway import files
+from clearway.errors import SceneError
+from clearway.scenes import rooms
+from clearway.scenes.build import build_scene, scene_name, shaping_versions
+from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene, write_scene
+
+KEY_LENGTH = 16
+
+
+class Builder(Protocol):
+    """What makes a scene that is not in the cache: `build_scene`, or a stand-in."""
+
+    def __call__(self, name: str, seed: int, *, workers: int | None, progress: bool) -> Scene:
+        """The scene of a room."""
+
+
+def cached_room_scene(
+    name: str,
+    seed: int = 0,
+    *,
+    workers: int | None = None,
+    progress: bool = False,
+    build: Builder = build_scene,
+) -> Scene:
+    """A room's scene from the user's cache; built and kept there the first time.
+
+    Whoever asks for a scene that another process is building waits for it. A builder that is killed leaves no
+    scene behind, and a file that cannot be read is built again. The scene's pictures are read from the file on
+    demand; it has no features.
+
+    Args:
+        name: of the room, one of `clearway.scenes.rooms.ROOM_NAMES`.
+        seed: 0 is the default room.
+        workers: number of renderer processes; None: one a core.
+        progress: show what is going on, if standard error is a terminal.
+        build: makes the scene.
+
+    Raises:
+        SceneError: there is no such room, or the agent fits nowhere in it.
+        RenderError: MuJoCo cannot render on this machine.
+    """
+    path, title = scene_path(name, seed), scene_name(name, seed)
+    scene = _readable_scene(path, title)
+    if scene is not None:
+        return scene
+    with files.locked(path):
+        scene = _readable_scene(path, title)
+        if scene is not None:
+            return scene
+        _remove_leftovers(path)
+        write_scene(build(name, seed, workers=workers, progress=progress), path)
+    return read_scene(path, name=title)
+
+
+def scene_path(name: str, seed: int) -> Path:
+    """Where the cache keeps the scene of a room: the name holds a hash of all that shapes its pictures."""
+    shaped_by = {"room": name, "seed": seed, "versions": shaping_versions(), "sources": _sources_hash()}
+    key = hashlib.sha256(json.dumps(shaped_by, sort_keys=True).encode()).hexdigest()[:KEY_LENGTH]
+    readable = re.sub(r"[^\w-]", "_", scene_name(name, seed))
+    return files.cache_dir() / "scenes" / f"{readable}-{key}.h5"
+
+
+def _sources_hash() -> str:
+    """Hash of the room builder's source files, so that a change of them makes a new scene."""
+    folder = Path(rooms.__file__).parent
+    digest = hashlib.sha256()
+    for source in sorted(folder.rglob("*.py")):
+        content = source.read_bytes()
+        digest.update(f"{source.relative_to(folder).as_posix()} {len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _readable_scene(path: Path, title: str) -> Scene | None:
+    """The scene in a cache file, under its title; None if there is no file or it is damaged."""
+    if not path.exists():
+        return None
+    try:
+        return read_scene(path, name=title)
+    except SceneError:
+        return None
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Remove the unfinished files of builders that were killed. Only for the holder of the lock of `path`."""
+    for part in path.parent.glob(f".{path.name}.*.part"):
+        part.unlink(missing_ok=True)
