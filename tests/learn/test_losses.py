@@ -1,0 +1,123 @@
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor
+
+from clearway.learn.losses import Batch, actor_critic_loss, loss_gradient
+
+LOG_4 = math.log(4)
+SETTINGS = {"entropy_weight": 0.1, "value_weight": 0.5, "ratio_clip": 0.2, "sum_loss": False}
+
+
+def made_batch(
+    action: list[int], log_prob: list[float], advantage: list[float], value_target: list[float]
+) -> Batch:
+    """A batch whose states do not matter."""
+    count = len(action)
+    return Batch(
+        torch.zeros(count, 4, dtype=torch.int64),
+        torch.zeros(count, dtype=torch.int64),
+        torch.tensor(action),
+        torch.tensor(log_prob),
+        torch.tensor(advantage),
+        torch.tensor(value_target),
+        (count,),
+    )
+
+
+def uniform_output(value: float, rows: int = 1) -> Tensor:
+    """Equal scores for all actions, and a value."""
+    return torch.tensor([[0.0, 0.0, 0.0, 0.0, value]]).repeat(rows, 1)
+
+
+def random_case(rows: int) -> tuple[Tensor, Batch]:
+    """Outputs (B, 5) and a batch on its first pass: log_prob is the outputs' own."""
+    rng = torch.Generator().manual_seed(0)
+    output = torch.randn(rows, 5, generator=rng)
+    action = torch.randint(4, (rows,), generator=rng)
+    log_prob = torch.log_softmax(output[:, :4], 1)[torch.arange(rows), action]
+    batch = made_batch(action.tolist(), [0.0] * rows, [0.0] * rows, [0.0] * rows)
+    return output, replace(
+        batch,
+        log_prob=log_prob,
+        advantage=torch.randn(rows, generator=rng),
+        value_target=torch.randn(rows, generator=rng),
+    )
+
+
+def test_terms_worked_by_hand() -> None:
+    terms = actor_critic_loss(uniform_output(1.0), made_batch([2], [-LOG_4], [2.0], [3.0]), **SETTINGS)
+    assert terms.policy.item() == pytest.approx(-2.0)
+    assert terms.value.item() == pytest.approx(2.0)  # half of (3 - 1)^2
+    assert terms.entropy.item() == pytest.approx(LOG_4)
+    assert terms.clipped.item() == 0.0
+    assert terms.total.item() == pytest.approx(-2.0 - 0.1 * LOG_4 + 0.5 * 2.0)
+
+
+def test_value_weight_a_half_is_zhu_s_quarter_of_the_squared_error() -> None:
+    batch = made_batch([0], [-LOG_4], [0.0], [3.0])
+    terms = actor_critic_loss(uniform_output(-1.0), batch, **SETTINGS | {"entropy_weight": 0.0})
+    assert terms.total.item() == pytest.approx(0.25 * (3 - -1) ** 2)
+
+
+def test_sum_is_the_mean_times_the_rows() -> None:
+    output, batch = random_case(6)
+    mean, gradient = loss_gradient(output, batch, **SETTINGS)
+    total, summed = loss_gradient(output, batch, **SETTINGS | {"sum_loss": True})
+    assert total.total.item() == pytest.approx(6 * mean.total.item(), rel=1e-5)
+    torch.testing.assert_close(summed, 6 * gradient)
+    assert total.policy.item() == pytest.approx(mean.policy.item())  # the parts are means either way
+
+
+def test_on_the_first_pass_the_gradient_is_a2c_s() -> None:
+    """d/dscores = (pi - 1_a) A + w pi (log pi + H);  d/dV = v (V - R)."""
+    output, batch = random_case(9)
+    _, gradient = loss_gradient(output, batch, **SETTINGS)
+    log_pi = torch.log_softmax(output[:, :4], 1)
+    pi = log_pi.exp()
+    entropy = -(pi * log_pi).sum(1, keepdim=True)
+    taken = torch.nn.functional.one_hot(batch.action, 4)
+    expected = torch.empty(9, 5)
+    expected[:, :4] = (pi - taken) * batch.advantage[:, None] + 0.1 * pi * (log_pi + entropy)
+    expected[:, 4] = 0.5 * (output[:, 4] - batch.value_target)
+    torch.testing.assert_close(gradient, expected / 9)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "advantage", "policy_loss", "moves"),
+    [
+        (2.0, 1.0, -1.2, False),  # already likelier by more than the clip: no further
+        (2.0, -1.0, 2.0, True),  # wrongly likelier: pull back
+        (0.5, 1.0, -0.5, True),  # wrongly unlikelier: pull back
+        (0.5, -1.0, 0.8, False),  # already unlikelier by more than the clip: no further
+    ],
+)
+def test_the_clip_stops_only_steps_that_go_too_far(
+    ratio: float, advantage: float, policy_loss: float, moves: bool
+) -> None:
+    batch = made_batch([1], [-LOG_4 - math.log(ratio)], [advantage], [0.0])
+    terms, gradient = loss_gradient(uniform_output(0.0), batch, **SETTINGS | {"entropy_weight": 0.0})
+    assert terms.policy.item() == pytest.approx(policy_loss, rel=1e-5)
+    assert terms.clipped.item() == 1.0
+    assert bool(gradient[0, :4].any()) == moves
+    if moves:  # a positive advantage makes the action likelier: its score rises against the gradient
+        assert (gradient[0, 1] < 0) == (advantage > 0)
+
+
+def test_entropy_alone_pulls_towards_uniform() -> None:
+    output = torch.tensor([[2.0, 0.0, 0.0, 0.0, 0.0]])
+    log_prob = torch.log_softmax(output[0, :4], 0)[0].item()
+    _, gradient = loss_gradient(output, made_batch([0], [log_prob], [0.0], [0.0]), **SETTINGS)
+    assert gradient[0, 0] > 0  # descending lowers the score that stands out
+    assert (gradient[0, 1:4] < 0).all()
+
+
+def test_rows_keep_what_belongs_together() -> None:
+    _, batch = random_case(5)
+    part = batch.rows(torch.tensor([4, 1]), (2,))
+    assert len(part) == 2
+    assert part.rows_per_scene == (2,)
+    assert part.advantage.tolist() == [batch.advantage[4].item(), batch.advantage[1].item()]
+    assert part.action.tolist() == [batch.action[4].item(), batch.action[1].item()]

@@ -1,0 +1,123 @@
+"""`LookupNetwork` against plain autograd on `SiameseActorCritic`, which defines what it computes."""
+
+from collections.abc import Iterator
+
+import pytest
+import torch
+from torch import Tensor
+
+from clearway.model.lookup import LookupNetwork
+from clearway.model.network import NetworkShape, SiameseActorCritic
+
+STATES, FEATURES, WIDTH, HISTORY = 30, 11, 14, 4
+FIRST_STATE = (0, 10, 22, 30)  # three scenes
+TARGET_STATE = (3, 9, 15, 25, 25)  # two targets are the same pose
+TARGET_SCENE = (0, 0, 1, 2, 2)
+
+
+@pytest.fixture
+def float64() -> Iterator[None]:
+    torch.set_default_dtype(torch.float64)
+    yield
+    torch.set_default_dtype(torch.float32)
+
+
+def made_network(seed: int = 0) -> tuple[SiameseActorCritic, LookupNetwork]:
+    network = SiameseActorCritic(NetworkShape(3, FEATURES, WIDTH, HISTORY), seed)
+    with torch.no_grad():  # larger weights, so that ReLUs cut and every path carries a gradient
+        for parameter in network.parameters():
+            parameter.mul_(2)
+    features = torch.randn(STATES, FEATURES, generator=torch.Generator().manual_seed(seed + 100))
+    return network, LookupNetwork(network, features, torch.tensor(TARGET_STATE))
+
+
+def made_rows(
+    rows_per_scene: tuple[int, ...], any_target: bool, seed: int = 0
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Histories (B, K), targets (B,), scenes (B,), ordered by scene; states and whole histories repeat."""
+    rng = torch.Generator().manual_seed(seed)
+    history, target, scene = [], [], []
+    for number, count in enumerate(rows_per_scene):
+        first, last = FIRST_STATE[number], FIRST_STATE[number + 1]
+        rows = torch.randint(first, last, (count, HISTORY), generator=rng)
+        rows[1::3] = rows[1::3, -1:]  # the agent stood still
+        rows[2::4] = rows[:1]
+        own = [m for m, s in enumerate(TARGET_SCENE) if any_target or s == number]
+        history.append(rows)
+        target.append(torch.tensor(own)[torch.randint(len(own), (count,), generator=rng)])
+        scene.append(torch.full((count,), number))
+    return torch.cat(history), torch.cat(target), torch.cat(scene)
+
+
+CASES = [((17, 9, 23), False), ((17, 0, 9), False), ((0, 0, 1), False), ((12, 12, 12), True)]
+
+
+def check_against_autograd(rows_per_scene: tuple[int, ...], any_target: bool, tolerance: float) -> None:
+    network, lookup = made_network()
+    history, target, scene = made_rows(rows_per_scene, any_target)
+    kept = lookup.forward(history, target, rows_per_scene)
+    grad_output = torch.randn(len(history), 5, generator=torch.Generator().manual_seed(5))
+    for parameter in network.parameters():
+        parameter.grad.fill_(torch.nan)  # whatever was there before must not stay
+    lookup.backward(history, target, rows_per_scene, kept, grad_output)
+    found = {name: parameter.grad.clone() for name, parameter in network.named_parameters()}
+
+    features = lookup.features
+    scores, value = network(features[history], features[lookup.target_state][target], scene)
+    torch.testing.assert_close(kept.scores, scores.detach(), rtol=tolerance, atol=tolerance)
+    torch.testing.assert_close(kept.value, value.detach(), rtol=tolerance, atol=tolerance)
+    network.zero_grad()
+    (scores * grad_output[:, :4]).sum().add((value * grad_output[:, 4]).sum()).backward()
+    for name, parameter in network.named_parameters():
+        largest = parameter.grad.abs().max().clamp_min(1e-3).item()
+        torch.testing.assert_close(
+            found[name], parameter.grad, rtol=0, atol=tolerance * largest, msg=lambda m, n=name: f"{n}: {m}"
+        )
+
+
+@pytest.mark.parametrize(("rows_per_scene", "any_target"), CASES)
+def test_outputs_and_every_gradient_equal_autograd_s(
+    rows_per_scene: tuple[int, ...], any_target: bool
+) -> None:
+    check_against_autograd(rows_per_scene, any_target, tolerance=1e-5)
+
+
+@pytest.mark.usefixtures("float64")
+@pytest.mark.parametrize(("rows_per_scene", "any_target"), CASES)
+def test_in_float64_they_agree_to_rounding(rows_per_scene: tuple[int, ...], any_target: bool) -> None:
+    check_against_autograd(rows_per_scene, any_target, tolerance=1e-13)
+
+
+def test_forward_follows_the_parameters_after_refresh() -> None:
+    network, lookup = made_network()
+    history, target, scene = made_rows((5, 5, 5), False)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.mul_(0.5)
+        lookup.refresh()
+        scores, value = network(
+            lookup.features[history], lookup.features[lookup.target_state][target], scene
+        )
+    kept = lookup.forward(history, target, (5, 5, 5))
+    torch.testing.assert_close(kept.scores, scores, rtol=1e-5, atol=1e-6)
+    torch.testing.assert_close(kept.value, value, rtol=1e-5, atol=1e-6)
+
+
+def test_backward_does_not_depend_on_what_was_computed_before() -> None:
+    """Memory is kept between calls; a larger batch before must leave no trace."""
+    network, lookup = made_network()
+    small, large = (3, 2, 4), (40, 50, 60)
+    gradients = []
+    for batches in ([small], [large, small]):
+        for rows_per_scene in batches:
+            history, target, _ = made_rows(rows_per_scene, False)
+            kept = lookup.forward(history, target, rows_per_scene)
+            lookup.backward(history, target, rows_per_scene, kept, torch.ones(len(history), 5))
+        gradients.append([parameter.grad.clone() for parameter in network.parameters()])
+    assert all(torch.equal(a, b) for a, b in zip(*gradients, strict=True))
+
+
+def test_features_of_another_size_are_refused() -> None:
+    network, _ = made_network()
+    with pytest.raises(AssertionError, match="features"):
+        LookupNetwork(network, torch.zeros(STATES, FEATURES + 1), torch.tensor(TARGET_STATE))

@@ -1,0 +1,70 @@
+import math
+
+import pytest
+import torch
+
+from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+
+
+def test_the_paper_s_size_has_5_780_500_parameters() -> None:
+    network = SiameseActorCritic(NetworkShape(scene_count=4, feature_count=2048))
+    count = {name: parameter.numel() for name, parameter in network.named_parameters()}
+    assert count["siamese_weight"] + count["siamese_bias"] == 4_194_816  # 8192 -> 512
+    assert count["fusion_weight"] + count["fusion_bias"] == 524_800  # 1024 -> 512
+    assert count["scene_weight"] + count["scene_bias"] == 4 * 262_656  # 512 -> 512
+    assert count["output_weight"] + count["output_bias"] == 4 * (2_052 + 513)  # 512 -> 4 and 512 -> 1
+    assert sum(count.values()) == 5_780_500
+
+
+def test_parameters_fill_the_range_of_their_fan_in() -> None:
+    network = SiameseActorCritic(NetworkShape(scene_count=2, feature_count=30, width=64, history_length=3))
+    fan_in = {"siamese": 90, "fusion": 128, "scene": 64, "output": 64}
+    for name, parameter in network.named_parameters():
+        bound = 1 / math.sqrt(fan_in[name.split("_")[0]])
+        assert parameter.abs().max() <= bound
+        if parameter.numel() >= 64:
+            assert parameter.abs().max() > 0.9 * bound
+        if parameter.numel() >= 1000:
+            assert parameter.std().item() == pytest.approx(bound / math.sqrt(3), rel=0.05)
+
+
+def test_a_seed_repeats_and_another_differs() -> None:
+    shape = NetworkShape(scene_count=1, feature_count=5, width=8)
+    first, again, other = (SiameseActorCritic(shape, seed).siamese_weight for seed in (7, 7, 8))
+    assert torch.equal(first, again)
+    assert not torch.equal(first, other)
+
+
+def test_forward_by_hand() -> None:
+    """Width 1, one feature, history of 2: every layer is a number."""
+    network = SiameseActorCritic(NetworkShape(scene_count=2, feature_count=1, width=1, history_length=2))
+    with torch.no_grad():
+        network.siamese_weight.copy_(torch.tensor([[[2.0]], [[3.0]]]))  # oldest, newest
+        network.siamese_bias.fill_(1.0)
+        network.fusion_weight.copy_(torch.tensor([[[1.0]], [[-1.0]]]))  # observation, target
+        network.fusion_bias.fill_(0.5)
+        network.scene_weight.copy_(torch.tensor([[[2.0]], [[-2.0]]]))
+        network.scene_bias.copy_(torch.tensor([[0.0], [1.0]]))
+        network.output_weight.copy_(torch.arange(10.0).view(2, 5, 1))
+        network.output_bias.zero_()
+        history, target = torch.tensor([[[1.0], [2.0]]] * 2), torch.tensor([[1.0], [-1.0]])
+        scores, value = network(history, target, torch.tensor([0, 1]))
+    # seen = 2 * 1 + 3 * 2 + 1 = 9; wanted = relu(5 * target + 1) = 6 and 0; fused = 3.5 and 9.5;
+    # scene layer: 2 * 3.5 = 7 in scene 0, relu(-2 * 9.5 + 1) = 0 in scene 1
+    assert scores.tolist() == [[0.0, 7.0, 14.0, 21.0], [0.0] * 4]
+    assert value.tolist() == [28.0, 0.0]
+
+
+def test_centred_features_have_mean_0_and_rms_1() -> None:
+    features = torch.randn(50, 6, generator=torch.Generator().manual_seed(0)) * 3 + torch.arange(6)
+    prepared = FeatureScale.centred(features)(features)
+    assert prepared.mean(0).abs().max() < 1e-5
+    assert prepared.square().mean().item() == pytest.approx(1, rel=1e-5)
+    ratio = (features - features.mean(0)) / prepared
+    assert torch.allclose(ratio, ratio[0, 0].expand_as(ratio), rtol=1e-4)  # one factor for all features
+
+
+def test_constant_features_and_the_identity() -> None:
+    constant = torch.full((4, 3), 2.5)
+    assert torch.equal(FeatureScale.centred(constant)(constant), torch.zeros(4, 3))
+    assert torch.equal(FeatureScale.identity(constant)(constant), constant)

@@ -1,0 +1,70 @@
+"""Small worlds, networks and training settings for the tests of the model and the learner."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from clearway.envs.world import World, make_world
+from clearway.learn.config import DEFAULT, Learner
+from clearway.learn.train import RunRequest
+from clearway.learn.trainer import Trainer
+from clearway.model.network import NetworkShape, SiameseActorCritic
+from clearway.reward import COLLISION_AWARE, Reward
+from clearway.scenes.scene import Scene
+from made import corridor_scene, grid_scene
+
+FEATURES = 12
+CORRIDOR_TARGETS = (0, 8, 16)  # looking along the corridor, in its first, middle and last cell
+GRID_TARGETS = (5, 22)
+
+
+def corridor_world() -> World:
+    """One corridor of five cells: states 4 * cell + heading / 90, targets 0, 8 and 16."""
+    return make_world([corridor_scene(5, feature_count=FEATURES)], {"corridor": CORRIDOR_TARGETS})
+
+
+def small_scenes() -> list[Scene]:
+    """A corridor and a grid."""
+    return [corridor_scene(5, feature_count=FEATURES), grid_scene(1, width=4, depth=3, feature_count=FEATURES)]
+
+
+def small_targets() -> dict[str, tuple[int, ...]]:
+    """Three targets in the corridor, two in the grid."""
+    return {"corridor": CORRIDOR_TARGETS, "grid": GRID_TARGETS}
+
+
+def small_world() -> World:
+    """The two small scenes."""
+    return make_world(small_scenes(), small_targets())
+
+
+def small_network(world: World, width: int = 16, seed: int = 0) -> SiameseActorCritic:
+    """A narrow network for a world."""
+    assert world.features is not None
+    return SiameseActorCritic(NetworkShape(world.scene_count, world.features.shape[1], width), seed)
+
+
+def small_learner(learner: Learner = DEFAULT, **changes: Any) -> Learner:
+    """Settings for 10 environments, 8 steps, 25 updates, where `changes` do not say otherwise."""
+    small: dict[str, Any] = {"frames": 2000, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
+    return replace(learner, **(small | changes))
+
+
+def small_trainer(learner: Learner, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
+    """A trainer on the two small scenes."""
+    return Trainer(small_world(), learner, reward, seed)
+
+
+def small_request(**changes: Any) -> RunRequest:
+    """A training run on the two small scenes."""
+    request = RunRequest(small_scenes(), small_targets(), small_learner(), COLLISION_AWARE, seed=3)
+    return replace(request, **changes)
+
+
+def equal_bits(first: dict[str, Tensor], second: dict[str, Tensor]) -> bool:
+    """The same names with the same tensors, bit for bit."""
+    return first.keys() == second.keys() and all(torch.equal(first[name], second[name]) for name in first)
