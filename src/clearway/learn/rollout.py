@@ -23,8 +23,8 @@ ACTION_STREAM = 3
 
 def sample_actions(scores: Tensor, uniform: Tensor) -> Tensor:
     """Actions (B,) int64 drawn from softmax(scores (B, A)) with uniform numbers (B,) in [0, 1)."""
-    bounds = torch.softmax(scores, 1).cumsum(1)
-    threshold = uniform.to(bounds.dtype)[:, None] * bounds[:, -1:]
+    bounds = torch.softmax(scores.double(), 1).cumsum(1)  # in float32 a number near 1 would round to 1: the last action
+    threshold = uniform[:, None] * bounds[:, -1:]
     return (threshold >= bounds).sum(1).clamp_(max=ACTION_COUNT - 1)
 
 
