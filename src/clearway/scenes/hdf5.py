@@ -1,0 +1,215 @@
+"""Checked reading of HDF5 files that others made: every fault of a file leaves as one `SceneError`.
+
+A reader opens a file with `opened` and touches it through the accessors here alone. They follow no link out
+of the file, read no size before it is checked against a limit, and turn the library's many exceptions into one.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from clearway.errors import SceneError
+
+MAX_ARRAY_BYTES = 2 * 1024**3  # the largest array that is read into memory at once
+MAX_CHUNK_BYTES = 256 * 1024**2  # what the library unpacks to reach one element
+MAX_JSON_BYTES = 4 * 1024**2
+MAX_GROUP_ARRAYS = 1000
+MAKE_AGAIN = "Make the file again or get another copy"
+
+_FAULTS = (
+    OSError,
+    RuntimeError,
+    LookupError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    MemoryError,
+)
+
+
+@contextmanager
+def faults_named(source: Path, dataset: str = "", problem: str = "cannot be read") -> Iterator[None]:
+    """Turn whatever the HDF5 library raises within into a `SceneError` about `source` and `dataset`."""
+    try:
+        yield
+    except _FAULTS as fault:
+        reason = " ".join(str(fault).split()) or type(fault).__name__
+        raise SceneError(source, f"{problem} ({reason})", MAKE_AGAIN, dataset) from fault
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[h5py.File]:
+    """The HDF5 file at `path`, open for reading. Raises SceneError where it is missing or not HDF5."""
+    if not path.is_file():
+        raise SceneError(path, "there is no such file", "Check the path")
+    with faults_named(path, problem="cannot be opened as HDF5"):
+        if not h5py.is_hdf5(path):
+            raise SceneError(path, "is not an HDF5 file", "Give a scene file in the thor_v1 format")
+        file = h5py.File(path, "r")
+    try:
+        yield file
+    finally:
+        with faults_named(path, problem="cannot be closed"):
+            file.close()
+
+
+def find_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset | None:
+    """The dataset `name` of a file or group, or None where there is none.
+
+    Raises:
+        SceneError: it is a link, not a dataset, or keeps its values in another file.
+    """
+    with faults_named(source, name):
+        link = parent.get(name, getlink=True)
+        if link is None:
+            return None
+        if not isinstance(link, h5py.HardLink):
+            raise SceneError(source, "is a link, which is not followed", "Copy the data into the file", name)
+        found = parent[name]
+        if not isinstance(found, h5py.Dataset):
+            raise SceneError(source, "is not a dataset", MAKE_AGAIN, name)
+        if found.is_virtual or found.external:
+            raise SceneError(source, "keeps its values in another file", "Copy the data into the file", name)
+        _check_chunks(found, source, name)
+        return found
+
+
+def need_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset:
+    """The dataset `name`, which the format requires. Raises SceneError where it is missing or unusable."""
+    found = find_dataset(parent, name, source)
+    if found is None:
+        raise SceneError(source, "is missing", "Give a complete scene file in the thor_v1 format", name)
+    return found
+
+
+def _check_chunks(dataset: h5py.Dataset, source: Path, name: str) -> None:
+    if dataset.chunks and math.prod(dataset.chunks) * dataset.dtype.itemsize > MAX_CHUNK_BYTES:
+        problem = f"its chunks {dataset.chunks} hold more than {MAX_CHUNK_BYTES >> 20} MiB each"
+        raise SceneError(source, problem, "Store the file again with smaller chunks", name)
+
+
+def check_layout(
+    dataset: h5py.Dataset, source: Path, *, shape: tuple[int | None, ...], kinds: str, limit: int | None = None
+) -> None:
+    """Check rank, lengths, number type and size of a dataset before anything of it is read.
+
+    Args:
+        dataset: the dataset.
+        source: the file, for the error.
+        shape: expected length of each axis; None where any length will do.
+        kinds: letters of `numpy.dtype.kind` that are accepted, for example "iuf".
+        limit: most bytes that the whole dataset may hold; None where it is read piece by piece.
+
+    Raises:
+        SceneError: something differs.
+    """
+    name = _short_name(dataset)
+    with faults_named(source, name):
+        found, dtype = dataset.shape, dataset.dtype
+    if found is None or not _shape_fits(found, shape):
+        wanted = ", ".join("any" if length is None else str(length) for length in shape)
+        raise SceneError(source, f"has shape {found}, expected ({wanted})", MAKE_AGAIN, name)
+    if dtype.kind not in kinds or dtype.names or dtype.subdtype:
+        raise SceneError(source, f"holds {dtype}, expected numbers of kind '{kinds}'", MAKE_AGAIN, name)
+    if limit is not None and math.prod(found) * dtype.itemsize > limit:
+        problem = f"would take {math.prod(found) * dtype.itemsize:,} bytes, more than the limit of {limit:,}"
+        raise SceneError(source, problem, "Give a smaller scene", name)
+
+
+def _shape_fits(found: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(found) == len(wanted) and all(w is None or f == w for f, w in zip(found, wanted, strict=True))
+
+
+def _short_name(dataset: h5py.Dataset) -> str:
+    return str(dataset.name or "").lstrip("/")
+
+
+def read_values(dataset: h5py.Dataset, source: Path, selection: object = ()) -> np.ndarray:
+    """The values of a dataset or of a part of it; a checksum that fails is a SceneError."""
+    with faults_named(source, _short_name(dataset), "is damaged"):
+        values = dataset[selection]
+    return np.asarray(values)
+
+
+def read_attribute(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> str | int | float | None:
+    """A small attribute as a Python number or text, None where there is none."""
+    with faults_named(source, problem=f"attribute '{name}' cannot be read"):
+        if name not in item.attrs:
+            return None
+        kept = item.attrs.get_id(name)
+        if kept.get_storage_size() > MAX_JSON_BYTES:
+            raise SceneError(source, f"attribute '{name}' is too large", MAKE_AGAIN)
+        value = item.attrs[name]
+        value = value.item() if isinstance(value, np.generic) else value
+        value = value.decode() if isinstance(value, bytes) else value
+    if not isinstance(value, str | int | float) or (isinstance(value, str) and len(value) > MAX_JSON_BYTES):
+        raise SceneError(source, f"attribute '{name}' is neither a number nor a text", MAKE_AGAIN)
+    return value
+
+
+def read_number(item: h5py.Group | h5py.Dataset, name: str, source: Path, low: float, high: float) -> float | None:
+    """A finite number attribute between `low` and `high`, None where there is none."""
+    value = read_attribute(item, name, source)
+    if value is None:
+        return None
+    if isinstance(value, str) or not low <= value <= high:  # NaN fails the comparison
+        raise SceneError(source, f"attribute '{name}' is {value!r}, expected {low} to {high}", MAKE_AGAIN)
+    return float(value)
+
+
+def read_record(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> dict[str, object] | None:
+    """An attribute that holds one JSON object, None where there is none."""
+    text = read_attribute(item, name, source)
+    if text is None:
+        return None
+    try:
+        record = json.loads(str(text))
+    except (ValueError, RecursionError) as fault:
+        raise SceneError(source, f"attribute '{name}' is not JSON ({fault})", MAKE_AGAIN) from fault
+    if not isinstance(record, dict):
+        raise SceneError(source, f"attribute '{name}' is not a JSON object", MAKE_AGAIN)
+    return record
+
+
+def read_group_arrays(file: h5py.File, name: str, source: Path) -> dict[str, np.ndarray]:
+    """The numeric arrays of a group by name; empty where there is no such group."""
+    with faults_named(source, name):
+        link = file.get(name, getlink=True)
+        if link is None:
+            return {}
+        group = file[name] if isinstance(link, h5py.HardLink) else None
+        if not isinstance(group, h5py.Group) or len(group) > MAX_GROUP_ARRAYS:
+            raise SceneError(source, f"is not a group of at most {MAX_GROUP_ARRAYS} arrays", MAKE_AGAIN, name)
+        keys = [str(key) for key in group]
+    arrays, left = {}, MAX_ARRAY_BYTES
+    for key in keys:
+        dataset = need_dataset(group, key, source)
+        with faults_named(source, f"{name}/{key}"):
+            anything = (None,) * len(dataset.shape or ())
+        check_layout(dataset, source, shape=anything, kinds="iufb", limit=left)
+        arrays[key] = read_values(dataset, source)
+        left -= arrays[key].nbytes
+    return arrays
+
+
+def write_array(
+    parent: h5py.Group,
+    name: str,
+    values: np.ndarray,
+    *,
+    chunks: tuple[int, ...] | bool = True,
+    gzip_level: int = 4,
+) -> h5py.Dataset:
+    """Store an array compressed and with a checksum (which HDF5 offers for neither scalars nor empty arrays)."""
+    if values.size == 0 or values.ndim == 0:
+        return parent.create_dataset(name, data=values)
+    packing = {"compression": "gzip", "compression_opts": gzip_level, "fletcher32": True}
+    return parent.create_dataset(name, data=values, chunks=chunks, shuffle=values.itemsize > 1, **packing)

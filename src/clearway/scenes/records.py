@@ -1,0 +1,98 @@
+"""What our scene files hold beyond `thor_v1`: what made the scene, which encoder was used, the view from above."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from clearway.errors import SceneError
+from clearway.scenes import hdf5
+from clearway.scenes.scene import EncoderRecord, Provenance, TopView
+from clearway.scenes.validate import MAX_COORDINATE_M, MAX_PICTURE_SIDE
+
+TOP_VIEW_EXTENT = ("x_min_m", "x_max_m", "z_min_m", "z_max_m")
+FILE_ENCODER = "from file"
+
+
+def read_provenance(file: h5py.File, path: Path) -> Provenance:
+    """What made the scene; for a file that does not say, the format's name."""
+    kept = hdf5.read_record(file, "made_by", path)
+    if kept is None:
+        return Provenance("thor_v1")
+    room, seed = kept.get("room"), kept.get("seed")
+    return Provenance(
+        source=_kept_text(kept, "source", path, "made_by"),
+        room=None if room is None else str(room),
+        seed=seed if isinstance(seed, int) else None,
+        versions={key: str(value) for key, value in _kept_object(kept, "versions", path, "made_by").items()},
+        notes=_kept_object(kept, "notes", path, "made_by"),
+    )
+
+
+def read_encoder(file: h5py.File, path: Path, feature_count: int) -> EncoderRecord:
+    """What made the features; a published dump does not say, so all of one feature size count as one encoder."""
+    kept = hdf5.read_record(file, "encoder", path)
+    if kept is None:
+        return EncoderRecord(f"{FILE_ENCODER} ({feature_count} features)", f"thor_v1-{feature_count}")
+    return EncoderRecord(
+        name=_kept_text(kept, "name", path, "encoder"),
+        identity=_kept_text(kept, "identity", path, "encoder"),
+        settings=_kept_object(kept, "settings", path, "encoder"),
+        arrays=hdf5.read_group_arrays(file, "encoder", path),
+    )
+
+
+def read_top_view(file: h5py.File, path: Path) -> TopView | None:
+    """The picture from above, None where the file has none."""
+    dataset = hdf5.find_dataset(file, "top_view", path)
+    if dataset is None:
+        return None
+    limit = MAX_PICTURE_SIDE * MAX_PICTURE_SIDE * 3
+    hdf5.check_layout(dataset, path, shape=(None, None, 3), kinds="u", limit=limit)
+    extent = {}
+    for side in TOP_VIEW_EXTENT:
+        value = hdf5.read_number(dataset, side, path, -MAX_COORDINATE_M, MAX_COORDINATE_M)
+        if value is None:
+            raise SceneError(path, f"lacks the attribute '{side}'", hdf5.MAKE_AGAIN, "top_view")
+        extent[side] = value
+    return TopView(hdf5.read_values(dataset, path).astype(np.uint8), **extent)
+
+
+def write_provenance(file: h5py.File, made_by: Provenance) -> None:
+    """Keep what made the scene as one JSON attribute."""
+    file.attrs["made_by"] = json.dumps(asdict(made_by))
+
+
+def write_encoder(file: h5py.File, encoder: EncoderRecord) -> None:
+    """Keep an encoder's record as a JSON attribute and its statistics as a group of arrays."""
+    kept = {"name": encoder.name, "identity": encoder.identity, "settings": dict(encoder.settings)}
+    file.attrs["encoder"] = json.dumps(kept)
+    group = file.create_group("encoder")
+    for name, values in encoder.arrays.items():
+        hdf5.write_array(group, name, values)
+
+
+def write_top_view(file: h5py.File, view: TopView) -> None:
+    """Store the picture from above, with its extent as attributes."""
+    dataset = hdf5.write_array(file, "top_view", view.image)
+    for side in TOP_VIEW_EXTENT:
+        dataset.attrs[side] = getattr(view, side)
+
+
+def _kept_text(kept: Mapping[str, object], key: str, path: Path, attribute: str) -> str:
+    value = kept.get(key)
+    if not isinstance(value, str):
+        raise SceneError(path, f"attribute '{attribute}' lacks the text '{key}'", hdf5.MAKE_AGAIN)
+    return value
+
+
+def _kept_object(kept: Mapping[str, object], key: str, path: Path, attribute: str) -> dict[str, object]:
+    value = kept.get(key, {})
+    if not isinstance(value, dict):
+        raise SceneError(path, f"attribute '{attribute}' has no object as '{key}'", hdf5.MAKE_AGAIN)
+    return value

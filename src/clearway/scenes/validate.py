@@ -1,0 +1,157 @@
+"""Checks that a scene passes before anything rests on it, as pure functions on its arrays.
+
+What training depends on (the graph and the features) raises `SceneError`. What only maps and tables show
+(where a state lies and looks) is judged by `pose_quirks`, since published dumps may have quirks there.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from clearway.errors import SceneError
+from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
+from clearway.scenes.scene import Observations, Scene
+
+MIN_STATES = 2
+MAX_STATES = 65_536
+MAX_FEATURES = 65_536
+MAX_PICTURE_SIDE = 2_048  # pixels
+MAX_COORDINATE_M = 10_000.0
+TURNS = (Action.TURN_RIGHT, Action.TURN_LEFT)
+MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
+CHECK_THE_MAKER = "Make the scene again, or check the program that made it"
+
+
+class SceneWarning(UserWarning):
+    """Something odd in a scene that does not keep it from being used."""
+
+
+def check_scene(scene: Scene, source: str | Path | None = None) -> None:
+    """Check every part of a scene. Raises SceneError; `source` is the file it names, else the scene's name."""
+    source = scene.name if source is None else source
+    check_graph(scene.graph, source)
+    check_turns(scene.graph, source)
+    check_poses(scene.locations_m, scene.headings_deg, scene.state_count, source)
+    if scene.features is not None:
+        check_features(scene.features, scene.state_count, source)
+        if scene.encoder is None:
+            raise SceneError(source, "has features but no record of their encoder", "Encode the scene again")
+    if scene.observations is not None:
+        check_observations(scene.observations, scene.state_count, source)
+    if not np.isfinite(scene.cell_size_m) or scene.cell_size_m <= 0:
+        raise SceneError(source, f"has a cell size of {scene.cell_size_m} m", "Give a length above 0")
+
+
+def check_graph(graph: np.ndarray, source: str | Path) -> None:
+    """Check that `graph` is (S, A) integers, S at least 2, each -1 or a state. Raises SceneError."""
+    _check(graph.ndim == 2 and graph.shape[1] == ACTION_COUNT, source, "graph", _shape_problem(graph, "(S, 4)"))
+    _check(graph.dtype.kind in "iu", source, "graph", f"holds {graph.dtype}, expected integers")
+    count = len(graph)
+    _check(
+        MIN_STATES <= count <= MAX_STATES,
+        source,
+        "graph",
+        f"has {count} states, expected {MIN_STATES} to {MAX_STATES}",
+    )
+    wrong = np.argwhere((graph < BLOCKED) | (graph >= count))
+    if len(wrong):
+        state, action = wrong[0].tolist()
+        problem = f"state {state} leads to {graph[state, action]} by action {action}, expected -1 to {count - 1}"
+        raise SceneError(source, problem, CHECK_THE_MAKER, "graph")
+
+
+def check_turns(graph: np.ndarray, source: str | Path) -> None:
+    """Check that turns are never blocked, four rights lead back, and right then left does. Raises SceneError."""
+    states = np.arange(len(graph))
+    for turn in TURNS:
+        _check_states(graph[:, turn] != BLOCKED, source, f"the {_words(turn)} is blocked")
+    right, left = (graph[:, turn].astype(np.int64) for turn in TURNS)
+    _check_states(right[right[right[right]]] == states, source, "four right turns do not lead back")
+    _check_states(left[right] == states, source, "a right and a left turn do not lead back")
+
+
+def check_features(features: np.ndarray, state_count: int, source: str | Path) -> None:
+    """Check that features are (S, F) finite floats. Raises SceneError."""
+    name = "resnet_feature"
+    fits = features.ndim == 2 and len(features) == state_count and 1 <= features.shape[1] <= MAX_FEATURES
+    _check(fits, source, name, _shape_problem(features, f"({state_count}, F)"))
+    _check(features.dtype.kind == "f", source, name, f"holds {features.dtype}, expected floats")
+    broken = np.flatnonzero(~np.isfinite(features).all(axis=1))
+    if len(broken):
+        problem = f"the features of {len(broken)} states, first {broken[0]}, hold NaN or Inf"
+        raise SceneError(source, problem, "Encode the pictures again", name)
+
+
+def check_poses(locations_m: np.ndarray, headings_deg: np.ndarray, state_count: int, source: str | Path) -> None:
+    """Check that locations are (S, 2) and headings (S,), finite and of a sane size. Raises SceneError."""
+    fits = locations_m.shape == (state_count, 2)
+    _check(fits, source, "location", _shape_problem(locations_m, f"({state_count}, 2)"))
+    sane = np.isfinite(locations_m) & (np.abs(locations_m) <= MAX_COORDINATE_M)
+    _check(bool(sane.all()), source, "location", f"holds NaN, Inf or more than {MAX_COORDINATE_M:,.0f} m")
+    fits = headings_deg.shape == (state_count,)
+    _check(fits, source, "rotation", _shape_problem(headings_deg, f"({state_count},)"))
+    sane = np.isfinite(headings_deg) & (np.abs(headings_deg) <= 360)
+    _check(bool(sane.all()), source, "rotation", "holds values that are no headings from -360 to 360 degrees")
+
+
+def check_observations(observations: Observations, state_count: int, source: str | Path) -> None:
+    """Check that pictures are (S, height, width, 3), by their shape alone. Raises SceneError."""
+    shape = observations.shape
+    fits = len(shape) == 4 and shape[0] == state_count and shape[3] == 3
+    fits = fits and all(1 <= side <= MAX_PICTURE_SIDE for side in shape[1:3])
+    wanted = f"({state_count}, height, width, 3) with sides up to {MAX_PICTURE_SIDE}"
+    _check(fits, source, "observation", f"has shape {tuple(shape)}, expected {wanted}")
+
+
+def pose_quirks(scene: Scene) -> list[str]:
+    """What is odd about where the states lie and look, one sentence each; empty for a regular scene."""
+    found = []
+    if np.any(scene.headings_deg % 90):
+        found.append("some headings are no multiples of 90 degrees")
+    turned = {turn: scene.graph[:, turn] for turn in TURNS}
+    for turn, right_deg in zip(TURNS, (90, -90), strict=True):
+        change_deg = (scene.headings_deg[turned[turn]] - scene.headings_deg) % 360
+        found += _quirk(change_deg != right_deg % 360, f"a {_words(turn)} changes the heading by {right_deg}")
+        far_m = np.abs(scene.locations_m[turned[turn]] - scene.locations_m).max(axis=1)
+        found += _quirk(far_m > 0.1 * scene.cell_size_m, f"a {_words(turn)} keeps the location")
+    for move, sign in zip(MOVES, (1, -1), strict=True):
+        found += _quirk(_moves_astray(scene, move, sign), f"a {_words(move)} leads one cell along the heading")
+    return found
+
+
+def _moves_astray(scene: Scene, move: Action, sign: int) -> np.ndarray:
+    """Whether the open move of each state ends elsewhere than one cell along its heading, (S,) bool."""
+    ahead = scene.graph[:, move]
+    turn = np.deg2rad(scene.headings_deg)
+    expected_m = sign * scene.cell_size_m * np.stack([np.sin(turn), np.cos(turn)], axis=1)
+    moved_m = scene.locations_m[ahead] - scene.locations_m
+    return (ahead != BLOCKED) & (np.abs(moved_m - expected_m).max(axis=1) > 0.1 * scene.cell_size_m)
+
+
+def _quirk(broken: np.ndarray, rule: str) -> list[str]:
+    """One sentence where a rule is broken by any state, else none."""
+    states = np.flatnonzero(broken)
+    return [f"{len(states)} states, first {states[0]}, break the rule that {rule}"] if len(states) else []
+
+
+def _check(holds: bool, source: str | Path, dataset: str, problem: str) -> None:
+    if not holds:
+        raise SceneError(source, problem, CHECK_THE_MAKER, dataset)
+
+
+def _check_states(holds: np.ndarray, source: str | Path, problem: str) -> None:
+    wrong = np.flatnonzero(~holds)
+    if len(wrong):
+        raise SceneError(source, f"{problem} at state {wrong[0]}", CHECK_THE_MAKER, "graph")
+
+
+def _shape_problem(values: np.ndarray, wanted: str) -> str:
+    return f"has shape {values.shape}, expected {wanted}"
+
+
+def _words(action: Action) -> str:
+    """The action in running text, for example "right turn"."""
+    verb, direction = action.name.lower().split("_")
+    return f"{direction} {verb}"

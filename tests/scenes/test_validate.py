@@ -1,0 +1,87 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from clearway.errors import SceneError
+from clearway.scenes.actions import Action
+from clearway.scenes.scene import Scene
+from clearway.scenes.validate import check_scene, pose_quirks
+from made import corridor_scene, grid_scene
+
+
+def changed(scene: Scene, part: str, where: object, value: float) -> Scene:
+    """The scene with one entry of one of its arrays replaced."""
+    values = getattr(scene, part).copy()
+    values[where] = value
+    return replace(scene, **{part: values})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sound_scenes_pass_without_quirks(seed: int) -> None:
+    scene = grid_scene(seed)
+    check_scene(scene)
+    assert pose_quirks(scene) == []
+
+
+@pytest.mark.parametrize(
+    ("part", "where", "value", "dataset", "problem"),
+    [
+        ("graph", (0, 0), 20, "graph", "state 0 leads to 20 by action 0, expected -1 to 19"),
+        ("graph", (3, 1), -2, "graph", "state 3 leads to -2"),
+        ("graph", (4, Action.TURN_RIGHT), -1, "graph", "the right turn is blocked at state 4"),
+        ("graph", (4, Action.TURN_LEFT), -1, "graph", "the left turn is blocked at state 4"),
+        ("graph", (4, Action.TURN_RIGHT), 6, "graph", "four right turns do not lead back"),
+        ("graph", (4, Action.TURN_LEFT), 5, "graph", "a right and a left turn do not lead back at state 7"),
+        ("features", (7, 2), np.nan, "resnet_feature", "1 states, first 7, hold NaN or Inf"),
+        ("features", (7, 2), np.inf, "resnet_feature", "NaN or Inf"),
+        ("locations_m", (0, 0), np.nan, "location", "NaN"),
+        ("locations_m", (0, 0), 1e9, "location", "10,000 m"),
+        ("headings_deg", 0, 400, "rotation", "no headings"),
+    ],
+)
+def test_a_fault_is_named(part: str, where: object, value: float, dataset: str, problem: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        check_scene(changed(corridor_scene(5), part, where, value), "some.h5")
+    assert caught.value.dataset == dataset
+    assert problem in str(caught.value)
+    assert str(caught.value).startswith("some.h5, dataset")
+
+
+def test_wrong_shapes_and_types_are_refused() -> None:
+    scene = corridor_scene(3)
+    for part, values in {
+        "graph": scene.graph[:, :3],
+        "locations_m": scene.locations_m[:-1],
+        "headings_deg": scene.headings_deg[:, None],
+        "features": scene.features[:, :, None],
+        "observations": scene.observations[..., :2],
+    }.items():
+        with pytest.raises(SceneError, match="has shape"):
+            check_scene(replace(scene, **{part: values}))
+    with pytest.raises(SceneError, match="expected integers"):
+        check_scene(replace(scene, graph=scene.graph.astype(float)))
+    with pytest.raises(SceneError, match="expected floats"):
+        check_scene(replace(scene, features=scene.features.astype(int)))
+    with pytest.raises(SceneError, match="no record of their encoder"):
+        check_scene(replace(scene, encoder=None))
+    with pytest.raises(SceneError, match="cell size"):
+        check_scene(replace(scene, cell_size_m=0.0))
+
+
+def test_one_state_is_too_few() -> None:
+    scene = replace(corridor_scene(1), graph=np.zeros((1, 4), np.int32))
+    with pytest.raises(SceneError, match="has 1 states"):
+        check_scene(scene)
+
+
+def test_quirks_of_poses_are_told() -> None:
+    scene = corridor_scene(4)
+    (turned,) = {len(pose_quirks(replace(scene, headings_deg=(scene.headings_deg + 90) % 360)))}
+    assert turned == 2  # turns are still right; moves lead across the heading, forward and backward
+    askew = changed(scene, "headings_deg", 5, 91)
+    assert pose_quirks(askew)[0] == "some headings are no multiples of 90 degrees"
+    torn = changed(scene, "locations_m", (slice(4, 5), 1), 9.0)
+    assert any("a right turn keeps the location" in quirk for quirk in pose_quirks(torn))
+    mirrored = replace(scene, headings_deg=-scene.headings_deg % 360)
+    assert any("a right turn changes the heading by 90" in quirk for quirk in pose_quirks(mirrored))
