@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from clearway.choices import RewardName
 from clearway.envs.render import RENDER_MODES
 from clearway.errors import EnvError
-from clearway.reward import REWARDS, Reward, RewardName
+from clearway.reward import REWARDS, Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
 

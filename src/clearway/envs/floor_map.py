@@ -92,7 +92,8 @@ class FloorMap:
         for share, colour in ((PATH_EDGE_WIDTH, "white"), (PATH_WIDTH, colours.PATH)):
             if len(set(points)) > 1:
                 pen.line(points, fill=colour, width=round(share * self._cell_px), joint="curve")
-            draw_disc(pen, points[0], (share / 2 + 0.06) * self._cell_px, colour)
+        for radius, colour in ((0.26, "white"), (0.20, colours.PATH), (0.09, "white")):
+            draw_disc(pen, points[0], radius * self._cell_px, colour)
 
     def _heading(self, state: int) -> float:
         return float(self._scene.headings_deg[state])

@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from clearway.choices import RewardName, ZoneLevel
 from clearway.envs.arguments import SceneSource
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.options import RESET_MASK
@@ -16,8 +17,7 @@ from clearway.envs.render import RENDER_MODES
 from clearway.envs.spaces import ObservationKind
 from clearway.envs.vector import ImageGoalVectorEnv, Info, Observation
 from clearway.errors import EnvError
-from clearway.reward import Reward, RewardName
-from clearway.zones import ZoneLevel
+from clearway.reward import Reward
 
 
 class ImageGoalEnv(gymnasium.Env[Observation, int]):

@@ -13,6 +13,7 @@ from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from clearway.choices import RewardName, ZoneLevel
 from clearway.envs.arguments import (
     NO_LIMIT,
     SceneSource,
@@ -29,10 +30,9 @@ from clearway.envs.record import EpisodeRecord
 from clearway.envs.render import RENDER_MODES, Renderer
 from clearway.envs.spaces import ObservationKind, observation_source, observation_space
 from clearway.envs.world import make_world
-from clearway.reward import Reward, RewardName
+from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.targets import default_targets
-from clearway.zones import ZoneLevel
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]

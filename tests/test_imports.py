@@ -1,0 +1,75 @@
+"""Data flows one way: a module imports only from its own folder or from what stands before it in `ORDER`."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import clearway
+
+ORDER = (
+    {"version", "errors", "choices", "files", "colours"},
+    {"scenes"},
+    {"perception"},
+    {"zones"},
+    {"reward"},
+    {"envs"},
+    {"model"},
+    {"learn"},
+    {"evaluate"},
+    {"experiments"},
+    {"viz"},
+    {"serve"},
+    {"cli", "__main__"},
+)
+PACKAGE = Path(clearway.__file__).parent
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def part_of(path: Path) -> str:
+    """The folder or module right under the package, for example "envs" or "zones"."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def rank(part: str) -> int:
+    ranks = [place for place, parts in enumerate(ORDER) if part in parts]
+    assert ranks, f"clearway.{part} has no place in the order of imports: add it to ORDER in this test"
+    return ranks[0]
+
+
+def imported_parts(source: str, module: str) -> set[str]:
+    """Parts of clearway that a module imports anywhere in its source, inside functions too."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} imports relatively; write the whole name"
+            # `from clearway import x` may name a module or what the package's __init__ offers
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        parts = [name.split(".") for name in names]
+        found |= {part[1] for part in parts if part[0] == "clearway" and len(part) > 1}
+    return {"version" if part == "__version__" else part for part in found}
+
+
+def test_imports_are_found_wherever_they_stand() -> None:
+    source = """
+import clearway.learn.rollout
+from clearway import __version__, zones
+def f():
+    from clearway.cli.main import main
+"""
+    assert imported_parts(source, "source") == {"learn", "version", "zones", "cli"}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_backwards(path: Path) -> None:
+    imported = imported_parts(path.read_text(encoding="utf-8"), path.name)
+    if path == PACKAGE / "__init__.py":
+        assert imported <= {"version"}
+        return
+    here = part_of(path)
+    forward = sorted(part for part in imported if part != here and rank(part) >= rank(here) and rank(here) > 0)
+    assert not forward, f"clearway.{here} imports {forward}, which come after it or stand beside it"
