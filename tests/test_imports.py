@@ -20,7 +20,8 @@ ORDER = (
     {"experiments"},
     {"viz"},
     {"serve"},
-    {"cli", "__main__"},
+    {"cli"},
+    {"__main__"},
 )
 PACKAGE = Path(clearway.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))

@@ -1,6 +1,7 @@
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import EnvError, SceneError
 from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import write_scene
 from made import corridor_scene, grid_scene
 
 INFO_KEYS = {"collision", "cost", "zone", "distance_to_go", "scene", "state", "target"}
@@ -50,7 +52,7 @@ def assert_same(left: Any, right: Any, where: str = "result") -> None:
 @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
 def test_it_equals_gymnasiums_vector_of_single_environments(mode: AutoresetMode, observations: str) -> None:
     arguments = {"observations": observations, "max_episode_steps": 12}
-    scenes, count = two_scenes(), 5
+    scenes, count = two_scenes(), 4
     native = ImageGoalVectorEnv(scenes, num_envs=count, autoreset_mode=mode, **arguments)
     copies = SyncVectorEnv([lambda: ImageGoalEnv(scenes, **arguments)] * count, autoreset_mode=mode)
     assert native.metadata["autoreset_mode"] == copies.metadata["autoreset_mode"] == mode
@@ -58,7 +60,7 @@ def test_it_equals_gymnasiums_vector_of_single_environments(mode: AutoresetMode,
     assert native.action_space == copies.action_space
     assert_same(native.reset(seed=3), copies.reset(seed=3))
     ends = {"terminated": 0, "truncated": 0}
-    for action in random_actions(300, count):
+    for action in random_actions(200, count):
         result = native.step(action)
         assert_same(result, copies.step(action))
         assert result[0] in native.observation_space
@@ -313,6 +315,21 @@ def test_arguments_that_do_not_fit(
 ) -> None:
     with pytest.raises(error, match=message):
         ImageGoalVectorEnv(**{"scenes": grid_scene(0), **arguments()})
+
+
+def test_scenes_from_files(tmp_path: Path) -> None:
+    scenes = two_scenes()
+    paths = [tmp_path / f"{scene.name}.h5" for scene in scenes]
+    for scene, path in zip(scenes, paths, strict=True):
+        write_scene(scene, path)
+    in_memory = ImageGoalVectorEnv(scenes, num_envs=3, observations="pictures")
+    from_files = ImageGoalVectorEnv([paths[0], str(paths[1])], num_envs=3, observations="pictures")
+    assert_same(from_files.reset(seed=0), in_memory.reset(seed=0))
+    copy = pickle.loads(pickle.dumps(from_files))
+    for action in random_actions(20, 3):
+        result = in_memory.step(action)
+        assert_same(from_files.step(action), result)
+        assert_same(copy.step(action), result)
 
 
 class CountedPictures:

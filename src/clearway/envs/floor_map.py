@@ -16,7 +16,7 @@ from clearway.zones import Zone
 
 MARGIN_CELLS = 1.0  # around the outermost cells' centres
 CELL_SHARE = 0.94  # side of a cell's square as a share of the grid step, so that the grid shows
-OPACITY_ON_PICTURE = {Zone.FREE: 0.3, Zone.PRECOLLISION: 0.6, Zone.COLLISION: 0.75}
+OPACITY_ON_PICTURE = {Zone.FREE: 0.3, Zone.PRECOLLISION: 0.6, Zone.COLLISION: 0.8}
 MAX_CELL_PX = 52  # in a very small room the map stays below the size it is given
 PICTURE_FADE = 0.3  # share of white in the picture from above, so that the marks stand out
 PATH_WIDTH, PATH_EDGE_WIDTH = 0.16, 0.28  # in cells

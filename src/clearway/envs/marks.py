@@ -16,7 +16,7 @@ from clearway.zones import ZONE_NAMES, Zone
 
 FINENESS = 3
 HATCH_PERIOD_PX, HATCH_WIDTH_PX = 7.0, 2.6  # of the scaled-down picture
-HATCH_GROUND = 0.62  # opacity of the collision zone between its stripes
+STRIPE_OPACITY, GROUND_OPACITY = 0.92, 0.62  # of the collision zone: its stripes and between them
 STAR_WAIST = 0.48  # inner radius of the star as a share of the outer
 
 Point = tuple[float, float]
@@ -62,7 +62,7 @@ def paint_zone(image: Image.Image, zone: Zone, mask: np.ndarray, opacity: float)
     if zone == Zone.COLLISION:
         rows, columns = np.indices(mask.shape)
         stripe = (rows + columns) / FINENESS % HATCH_PERIOD_PX < HATCH_WIDTH_PX
-        alpha = np.where(stripe, 0.92, opacity * HATCH_GROUND)
+        alpha = opacity * np.where(stripe, STRIPE_OPACITY, GROUND_OPACITY)
     colour = Image.new("RGB", image.size, colours.ZONE_COLOURS[ZONE_NAMES[zone]])
     image.paste(colour, mask=Image.fromarray((mask * alpha * 255).astype(np.uint8)))
 

@@ -72,7 +72,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     ## Episode End
 
     1. Termination: the agent is in the target's pose, position and heading. There is no action to stop.
-    2. Truncation: after `max_episode_steps` steps (500 through `gymnasium.make`).
+    2. Truncation: after `max_episode_steps` steps (500 through `gymnasium.make`) that did not reach the target.
 
     ## Information
 
@@ -93,7 +93,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | `render_mode`       | `None`              | `"rgb_array"` (view, target and map side by side) or `"ansi"`      |
 
     ```python
-    >>> import gymnasium, clearway.envs
+    >>> import gymnasium, clearway.envs  # or without the second: gymnasium.make("clearway.envs:Clearway/ImageGoal-v0")
     >>> env = gymnasium.make("Clearway/ImageGoal-v0", scenes="bathroom.h5")
     >>> envs = gymnasium.make_vec("Clearway/ImageGoal-v0", num_envs=64, scenes="bathroom.h5")
 
