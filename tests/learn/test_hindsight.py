@@ -1,5 +1,7 @@
 """Hindsight on a corridor of five cells; targets 0, 1, 2 are the states 0, 8 and 16, all looking ahead."""
 
+from itertools import product
+
 import pytest
 import torch
 from torch import Tensor
@@ -204,21 +206,21 @@ def test_segments_of_real_rollouts_equal_their_definition() -> None:
     world = trainer.world
     trainer.lookup.refresh()
     rollout = trainer.collector.collect(trainer.statistics)
+    target_state, target_scene = world.target_state.tolist(), world.target_scene.tolist()
+    own, here, arrived = rollout.target.tolist(), rollout.history[..., -1].tolist(), rollout.arrived.tolist()
+    ended = (rollout.reached | rollout.truncated).tolist()
     expected = set()
-    for env in range(trainer.env_count):
-        for j in range(world.target_count):
-            if world.target_scene[j] != world.target_scene[rollout.target[0, env]]:
-                continue
-            state = int(world.target_state[j])
-            for t in range(12):
-                for u in range(t, 12):
-                    if rollout.target[u, env] == j or rollout.history[u, env, -1] == state:
-                        break
-                    if rollout.arrived[u, env] == state:
-                        expected.add((t, env, j, u == t))
-                        break
-                    if rollout.reached[u, env] or rollout.truncated[u, env]:
-                        break
+    for env, j, t in product(range(trainer.env_count), range(world.target_count), range(12)):
+        if target_scene[j] != target_scene[own[0][env]]:
+            continue
+        for u in range(t, 12):
+            if own[u][env] == j or here[u][env] == target_state[j]:
+                break
+            if arrived[u][env] == target_state[j]:
+                expected.add((t, env, j, u == t))
+                break
+            if ended[u][env]:
+                break
     rows = find_segments(rollout, trainer.navigation)
     columns = rows.step.tolist(), rows.env.tolist(), rows.target.tolist(), rows.hit.tolist()
     assert set(zip(*columns, strict=True)) == expected

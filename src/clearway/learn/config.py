@@ -89,6 +89,9 @@ class Learner:
         for name in ("entropy_start", "entropy_end", "lr_start", "clip_norm", "reward_scale"):
             if not getattr(self, name) > 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}")
+        for name in ("lr_end", "balance", "ratio_clip", "value_weight"):
+            if not getattr(self, name) >= 0:
+                raise RunError(f"{name} is {getattr(self, name)}, expected at least 0. Give a larger {name}")
         if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):
             raise RunError("a2c makes one pass over each rollout. Set epochs and minibatches to 1, or use ppo")
 

@@ -65,7 +65,8 @@ class Trainer:
         seed: of parameters, environments, actions and shuffling.
 
     Raises:
-        RunError: features are missing or not finite, or there are fewer environments than scenes.
+        RunError: features are missing or not finite, there are fewer environments than scenes, or fewer rows of a
+            scene than minibatches.
     """
 
     def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
@@ -75,6 +76,11 @@ class Trainer:
         per_scene = learner.envs // world.scene_count
         if per_scene < 1:
             raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give at least one a scene")
+        if per_scene * learner.rollout_steps < learner.minibatches:
+            raise RunError(
+                f"{learner.minibatches} minibatches of {per_scene * learner.rollout_steps} rows a scene. "
+                "Give fewer minibatches, or more environments"
+            )
         self.env_count = per_scene * world.scene_count
         device = world.device
         self.scale = FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
@@ -174,7 +180,7 @@ class Trainer:
             learner.gae_lambda,
         )
         value_target = advantage + value
-        explained = 1 - advantage.var() / value_target.var().clamp_min(1e-12)
+        explained = 1 - advantage.var(correction=0) / value_target.var(correction=0).clamp_min(1e-12)
         batch = Batch(
             by_scene(rollout.history, scenes),
             by_scene(rollout.target, scenes),

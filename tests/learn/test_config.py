@@ -1,0 +1,114 @@
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+
+from clearway.errors import RunError
+from clearway.learn.config import DEFAULT, PAPER_A2C, PRESETS, Learner
+
+
+def test_the_paper_s_settings() -> None:
+    """Typed in from the published set-up (Zhu et al.'s released code, which the paper follows)."""
+    published = {
+        "rollout_steps": 5,
+        "step_limit": 5000,
+        "bootstrap_cut": False,
+        "reward_scale": 1.0,
+        "clip_rewards": True,
+        "centre_features": False,
+        "discount": 0.99,
+        "gae_lambda": 1.0,
+        "hindsight": False,
+        "balance": 0.0,
+        "algorithm": "a2c",
+        "epochs": 1,
+        "minibatches": 1,
+        "value_weight": 0.5,
+        "entropy_start": 0.01,
+        "entropy_end": 0.01,
+        "sum_loss": True,
+        "optimiser": "rmsprop",
+        "lr_start": 7.0e-4,
+        "lr_end": 0.0,
+        "clip_norm": 40.0,
+        "clip_each_tensor": True,
+        "width": 512,
+        "history_length": 4,
+        "frames": 10_000_000,
+        "envs": 100,
+    }
+    without_meaning = {"ratio_clip"}  # one pass over each rollout has no ratio to clip
+    assert {name: value for name, value in asdict(PAPER_A2C).items() if name not in without_meaning} == published
+
+
+def test_the_default_is_the_recipe() -> None:
+    recipe = {
+        "envs": 400,
+        "rollout_steps": 20,
+        "step_limit": 200,
+        "bootstrap_cut": True,
+        "epochs": 2,
+        "minibatches": 4,
+        "ratio_clip": 0.2,
+        "gae_lambda": 0.95,
+        "discount": 0.97,
+        "value_weight": 0.5,
+        "reward_scale": 0.1,
+        "clip_rewards": False,
+        "entropy_start": 0.01,
+        "entropy_end": 0.001,
+        "optimiser": "adam",
+        "clip_norm": 0.5,
+        "clip_each_tensor": False,
+        "lr_start": 1e-3,
+        "lr_end": 5e-5,
+        "hindsight": True,
+        "balance": 3.0,
+        "centre_features": True,
+        "width": 512,
+    }
+    assert {name: asdict(DEFAULT)[name] for name in recipe} == recipe
+    assert PRESETS == {"default": DEFAULT, "paper": PAPER_A2C}
+
+
+def test_as_a2c_makes_one_pass_and_changes_nothing_else() -> None:
+    changed = {name for name, value in asdict(DEFAULT.as_a2c()).items() if asdict(DEFAULT)[name] != value}
+    assert changed == {"algorithm", "epochs", "minibatches"}
+    assert PAPER_A2C.as_a2c() == PAPER_A2C
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("frames", 0),
+        ("envs", 0),
+        ("rollout_steps", -1),
+        ("step_limit", 0),
+        ("epochs", 0),
+        ("minibatches", 0),
+        ("width", 0),
+        ("history_length", 0),
+        ("discount", 1.01),
+        ("discount", float("nan")),
+        ("gae_lambda", -0.1),
+        ("entropy_start", 0.0),
+        ("entropy_end", -0.001),
+        ("lr_start", 0.0),
+        ("lr_start", float("nan")),
+        ("lr_end", -1e-5),
+        ("clip_norm", 0.0),
+        ("reward_scale", 0.0),
+        ("balance", -1.0),
+        ("ratio_clip", -0.2),
+        ("value_weight", -0.5),
+    ],
+)
+def test_settings_out_of_range_are_refused_by_name(name: str, value: float) -> None:
+    settings: dict[str, Any] = {name: value}
+    with pytest.raises(RunError, match=rf"{name} is {value}, expected"):
+        Learner(**settings)
+
+
+def test_a2c_with_several_passes_is_refused() -> None:
+    with pytest.raises(RunError, match="one pass"):
+        Learner(algorithm="a2c")

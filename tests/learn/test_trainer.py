@@ -1,0 +1,232 @@
+"""The trainer against the same update written plainly: the naive network, autograd, returns step by step."""
+
+import copy
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from clearway.errors import RunError
+from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
+from clearway.learn.losses import Batch
+from clearway.learn.rollout import Rollout
+from clearway.learn.trainer import Trainer, merged
+from clearway.model.network import SiameseActorCritic
+from clearway.reward import COLLISION_AWARE, SHORTEST
+from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
+
+A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, step_limit=5)
+
+
+def predicted(
+    trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Scores (..., A) and values (...) of the naive network for states (..., K) and targets (...)."""
+    world, states = trainer.world, trainer.scale(trainer.world.features)
+    rows, wanted = history.reshape(-1, history.shape[-1]), target.reshape(-1)
+    scene = world.target_scene[wanted]
+    scores, value = network(states[rows], states[world.target_state][wanted], scene)
+    return scores.view(*target.shape, -1), value.view(target.shape)
+
+
+def advantages_step_by_step(trainer: Trainer, rollout: Rollout, value: Tensor, after: Tensor) -> Tensor:
+    """(T, N) GAE, one environment at a time, from reward, ends and values."""
+    learner = trainer.learner
+    advantage = torch.zeros_like(value)
+    _, at_cut = predicted(trainer, copy.deepcopy(trainer.network), rollout.last_history, rollout.target)
+    for env in range(trainer.env_count):
+        running, following = 0.0, after[env]
+        for t in reversed(range(learner.rollout_steps)):
+            reward = rollout.reward[t, env] * learner.reward_scale
+            if rollout.reached[t, env]:
+                running, following = 0.0, 0.0
+            elif rollout.truncated[t, env]:
+                running, following = 0.0, at_cut[t, env] if learner.bootstrap_cut else 0.0
+            delta = reward + learner.discount * following - value[t, env]
+            running = delta + learner.discount * learner.gae_lambda * running
+            advantage[t, env], following = running, value[t, env]
+    return advantage.detach()
+
+
+def naive_update(trainer: Trainer, lr: float) -> SiameseActorCritic:
+    """The network after one A2C update from where the trainer stands, computed afresh; uses up the rollout."""
+    learner, network = trainer.learner, copy.deepcopy(trainer.network)
+    rollout = trainer.collector.collect(trainer.statistics)
+    scores, value = predicted(trainer, network, rollout.history, rollout.target)
+    _, after = predicted(trainer, network, rollout.history_after, rollout.target_after)
+    advantage = advantages_step_by_step(trainer, rollout, value.detach(), after.detach())
+    log_pi = torch.log_softmax(scores, -1)
+    taken = log_pi.gather(-1, rollout.action[..., None])[..., 0]
+    entropy = -(log_pi.exp() * log_pi).sum(-1)
+    error = advantage + value.detach() - value
+    loss = -taken * advantage - learner.entropy_start * entropy + learner.value_weight / 2 * error**2
+    network.zero_grad()
+    (loss.sum() if learner.sum_loss else loss.mean()).backward()
+    if learner.optimiser == "adam":
+        nn.utils.clip_grad_norm_(network.parameters(), learner.clip_norm)
+        torch.optim.Adam(network.parameters(), lr).step()
+    else:
+        published_step(network, learner.clip_norm, lr)
+    return network
+
+
+@torch.no_grad()
+def published_step(network: SiameseActorCritic, clip_norm: float, lr: float) -> None:
+    """The first step of the published RMSProp after clipping tensor by tensor."""
+    for parameter in network.parameters():
+        parameter.grad *= min(1.0, clip_norm / parameter.grad.norm().item())
+        parameter -= lr * parameter.grad / (0.99 + 0.01 * parameter.grad**2 + 0.1).sqrt()
+
+
+@pytest.mark.parametrize(
+    "learner",
+    [
+        pytest.param(A2C, id="default as a2c"),
+        pytest.param(replace(A2C, clip_norm=0.01), id="clipped"),
+        pytest.param(replace(A2C, sum_loss=True, clip_norm=1e9, gae_lambda=1.0), id="summed"),
+        pytest.param(replace(A2C, bootstrap_cut=False), id="cut is an end"),
+        pytest.param(small_learner(PAPER_A2C, step_limit=5), id="paper"),
+        pytest.param(small_learner(PAPER_A2C, step_limit=5, clip_norm=0.02), id="paper, clipped"),
+    ],
+)
+def test_an_a2c_update_equals_the_naive_one(learner: Learner) -> None:
+    trainer, other = small_trainer(learner, seed=2), small_trainer(learner, seed=2)
+    before = copy.deepcopy(trainer.network)
+    expected = naive_update(other, learner.lr_start)
+    trainer.update()
+    for (name, after), start, naive in zip(
+        trainer.network.named_parameters(), before.parameters(), expected.parameters(), strict=True
+    ):
+        largest = naive.grad.abs().max().item()
+        assert largest > 0
+        torch.testing.assert_close(
+            after.grad, naive.grad, rtol=0, atol=2e-5 * largest, msg=lambda m, n=name: f"{n}: {m}"
+        )
+        moved, should = after - start, naive - start
+        # Adam's first step is nearly lr * sign(g): where g is within rounding of 0 the two may differ
+        off = (moved - should).abs() > 1e-3 * should.abs().max()
+        assert off.float().mean() < (0.005 if learner.optimiser == "adam" else 1e-9), name
+
+
+def test_rewards_are_clipped_and_scaled_as_set() -> None:
+    paper, default = small_trainer(small_learner(PAPER_A2C)), small_trainer(small_learner())
+    assert paper.navigation.reward_table.max() == 1
+    assert default.navigation.reward_table.max() == 10
+    assert paper.learner.reward_scale == 1
+    assert default.learner.reward_scale == 0.1
+
+
+def test_schedules_run_from_start_to_end() -> None:
+    learner = small_learner(frames=800, lr_start=1e-2, lr_end=1e-3, entropy_start=0.1, entropy_end=0.001)
+    trainer = small_trainer(learner)
+    updates = [trainer.update() for _ in range(10)]
+    assert trainer.finished
+    assert [u.lr for u in updates] == pytest.approx([1e-2 - 9e-4 * k for k in range(10)])
+    assert [u.entropy_weight for u in updates] == pytest.approx([0.1 * 0.01 ** (k / 10) for k in range(10)])
+    assert trainer.frames == 800
+    assert trainer.updates == 10
+
+
+def test_a_pass_deals_every_row_out_once() -> None:
+    trainer = small_trainer(small_learner(epochs=3, minibatches=4))
+    rows = torch.arange(21)
+    batch = Batch(rows[:, None], rows, rows, rows, rows, rows, (15, 6))
+    parts = list(trainer._minibatches(batch))
+    assert len(parts) == 12
+    epochs = [torch.cat([part.action for part in parts[4 * e : 4 * e + 4]]) for e in range(3)]
+    assert all(sorted(epoch.tolist()) == rows.tolist() for epoch in epochs)
+    assert not torch.equal(epochs[0], epochs[1])
+    for part in parts:
+        first, second = part.rows_per_scene
+        assert (part.action[:first] < 15).all()
+        assert (part.action[first:] >= 15).all()
+        assert 3 <= first <= 4
+        assert 1 <= second <= 2
+
+
+def test_merged_keeps_the_order_of_scenes() -> None:
+    def batch(first: int, rows_per_scene: tuple[int, ...]) -> Batch:
+        rows = torch.arange(first, first + sum(rows_per_scene))
+        return Batch(rows[:, None], rows, rows, rows, rows, rows, rows_per_scene)
+
+    joined = merged(batch(0, (2, 0, 3)), batch(100, (1, 2, 0)))
+    assert joined.action.tolist() == [0, 1, 100, 101, 102, 2, 3, 4]
+    assert joined.history[:, 0].tolist() == joined.target.tolist() == joined.action.tolist()
+    assert joined.rows_per_scene == (3, 2, 3)
+
+
+def test_hindsight_adds_rows_only_when_asked() -> None:
+    assert small_trainer(small_learner(step_limit=200, hindsight=True)).update().hindsight_rows > 0
+    assert small_trainer(small_learner(step_limit=200, hindsight=False)).update().hindsight_rows == 0
+
+
+def test_targets_reached_less_often_are_drawn_more_often() -> None:
+    trainer = small_trainer(small_learner(balance=3.0))
+    trainer.statistics.recent_success = torch.tensor([1.0, 0.5, 0.0, 1.0, 1.0], dtype=torch.float64)
+    trainer._rebalance()
+    assert trainer.navigation.choice.weights.tolist() == [[1.0, 2.5, 4.0], [1.0, 1.0, 0.0]]  # 0 is padding
+    unbalanced = small_trainer(small_learner(balance=0.0))
+    unbalanced.statistics.recent_success = torch.full((5,), 0.5, dtype=torch.float64)
+    unbalanced._rebalance()
+    assert unbalanced.navigation.choice.weights.tolist() == [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
+
+
+@pytest.mark.parametrize("preset", [DEFAULT, DEFAULT.as_a2c(), PAPER_A2C])
+def test_a_seed_repeats_and_tensors_bring_a_trainer_back_bit_for_bit(preset: Learner) -> None:
+    learner = small_learner(preset)
+    trainer, again, resumed = (small_trainer(learner, SHORTEST, seed=9) for _ in range(3))
+    for each in (trainer, again):
+        for _ in range(4):
+            each.update()
+    assert equal_bits(trainer.tensors(), again.tensors())
+    saved = {name: tensor.clone() for name, tensor in trainer.tensors().items()}
+    resumed.load_tensors(saved, trainer.frames, trainer.updates)
+    for _ in range(4):
+        assert trainer.update() == resumed.update()
+    assert equal_bits(trainer.tensors(), resumed.tensors())
+    assert not equal_bits(trainer.tensors(), saved)
+
+
+def test_another_seed_gives_another_network() -> None:
+    first, second = (small_trainer(small_learner(), seed=seed) for seed in (0, 1))
+    assert not torch.equal(first.network.siamese_weight, second.network.siamese_weight)
+    assert not torch.equal(first.navigation.history, second.navigation.history)
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+def test_features_that_are_not_finite_are_refused(value: float) -> None:
+    world = small_world()
+    world.features[7, 3] = value
+    with pytest.raises(RunError, match="NaN or Inf"):
+        Trainer(world, small_learner(), COLLISION_AWARE, 0)
+
+
+def test_a_world_without_features_is_refused() -> None:
+    with pytest.raises(RunError, match="no features"):
+        Trainer(replace(small_world(), features=None), small_learner(), COLLISION_AWARE, 0)
+
+
+def test_fewer_environments_than_scenes_are_refused() -> None:
+    with pytest.raises(RunError, match="1 environments for 2 scenes"):
+        small_trainer(small_learner(envs=1, minibatches=1))
+
+
+def test_a_loss_that_is_not_finite_stops_training() -> None:
+    trainer = small_trainer(small_learner())
+    with torch.no_grad():
+        trainer.network.output_bias[0, 4] = torch.nan
+    with pytest.raises(RunError, match="nan after 80 frames"):
+        trainer.update()
+
+
+def test_more_minibatches_than_rows_of_a_scene_are_refused() -> None:
+    with pytest.raises(RunError, match="minibatches"):
+        small_trainer(small_learner(envs=2, rollout_steps=3, minibatches=4))
+
+
+def test_one_row_an_update_gives_finite_figures() -> None:
+    learner = small_learner(envs=1, rollout_steps=1, minibatches=1, epochs=1)
+    figures = vars(Trainer(corridor_world(), learner, COLLISION_AWARE, 0).update())
+    assert all(math.isfinite(value) for value in figures.values())
