@@ -16,7 +16,7 @@ from clearway.zones import ZONE_NAMES, Zone
 
 FINENESS = 3
 HATCH_PERIOD_PX, HATCH_WIDTH_PX = 7.0, 2.6  # of the scaled-down picture
-STRIPE_OPACITY, GROUND_OPACITY = 0.92, 0.62  # of the collision zone: its stripes and between them
+STRIPE_OPACITY, GROUND_OPACITY = 0.95, 0.55  # of the collision zone: its stripes and between them
 STAR_WAIST = 0.48  # inner radius of the star as a share of the outer
 
 Point = tuple[float, float]
