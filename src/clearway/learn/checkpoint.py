@@ -53,7 +53,8 @@ def write_checkpoint(
     final = folder / f"frames-{progress.frames:012d}"
     part = folder / f".{final.name}.part"
     try:
-        shutil.rmtree(part, ignore_errors=True)
+        for half_written in folder.glob(".frames-*.part"):  # by a process that was killed
+            shutil.rmtree(half_written)
         part.mkdir(parents=True)
         sums = {}
         for name, tensors in ((NETWORK_FILE, network), (TRAINING_FILE, training)):
@@ -80,7 +81,7 @@ def newest_checkpoint(folder: Path) -> Path:
         UserWarning: a newer checkpoint is damaged.
 
     Raises:
-        RunError: there is none.
+        RunError: there is none, or all are damaged.
     """
     for path in reversed(_found(folder)):
         try:
@@ -88,6 +89,8 @@ def newest_checkpoint(folder: Path) -> Path:
             return path
         except RunError as error:
             warnings.warn(f"{error}; an earlier checkpoint is used", stacklevel=2)
+    if _found(folder):
+        raise RunError(f"{folder}: every checkpoint is damaged. Restore one from a copy, or train again")
     raise RunError(f"{folder}: no checkpoint found. Train first, or name another run")
 
 
@@ -117,12 +120,13 @@ def _found(folder: Path) -> list[Path]:
 def _checked_manifest(path: Path) -> dict:
     try:
         manifest = json.loads((path / MANIFEST_FILE).read_text())
-        version, sums = int(manifest["format_version"]), dict(manifest["sha256"])
+        version = int(manifest["format_version"])
+        if version > FORMAT_VERSION:  # it may hold other files, so this comes before looking for ours
+            raise RunError(f"{path}: written by a newer clearway (format {version}). Upgrade clearway")
+        sums = dict(manifest["sha256"])
         actual = {name: _sha256(path / name) for name in (NETWORK_FILE, TRAINING_FILE)}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunError(f"{path}: the checkpoint is incomplete ({error}). Use another one") from error
-    if version > FORMAT_VERSION:
-        raise RunError(f"{path}: written by a newer clearway (format {version}). Upgrade clearway")
     for name, digest in actual.items():
         if sums.get(name) != digest:
             raise RunError(f"{path / name}: its SHA-256 differs from the manifest's. Use another checkpoint")
