@@ -8,9 +8,11 @@ from clearway.scenes.rooms import finishes, textures
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import bathroom as fittings
 from clearway.scenes.rooms.furniture import decor, lamps, openings, storage
+from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
-from clearway.scenes.rooms.shell import SIDES, Column, Finish, add_surfaces, add_walls, wall_size_m
-from clearway.scenes.rooms.surfaces import pixels, tiled, with_band
+from clearway.scenes.rooms.shell import SIDES, Column, Finish, add_surfaces, add_walls
+from clearway.scenes.rooms.surfaces import pixels
+from clearway.scenes.rooms.textures import Colour
 
 WIDTH_M, DEPTH_M, HEIGHT_M = 5.0, 4.0, 2.5
 WALL = Column(0.0, 1.69, 3.4, 1.81)
@@ -33,23 +35,45 @@ def _finish(room: Room) -> Finish:
     floor = textures.tiles(room.rng, pixels(4), pixels(4), 10, 10, (0.36, 0.37, 0.38), (0.6, 0.59, 0.56), 0.14, 0.3)
     if room.rng.random() < 0.5:
         floor = textures.tiles(
-            room.rng, pixels(4), pixels(4), 12, 12, (0.84, 0.83, 0.8), (0.55, 0.54, 0.52), 0.05, 0.15,
+            room.rng,
+            pixels(4),
+            pixels(4),
+            12,
+            12,
+            (0.84, 0.83, 0.8),
+            (0.55, 0.54, 0.52),
+            0.05,
+            0.15,
             second=(0.3, 0.33, 0.36),
-        )  # fmt: skip
+        )
     covered = finishes.with_rug(room, finishes.floor_of(room, floor), (0.95, 2.7), (1.1, 0.6), "stripes")
-    walls = {side: _tiled_wall(room, side) for side in SIDES}
-    return Finish(covered, finishes.plain_ceiling(room), walls, partitions=walls["south"], skirting=None)
-
-
-def _tiled_wall(room: Room, side: str) -> np.ndarray:
-    """Bonded tiles up to a height that differs by wall, a coloured rail, and paint."""
-    size = wall_size_m(room, side)
-    tiles = textures.tiles(
-        room.rng, pixels(2.4), pixels(2.4), 8, 16, (0.88, 0.89, 0.88), (0.72, 0.72, 0.7), 0.04, 0.06, 1, bonded=True
+    walls = {side: finishes.aged(room, _wall(room, side)) for side in SIDES}
+    paint = finishes.painted_wall(room, "south", room.colours.wall)
+    partition = finishes.tiled_wall(
+        room, "south", paint, varied(room.rng, (0.8, 0.82, 0.8), 0.02), 1.45, _rail(room), 0.15
     )
-    paint = finishes.painted_wall(room, side, room.colours.feature_wall if side == "west" else room.colours.wall)
-    height = {"north": 2.1, "east": 1.2, "south": 1.2, "west": 1.2}[side]
-    return with_band(tiled(tiles, *size), paint, height, np.array(room.colours.accent) * 0.8)
+    return Finish(covered, finishes.plain_ceiling(room), walls, finishes.aged(room, partition), skirting=None)
+
+
+def _wall(room: Room, side: str) -> np.ndarray:
+    """Tiles and paint; size, colour and height of the tiles differ by wall."""
+    colours = room.colours
+    paint = finishes.painted_wall(room, side, colours.feature_wall if side == "west" else colours.wall)
+    red, green, blue = colours.feature_wall
+    pale = (0.55 + 0.4 * red, 0.55 + 0.4 * green, 0.55 + 0.4 * blue)
+    tile, height, size = {
+        "north": (pale, 2.1, 0.2),
+        "east": ((0.88, 0.89, 0.88), 1.2, 0.3),
+        "south": ((0.88, 0.89, 0.88), 1.2, 0.3),
+        "west": (pale, 1.0, 0.24),
+    }[side]
+    return finishes.tiled_wall(room, side, paint, tile, height, _rail(room), size)
+
+
+def _rail(room: Room) -> Colour:
+    """The colour of the row that ends the tiles."""
+    red, green, blue = room.colours.accent
+    return 0.8 * red, 0.8 * green, 0.8 * blue
 
 
 def _place_fittings(room: Room) -> None:

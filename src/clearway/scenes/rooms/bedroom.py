@@ -5,6 +5,7 @@ from __future__ import annotations
 from clearway.scenes.rooms import finishes, textures
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import beds, decor, lamps, openings, seating, storage, tables
+from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import Column, Finish, add_surfaces, add_walls
 from clearway.scenes.rooms.surfaces import pixels
@@ -34,13 +35,19 @@ def _finish(room: Room) -> Finish:
     floor = finishes.with_rug(room, finishes.floor_of(room, pile), (2.0, 2.5), (2.6, 2.3))
     floor = finishes.with_rug(room, floor, (5.3, 2.6), (1.5, 1.5), "medallion", round_edge=True)
     pattern = textures.WALLPAPERS[int(room.rng.integers(len(textures.WALLPAPERS)))]
+    boards = varied(room.rng, (0.86, 0.86, 0.84), 0.02)
+    paint = finishes.painted_wall(room, "west", colours.feature_wall)
     walls = {
         "south": finishes.papered_wall(room, "south", colours.wall, pattern),
-        "north": finishes.papered_wall(room, "north", colours.wall, pattern),
+        "north": finishes.boarded_wall(
+            room, "north", finishes.papered_wall(room, "north", colours.wall, "dots"), boards
+        ),
         "east": finishes.papered_wall(room, "east", colours.wall, "stripes"),
-        "west": finishes.painted_wall(room, "west", colours.feature_wall),
+        "west": finishes.boarded_wall(room, "west", paint, boards, 0.6),
     }
-    return Finish(floor, finishes.plain_ceiling(room), walls, partitions=walls["south"])
+    partition = finishes.papered_wall(room, "south", varied(room.rng, colours.wall), "damask", 0.4)
+    walls = {side: finishes.aged(room, wall) for side, wall in walls.items()}
+    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, partition))
 
 
 def _place_bed(room: Room) -> None:
@@ -51,7 +58,7 @@ def _place_bed(room: Room) -> None:
     openings.window(room, room.wall("south", 2.0, 0.9), 1.6, 1.25)
     decor.painting(room, room.wall("west", 2.5, 1.6), 1.2, 0.6)
     decor.painting(room, STUDY_WALL.face("west", 2.9, 1.55), 0.6, 0.8)
-    decor.mirror(room, STUDY_WALL.face("west", 2.0, 1.4), 0.45, 1.2)
+    decor.painting(room, STUDY_WALL.face("west", 2.05, 1.55), 0.4, 0.55, "oak")
     decor.clock(room, DRESSING_WALL.face("south", 1.8, 1.8))
     decor.wall_shelf(room, DRESSING_WALL.face("south", 2.8, 1.6))
     lamps.ceiling_lamp(room, Frame(2.4, 2.4), 0.26, 1.2)

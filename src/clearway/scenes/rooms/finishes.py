@@ -7,8 +7,8 @@ import numpy as np
 from clearway.scenes.rooms import pictures, textures
 from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
-from clearway.scenes.rooms.shell import SIDES, wall_size_m
-from clearway.scenes.rooms.surfaces import pasted, pixels, tiled
+from clearway.scenes.rooms.shell import wall_size_m
+from clearway.scenes.rooms.surfaces import pasted, pixels, tiled, with_band
 from clearway.scenes.rooms.textures import Colour
 
 WHITE: Colour = (0.9, 0.9, 0.88)
@@ -41,38 +41,63 @@ def plain_ceiling(room: Room) -> np.ndarray:
 
 def painted_wall(room: Room, side: str, colour: Colour) -> np.ndarray:
     """A wall in one colour."""
-    image = textures.plaster(room.rng, pixels(4), pixels(4), colour, 0.06)
+    image = textures.plaster(room.rng, pixels(4), pixels(4), colour, 0.1)
     return tiled(image, *wall_size_m(room, side))
 
 
 def papered_wall(room: Room, side: str, colour: Colour, pattern: str, repeat_m: float = 0.25) -> np.ndarray:
     """A wall with paper in two close tones."""
-    darker = (colour[0] * 0.92, colour[1] * 0.92, colour[2] * 0.91)
+    darker = (colour[0] * 0.86, colour[1] * 0.85, colour[2] * 0.84)
     image = textures.wallpaper(room.rng, pixels(2), pixels(2), colour, darker, pattern, round(2 / repeat_m))
     return tiled(image, *wall_size_m(room, side))
 
 
-def wainscot(room: Room, side: str, colour: Colour) -> np.ndarray:
-    """Painted boarding, to be used for the lower part of a wall."""
-    image = textures.plaster(room.rng, pixels(2), pixels(2), colour, 0.03)
-    x = np.arange(pixels(2)) / pixels(2) * 2
-    groove = np.abs((x / 0.125) % 1 - 0.5) > 0.44
-    image[:, groove] *= 0.86
-    return tiled(image, *wall_size_m(room, side))
+def boarded_wall(room: Room, side: str, above: np.ndarray, colour: Colour, height_m: float = 0.95) -> np.ndarray:
+    """A wall with upright painted boards below a rail."""
+    image = textures.plaster(room.rng, pixels(2), pixels(2), colour, 0.04)
+    board = np.arange(pixels(2)) / pixels(2) * 2 / 0.125
+    image[:, np.abs(board % 1 - 0.5) > 0.45] *= 0.8
+    return with_band(tiled(image, *wall_size_m(room, side)), above, height_m, np.array(colour))
 
 
-def sides_of(room: Room, make: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The four walls, checked to be complete."""
-    assert set(make) == set(SIDES), make.keys()
-    return make
+def tiled_wall(
+    room: Room, side: str, above: np.ndarray, colour: Colour, height_m: float, rail: Colour, tile_m: float = 0.3
+) -> np.ndarray:
+    """A wall with bonded tiles, twice as wide as high, below a rail."""
+    columns = round(2.4 / tile_m)
+    tiles = textures.tiles(
+        room.rng,
+        pixels(2.4),
+        pixels(2.4),
+        columns,
+        2 * columns,
+        colour,
+        (colour[0] * 0.78, colour[1] * 0.78, colour[2] * 0.78),
+        0.07,
+        0.08,
+        2,
+        bonded=True,
+    )
+    return with_band(tiled(tiles, *wall_size_m(room, side)), above, height_m, np.array(rail))
 
 
 def with_rug(
-    room: Room, floor: np.ndarray, centre_m: tuple[float, float], size_m: tuple[float, float], pattern: str = "",
+    room: Room,
+    floor: np.ndarray,
+    centre_m: tuple[float, float],
+    size_m: tuple[float, float],
+    pattern: str = "",
     round_edge: bool = False,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """A floor with a rug in the scheme's colours; without a name the seed chooses the pattern."""
     chosen = pattern or pictures.RUGS[int(room.rng.integers(len(pictures.RUGS)))]
     ground, second = varied(room.rng, room.colours.rug, 0.04), varied(room.rng, room.colours.rug_second, 0.04)
     image = pictures.rug(room.rng, pixels(size_m[1]), pixels(size_m[0]), ground, second, chosen)
     return pasted(floor, image, centre_m, round_edge)
+
+
+def aged(room: Room, wall: np.ndarray) -> np.ndarray:
+    """A wall with faint stains that nowhere repeat, so that no two places look alike."""
+    rows, columns = wall.shape[:2]
+    stains = textures.noise(room.rng, rows, columns, 1.3)[..., None] - 0.5
+    return np.clip(wall * (1 + 0.3 * stains), 0, 1)

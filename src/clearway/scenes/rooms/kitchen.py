@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from clearway.scenes.rooms import finishes, textures
+from clearway.scenes.rooms.finishes import WHITE
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import decor, kitchen, lamps, openings, seating, storage, tables
+from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import Column, Finish, add_surfaces, add_walls
 from clearway.scenes.rooms.surfaces import pixels
@@ -30,13 +32,20 @@ def _finish(room: Room) -> Finish:
     colours = room.colours
     tiles = textures.tiles(room.rng, pixels(4), pixels(4), 8, 8, (0.72, 0.62, 0.5), (0.52, 0.47, 0.4), 0.1, 0.25)
     floor = finishes.floor_of(room, tiles)
+    accent = colours.second_accent
     walls = {
-        "south": finishes.painted_wall(room, "south", colours.wall),
-        "north": finishes.painted_wall(room, "north", colours.wall),
-        "east": finishes.painted_wall(room, "east", colours.feature_wall),
-        "west": finishes.painted_wall(room, "west", colours.wall),
+        side: finishes.tiled_wall(
+            room, side, finishes.painted_wall(room, side, colours.wall), (0.9, 0.89, 0.86), 1.42, accent, 0.2
+        )
+        for side in ("south", "west")
     }
-    return Finish(floor, finishes.plain_ceiling(room), walls, partitions=walls["south"])
+    paper = finishes.papered_wall(room, "north", colours.wall, "leaves")
+    walls["north"] = finishes.boarded_wall(room, "north", paper, WHITE)
+    paint = finishes.painted_wall(room, "east", colours.feature_wall)
+    walls["east"] = finishes.boarded_wall(room, "east", paint, WHITE)
+    partition = finishes.papered_wall(room, "south", varied(room.rng, colours.wall), "trellis", 0.4)
+    walls = {side: finishes.aged(room, wall) for side, wall in walls.items()}
+    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, partition))
 
 
 def _place_kitchen(room: Room) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from clearway.scenes.rooms import finishes
+from clearway.scenes.rooms.finishes import WHITE
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import decor, lamps, openings, seating, storage, tables
+from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import Column, Finish, add_surfaces, add_walls
 
@@ -31,13 +33,18 @@ def _finish(room: Room) -> Finish:
     colours = room.colours
     floor = finishes.with_rug(room, finishes.plank_floor(room), (1.9, 2.4), (2.2, 2.6))
     floor = finishes.with_rug(room, floor, (6.5, 3.5), (2.6, 2.6), "medallion", round_edge=True)
+    paint = finishes.painted_wall(room, "north", colours.feature_wall)
+    partition = finishes.papered_wall(room, "south", varied(room.rng, colours.wall), "trellis", 0.33)
     walls = {
         "south": finishes.papered_wall(room, "south", colours.wall, "stripes"),
-        "north": finishes.painted_wall(room, "north", colours.feature_wall),
+        "north": finishes.boarded_wall(room, "north", paint, WHITE),
         "east": finishes.papered_wall(room, "east", colours.wall, "damask"),
-        "west": finishes.papered_wall(room, "west", colours.wall, "stripes"),
+        "west": finishes.boarded_wall(
+            room, "west", finishes.papered_wall(room, "west", colours.wall, "leaves", 0.4), colours.cabinet, 0.8
+        ),
     }
-    return Finish(floor, finishes.plain_ceiling(room), walls, partitions=walls["south"])
+    walls = {side: finishes.aged(room, wall) for side, wall in walls.items()}
+    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, partition))
 
 
 def _place_sofas(room: Room) -> None:
@@ -53,7 +60,7 @@ def _place_sofas(room: Room) -> None:
     lamps.floor_lamp(room, Frame(0.25, 1.25))
     storage.bookcase(room, DINING_WALL.face("west", 3.25).moved(0, 0.165))
     storage.sideboard(room, room.wall("south", 3.9, gap_m=0.22), 1.2)
-    openings.window(room, room.wall("south", 2.0, 0.95), 1.6, 1.3)
+    openings.window(room, room.wall("south", 2.0, 0.95), 1.9, 1.3)
     openings.door(room, room.wall("west", 0.62))
     decor.painting(room, room.wall("south", 3.9, 1.55), 0.9, 0.65)
     decor.painting(room, room.wall("west", 3.75, 1.85), 0.45, 0.45)

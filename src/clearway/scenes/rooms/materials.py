@@ -55,7 +55,7 @@ SCHEMES = (
     Colours(
         upholstery=(0.36, 0.44, 0.33), accent=(0.88, 0.74, 0.34), second_accent=(0.7, 0.36, 0.26),
         curtain=(0.8, 0.72, 0.55), wall=(0.86, 0.84, 0.75), feature_wall=(0.52, 0.58, 0.44),
-        cabinet=(0.46, 0.55, 0.45), dark_wood=(0.3, 0.19, 0.12), light_wood=(0.5, 0.34, 0.21),
+        cabinet=(0.46, 0.55, 0.45), dark_wood=(0.36, 0.23, 0.15), light_wood=(0.56, 0.39, 0.25),
         rug=(0.78, 0.7, 0.55), rug_second=(0.34, 0.42, 0.3),
     ),
     Colours(
@@ -73,7 +73,7 @@ SCHEMES = (
     Colours(
         upholstery=(0.56, 0.3, 0.26), accent=(0.3, 0.44, 0.36), second_accent=(0.88, 0.78, 0.58),
         curtain=(0.36, 0.46, 0.4), wall=(0.88, 0.85, 0.77), feature_wall=(0.76, 0.62, 0.42),
-        cabinet=(0.8, 0.72, 0.56), dark_wood=(0.27, 0.16, 0.1), light_wood=(0.46, 0.29, 0.18),
+        cabinet=(0.8, 0.72, 0.56), dark_wood=(0.37, 0.22, 0.13), light_wood=(0.6, 0.39, 0.24),
         rug=(0.3, 0.4, 0.35), rug_second=(0.82, 0.72, 0.52),
     ),
 )  # fmt: skip
@@ -136,9 +136,17 @@ def _cloth(part: str, strength: float = 0.16) -> Maker:
     return make
 
 
-def _plain(colour: Colour, **look: float) -> Maker:
+def _plain(
+    colour: Colour,
+    specular: float = 0.15,
+    shininess: float = 0.3,
+    emission: float = 0.0,
+    reflectance: float = 0.0,
+    alpha: float = 1.0,
+) -> Maker:
     """One colour without a picture."""
-    return lambda rng, colours: Look(colour=colour, **look)
+    look = Look(None, colour, (1.0, 1.0), specular, shininess, emission, reflectance, alpha)
+    return lambda rng, colours: look
 
 
 def _painted(colour: Colour | None, strength: float = 0.02, specular: float = 0.2, shininess: float = 0.4) -> Maker:

@@ -50,18 +50,68 @@ def bevelled_box(size_m: tuple[float, float, float], bevel_m: float, segments: i
     Args:
         size_m: full size along x, y, z.
         bevel_m: radius of the edges, cut to fit the smallest side.
-        segments: rows of quads in half a rounded edge; 0 gives a plain box of 12 triangles.
+        segments: roundness; 0 gives a plain box of 12 triangles, 1 flat faces joined by one strip along every
+            edge (44 triangles), n > 1 edges of 2 n strips.
         grain_up: keep u horizontal on every face; otherwise u runs along the longer side, as wood grain does.
     """
     half = np.array(size_m) / 2
+    if segments == 1:
+        return _chamfered_box(half, min(bevel_m, float(half.min()) * 0.9), grain_up)
     bevel = min(bevel_m, float(half.min()) * 0.98) if segments else 0.0
     parts = [_box_face(half, bevel, segments, axis, sign, grain_up) for axis in range(3) for sign in (-1.0, 1.0)]
     return _joined(parts)
 
 
+def _chamfered_box(half: np.ndarray, bevel: float, grain_up: bool) -> Mesh:
+    """Six flat faces, twelve strips and eight corners between them; the strips blend the faces' normals."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    vertices, normals, uvs = [], [], []
+    for axis in range(3):
+        inset = np.where(np.arange(3) == axis, half, half - bevel)
+        points = signs * inset
+        u_axis, v_axis = FACE_AXES[axis]
+        swap = not grain_up and half[v_axis] > half[u_axis]
+        vertices.append(points)
+        normals.append(signs * np.eye(3)[axis])
+        uvs.append(points[:, [v_axis, u_axis] if swap else [u_axis, v_axis]])
+    points, outward = np.concatenate(vertices), np.concatenate(normals)
+    faces = np.concatenate([CHAMFER_QUADS[:, [0, 1, 2]], CHAMFER_QUADS[:, [0, 2, 3]]])
+    faces = faces[(faces[:, 0] != faces[:, 2]) & (faces[:, 1] != faces[:, 2])]
+    corners = points[faces]
+    winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = np.einsum("ij,ij->i", winding, outward[faces].sum(axis=1)) < 0
+    faces[inwards] = faces[inwards][:, ::-1]
+    return Mesh(points, faces, outward, np.concatenate(uvs))
+
+
+def _chamfer_quads() -> np.ndarray:
+    """Corner indices of the quads of a chamfered box; vertex 8 axis + corner lies on the face across that axis.
+
+    A corner is a number whose bits 4, 2 and 1 say whether x, y and z are high. A triangle repeats its last index.
+    """
+    bit = {0: 4, 1: 2, 2: 1}
+    quads = []
+    for axis in range(3):
+        u, v = (bit[a] for a in range(3) if a != axis)
+        for base in (0, bit[axis]):
+            quads.append([8 * axis + base + k for k in (0, u, u + v, v)])
+        first, second = ((axis + 1) % 3, (axis + 2) % 3)
+        for corner in (0, bit[first], bit[second], bit[first] + bit[second]):
+            ends = (corner, corner + bit[axis])
+            quads.append([8 * first + ends[0], 8 * first + ends[1], 8 * second + ends[1], 8 * second + ends[0]])
+    quads += [[corner, 8 + corner, 16 + corner, 16 + corner] for corner in range(8)]
+    return np.array(quads)
+
+
+FACE_AXES = ((1, 2), (0, 2), (0, 1))
+"""The axes along u and v of the face across each axis."""
+
+CHAMFER_QUADS = _chamfer_quads()
+
+
 def _box_face(half: np.ndarray, bevel: float, segments: int, axis: int, sign: float, grain_up: bool) -> Mesh:
     """One face of a bevelled box, up to the middle of its rounded edges."""
-    u_axis, v_axis = ((1, 2), (0, 2), (0, 1))[axis]
+    u_axis, v_axis = FACE_AXES[axis]
     lines = [_face_lines(half[a], bevel, segments) for a in (u_axis, v_axis)]
     u, v = np.meshgrid(*lines, indexing="ij")
     flat = np.zeros((*u.shape, 3))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from clearway.scenes.rooms.room import Part
+from clearway.scenes.rooms.parts import Part
 
 VOXEL_M = 0.04
 MAX_STEPS = 96
@@ -25,27 +25,36 @@ class Occupancy:
 
     free_voxels: np.ndarray
 
-    def distance_m(self, points_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """How far light travels from (N, 3) points along (N, 3) unit vectors, (N,) float32 metres."""
+    def distance_m(self, points_m: np.ndarray, directions: np.ndarray, limit_m: float = np.inf) -> np.ndarray:
+        """How far light travels from (N, 3) points along (N, 3) unit vectors, (N,) float32 metres.
+
+        Rays that have come farther than `limit_m` stop there.
+        """
         field = self.free_voxels.reshape(-1)
-        limits = np.array(self.free_voxels.shape, np.int32)
-        strides = np.array([limits[1] * limits[2], limits[2], 1], np.int32)
+        limits = np.array(self.free_voxels.shape, np.float32) - 1
+        _, size_y, size_z = self.free_voxels.shape
         travelled = np.zeros(len(points_m), np.float32)
         active = np.arange(len(points_m))
-        here = points_m.astype(np.float32) / VOXEL_M + 1
+        here = points_m.astype(np.float32) / np.float32(VOXEL_M) + np.float32(1)
         step_by = directions.astype(np.float32)
         for _ in range(MAX_STEPS):
-            voxel = np.clip(here.astype(np.int32), 0, limits - 1)
-            free = field[voxel @ strides]
-            moving = free > 0
+            np.clip(here, 0, limits, out=here)
+            x, y, z = here.astype(np.int32).T
+            free = field[(x * size_y + y) * size_z + z]
+            moving = (free > 0) & (travelled[active] < limit_m / VOXEL_M)
             if not moving.all():
                 active, here, step_by, free = active[moving], here[moving], step_by[moving], free[moving]
             if not len(active):
                 break
-            step = np.maximum(free.astype(np.float32) - 0.9, 0.6)
+            step = np.maximum(free.astype(np.float32) - np.float32(0.9), np.float32(0.6))
             here += step_by * step[:, None]
             travelled[active] += step
         return travelled * VOXEL_M
+
+    def is_solid(self, points_m: np.ndarray) -> np.ndarray:
+        """Whether each of (N, 3) points lies in something solid or outside the room, (N,) bool."""
+        voxels = np.clip((points_m / VOXEL_M + 1).astype(int), 0, np.array(self.free_voxels.shape) - 1)
+        return self.free_voxels[tuple(voxels.T)] == 0
 
 
 def occupancy_of(size_m: tuple[float, float, float], parts: Iterable[Part]) -> Occupancy:

@@ -14,10 +14,12 @@ import numpy as np
 
 from clearway.scenes.rooms import meshes
 from clearway.scenes.rooms.frame import UPRIGHT, Frame, along, rotation
+from clearway.scenes.rooms.groups import OBSTACLE_GROUP, SEEN_GROUP
 from clearway.scenes.rooms.materials import SCHEMES, Look, look_of
+from clearway.scenes.rooms.parts import Lamp, Part, Window
+from clearway.scenes.rooms.spec import add_material, empty_spec
 from clearway.scenes.rooms.surfaces import Surface
 
-CEILING_GROUP, SEEN_GROUP, OBSTACLE_GROUP = 1, 2, 3
 WALL_THICKNESS_M = 0.1
 NOT_SHADED = ("bulb", "shade", "mirror")
 LETS_LIGHT_THROUGH = ("glass", "water", "bulb", "shade")
@@ -25,60 +27,6 @@ LETS_LIGHT_THROUGH = ("glass", "water", "bulb", "shade")
 Point = tuple[float, float, float]
 Tilt = tuple[float, float, float, float]
 ORIGIN = Frame(0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Lamp:
-    """A lamp that the baked light comes from.
-
-    Attributes:
-        centre_m: (3,) middle of the lamp in the room.
-        radius_m: the light leaves from a horizontal circle of this size, which softens shadows.
-        colour: (3,) of the light.
-        power: brightness; a ceiling lamp has about 2.
-    """
-
-    centre_m: np.ndarray
-    radius_m: float
-    colour: np.ndarray
-    power: float
-
-
-@dataclass(frozen=True)
-class Window:
-    """A window that daylight comes through.
-
-    Attributes:
-        centre_m: (3,) middle of the pane.
-        normal: (3,) unit vector into the room.
-        width_m, height_m: size of the pane.
-    """
-
-    centre_m: np.ndarray
-    normal: np.ndarray
-    width_m: float
-    height_m: float
-
-
-@dataclass(eq=False)
-class Part:
-    """A visible part of the furniture, as the baked light knows it.
-
-    Attributes:
-        geom: its geom in the spec; None for a piece of wall, which is drawn by its surfaces.
-        material: name of its material; empty for a piece of wall.
-        centre_m, rotation, half_extents_m: its box, (3,), (3, 3), (3,), turned into room coordinates.
-        round: it fills the ellipse within its box rather than all of it.
-        casts_shadow: light does not pass.
-    """
-
-    geom: mujoco.MjsGeom | None
-    material: str
-    centre_m: np.ndarray
-    rotation: np.ndarray
-    half_extents_m: np.ndarray
-    round: bool
-    casts_shadow: bool
 
 
 @dataclass(eq=False)
@@ -120,8 +68,7 @@ class Room:
         self.surfaces: list[Surface] = []
         self.parts: list[Part] = []
         self._looks: dict[str, Look] = {}
-        self._mesh_names: dict[tuple, str] = {}
-        self.spec = _empty_spec(self)
+        self.spec = empty_spec(self.name, (self.width_m / 2, self.depth_m / 2, 1.0))
         if self.mirrored:
             self.grid_origin_m = (self.width_m - self.grid_origin_m[0], self.grid_origin_m[1])
 
@@ -150,6 +97,10 @@ class Room:
             point[0] = self.width_m - point[0]
             quat = quat * np.array([1, 1, -1, -1])
         return point, quat
+
+    def place(self, frame: Frame, position_m: Point) -> np.ndarray:
+        """Room coordinates (3,) of a point in a frame, mirrored where the room is."""
+        return self._placed(frame, position_m, UPRIGHT)[0]
 
     def direction(self, frame: Frame, x: float, y: float, z: float) -> np.ndarray:
         """A direction of a frame as a (3,) vector of the room, mirrored where the room is."""
@@ -235,9 +186,15 @@ class Room:
         self.cylinder(frame, start_m, radius_m, length, material, along(axis), group)
 
     def ball(
-        self, frame: Frame, centre_m: Point, radii_m: Point, material: str, tilt: Tilt = UPRIGHT, slices: int = 12,
+        self,
+        frame: Frame,
+        centre_m: Point,
+        radii_m: Point,
+        material: str,
+        tilt: Tilt = UPRIGHT,
+        slices: int = 12,
         group: int = SEEN_GROUP,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """An ellipsoid with half-axes `radii_m`."""
         angles = np.linspace(-np.pi / 2, np.pi / 2, max(4, slices // 2 + 1))
         widest = round(max(radii_m[0], radii_m[1]), 4)
@@ -251,15 +208,17 @@ class Room:
         frame: Frame,
         centre_m: Point,
         size_m: tuple[float, float],
-        make: Callable[[np.random.Generator], np.ndarray] | str,
-        tilt: Tilt = UPRIGHT,
-        **look: float,
+        make: Callable[[np.random.Generator], np.ndarray],
+        specular: float = 0.1,
+        shininess: float = 0.3,
+        emission: float = 0.0,
     ) -> None:
-        """A flat picture (width, height) that faces the frame's +y, made by a function or given as a material."""
+        """A flat picture (width, height) that faces the frame's +y."""
         if self.looks:
-            material = make if isinstance(make, str) else self._one_off(Look(make(self.rng), **look))
+            look = Look(make(self.rng), specular=specular, shininess=shininess, emission=emission)
+            material = self._one_off(look)
             mesh = meshes.panel(round(size_m[0], 4), round(size_m[1], 4))
-            self._add(mesh, frame, centre_m, material, tilt, SEEN_GROUP, stretch=True)
+            self._add(mesh, frame, centre_m, material, UPRIGHT, SEEN_GROUP, stretch=True)
 
     def cloth(self, frame: Frame, position_m: Point, size_m: tuple[float, float], folds: int, material: str) -> None:
         """A hanging cloth (width, height) in waves; `position_m` is the middle of its lower hem."""
@@ -279,34 +238,21 @@ class Room:
         round_shape: bool = False,
         stretch: bool = False,
     ) -> None:
-        """Place a mesh and note it for the light."""
+        """Place a mesh; the grain of a material that has one starts at a random place."""
         look = self._look(material)
-        size_m = (1.0, 1.0) if stretch else look.size_m
-        moves_grain = look.image is not None and not stretch
-        shift = tuple(self.rng.integers(0, 4, 2) / 4) if moves_grain else (0.0, 0.0)
+        uvs = mesh.uvs
+        if not stretch:
+            shift = self.rng.random(2) if look.image is not None else np.zeros(2)
+            uvs = mesh.uvs / look.size_m + shift
         point, quat = self._placed(frame, position_m, tilt)
-        geom = self.spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=self._mesh_name(mesh, size_m, shift), material=material,
-            pos=point, quat=quat, group=group, contype=0, conaffinity=0,
-        )  # fmt: skip
-        turned = rotation(quat)
         casts = material not in LETS_LIGHT_THROUGH and look.alpha == 1.0
-        self.parts.append(
-            Part(geom, material, point + turned @ mesh.centre_m, turned, mesh.half_extents_m, round_shape, casts)
-        )
-
-    def _mesh_name(self, mesh: meshes.Mesh, size_m: tuple[float, float], shift: tuple[float, float]) -> str:
-        """The name of the mesh in the spec, added the first time it is asked for."""
-        key = (mesh, size_m, shift)
-        if key not in self._mesh_names:
-            self._mesh_names[key] = f"mesh {len(self._mesh_names)}"
-            add_mesh(self.spec, self._mesh_names[key], mesh, mesh.uvs / size_m + shift)
-        return self._mesh_names[key]
+        self.parts.append(Part(mesh, uvs, material, group, point, rotation(quat), round_shape, casts))
 
     def shadow_box(self, frame: Frame, size_m: Point) -> None:
         """A box on the frame's origin that stops light and is drawn by other means: a partition."""
+        mesh = meshes.bevelled_box(size_m, 0.0, 0)
         point, quat = self._placed(frame, (0, 0, size_m[2] / 2), UPRIGHT)
-        self.parts.append(Part(None, "", point, rotation(quat), np.array(size_m) / 2, False, True))
+        self.parts.append(Part(mesh, mesh.uvs, "", SEEN_GROUP, point, rotation(quat), False, True))
 
     def mirror_glass(self, frame: Frame, centre_m: Point, size_m: tuple[float, float]) -> None:
         """A mirror (width, height) that faces the frame's +y; MuJoCo mirrors in the top of a box only."""
@@ -315,9 +261,14 @@ class Room:
             to_front = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)
             point, quat = self._placed(frame, centre_m, to_front)
             geom = self.spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX, pos=point, quat=quat, group=SEEN_GROUP, material="mirror",
-                contype=0, conaffinity=0,
-            )  # fmt: skip
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=point,
+                quat=quat,
+                group=SEEN_GROUP,
+                material="mirror",
+                contype=0,
+                conaffinity=0,
+            )
             geom.size[:] = [size_m[0] / 2, size_m[1] / 2, 0.008]
 
     # --------------------------------------------------------------- materials
@@ -343,53 +294,11 @@ class Room:
         colour = (1.0, 1.0, 1.0) if look.image is not None else look.colour
         return np.array([*colour, look.alpha])
 
+    def is_opaque(self, name: str) -> bool:
+        """Whether nothing shows through a material."""
+        return self._looks[name].alpha == 1.0
+
     def is_shaded(self, name: str) -> bool:
         """Whether a material takes the baked light: lamps, mirrors and window views shine by themselves."""
         look = self._looks[name]
         return name not in NOT_SHADED and look.emission < 0.5
-
-
-def add_material(spec: mujoco.MjSpec, name: str, look: Look) -> None:
-    """A material with its texture in the spec."""
-    material = spec.add_material(
-        name=name, specular=look.specular, shininess=look.shininess, emission=look.emission,
-        reflectance=look.reflectance,
-    )  # fmt: skip
-    if look.image is None:
-        material.rgba[:] = [*look.colour, look.alpha]
-        return
-    pixels = np.clip(np.round(look.image[::-1] * 255), 0, 255).astype(np.uint8)
-    texture = spec.add_texture(
-        name=f"{name} texture", type=mujoco.mjtTexture.mjTEXTURE_2D, height=pixels.shape[0], width=pixels.shape[1],
-        nchannel=3,
-    )  # fmt: skip
-    texture.data = pixels.tobytes()
-    material.rgba[:] = [1, 1, 1, look.alpha]
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture.name
-
-
-def add_mesh(spec: mujoco.MjSpec, name: str, mesh: meshes.Mesh, uvs: np.ndarray) -> None:
-    """A mesh in the spec with texture coordinates in repeats of its picture."""
-    item = spec.add_mesh(name=name)
-    item.uservert = mesh.vertices_m.ravel()
-    item.userface = mesh.faces.ravel()
-    item.usernormal = mesh.normals.ravel()
-    item.usertexcoord = uvs.ravel()
-    item.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-
-
-def _empty_spec(room: Room) -> mujoco.MjSpec:
-    """A spec with the settings that the rooms are rendered with."""
-    spec = mujoco.MjSpec()
-    spec.modelname = room.name
-    spec.visual.quality.offsamples = 4
-    spec.visual.quality.shadowsize = 0
-    spec.visual.headlight.diffuse[:] = [0, 0, 0]
-    spec.visual.headlight.specular[:] = [0, 0, 0]
-    spec.visual.headlight.ambient[:] = [0.4, 0.4, 0.4]
-    spec.stat.extent = 10.0
-    spec.stat.center[:] = [room.width_m / 2, room.depth_m / 2, 1.0]
-    spec.visual.map.znear = 0.005  # times the extent: 5 cm
-    spec.visual.map.zfar = 5.0
-    spec.visual.global_.fovy = 60.0
-    return spec

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clearway.scenes.rooms.frame import Frame
-from clearway.scenes.rooms.room import CEILING_GROUP, ORIGIN, SEEN_GROUP, WALL_THICKNESS_M, Room
+from clearway.scenes.rooms.groups import CEILING_GROUP, SEEN_GROUP
+from clearway.scenes.rooms.room import ORIGIN, WALL_THICKNESS_M, Room
 from clearway.scenes.rooms.surfaces import Surface, pixels
 
 SIDES = ("south", "north", "west", "east")
@@ -69,8 +70,11 @@ def add_walls(room: Room, columns: tuple[Column, ...] = ()) -> None:
     """The obstacles of the shell: the four walls and the columns."""
     w, d, h, t = room.width_m, room.depth_m, room.height_m, WALL_THICKNESS_M
     for x, y, size_x, size_y in (
-        (w / 2, -t / 2, w + 2 * t, t), (w / 2, d + t / 2, w + 2 * t, t), (-t / 2, d / 2, t, d), (w + t / 2, d / 2, t, d),
-    ):  # fmt: skip
+        (w / 2, -t / 2, w + 2 * t, t),
+        (w / 2, d + t / 2, w + 2 * t, t),
+        (-t / 2, d / 2, t, d),
+        (w + t / 2, d / 2, t, d),
+    ):
         room.block(ORIGIN, (x, y, h / 2), (size_x, size_y, h))
     for column in columns:
         frame, size = _column_box(room, column)
@@ -91,19 +95,26 @@ def add_surfaces(room: Room, finish: Finish, columns: tuple[Column, ...] = ()) -
     _surface(room, "floor", np.zeros(3), x * w, y * d, finish.floor)
     _surface(room, "ceiling", y * d + z * h, x * w, -y * d, finish.ceiling, CEILING_GROUP)
     for side, corner, right in (
-        ("south", x * w, -x * w), ("north", y * d, x * w), ("west", np.zeros(3), y * d), ("east", x * w + y * d, -y * d)
-    ):  # fmt: skip
+        ("south", x * w, -x * w),
+        ("north", y * d, x * w),
+        ("west", np.zeros(3), y * d),
+        ("east", x * w + y * d, -y * d),
+    ):
         _surface(room, f"wall {side}", corner, right, z * h, finish.walls[side])
         _add_boards(room, side, finish)
     for number, column in enumerate(columns):
-        assert finish.partitions is not None, "columns need a finish"
         _add_column(room, number, column, finish)
 
 
 def _surface(
-    room: Room, name: str, corner: np.ndarray, right: np.ndarray, up: np.ndarray, albedo: np.ndarray,
+    room: Room,
+    name: str,
+    corner: np.ndarray,
+    right: np.ndarray,
+    up: np.ndarray,
+    albedo: np.ndarray,
     group: int = SEEN_GROUP,
-) -> None:  # fmt: skip
+) -> None:
     """One rectangle of the shell, mirrored where the room is."""
     if room.mirrored:
         flip = np.array([-1, 1, 1])
@@ -126,12 +137,15 @@ def _add_boards(room: Room, side: str, finish: Finish) -> None:
 
 def _add_column(room: Room, number: int, column: Column, finish: Finish) -> None:
     """The faces of a column that show, each with its skirting board."""
+    assert finish.partitions is not None, "columns need a finish"
     frame, (width, depth, height) = _column_box(room, column)
     room.shadow_box(frame, (width, depth, height))
     at_wall = {
-        0: column.y_max_m >= room.depth_m, 90: column.x_min_m <= 0,
-        180: column.y_min_m <= 0, 270: column.x_max_m >= room.width_m,
-    }  # fmt: skip
+        0: column.y_max_m >= room.depth_m,
+        90: column.x_min_m <= 0,
+        180: column.y_min_m <= 0,
+        270: column.x_max_m >= room.width_m,
+    }
     up = np.array([0.0, 0.0, height])
     for yaw, hidden in at_wall.items():
         if hidden:
@@ -139,7 +153,7 @@ def _add_column(room: Room, number: int, column: Column, finish: Finish) -> None
         length, reach = (width, depth / 2) if yaw % 180 == 0 else (depth, width / 2)
         face = Frame(frame.x_m, frame.y_m, yaw)  # its y points away from the column
         corner, other = face.point(length / 2, reach, 0), face.point(-length / 2, reach, 0)
-        albedo = finish.partitions[: pixels(height), : pixels(length)]
+        albedo = np.roll(finish.partitions, 97 * number + 2 * yaw, axis=1)[: pixels(height), : pixels(length)]
         _surface(room, f"column {number} face {yaw}", corner, other - corner, up, albedo)
         if finish.skirting:
             room.box(face, (0, reach + 0.008, 0), (length + 0.032, 0.016, 0.09), finish.skirting, 0.004)

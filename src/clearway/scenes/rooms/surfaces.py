@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-PIXELS_PER_METRE = 128
+PIXELS_PER_METRE = 160
 """Resolution of floors and walls; their textures are made at this scale."""
 
 

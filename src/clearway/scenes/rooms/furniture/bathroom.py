@@ -42,7 +42,7 @@ def vanity(room: Room, at: Frame, width_m: float = 1.2, depth_m: float = 0.48) -
     top = 0.84
     room.box(at, (0, -0.008, 0.2), (width_m - 0.02, depth_m - 0.03, top - 0.24), "wood", 0.006)
     room.box(at, (0, 0, top - 0.04), (width_m, depth_m, 0.04), "marble", 0.01)
-    for x in (-1, 1):
+    for x in (-1.0, 1.0):
         for y in (-1, 1):
             room.cylinder(at, (x * (width_m / 2 - 0.07), y * (depth_m / 2 - 0.08), 0), 0.018, 0.21, "chrome")
     count = max(2, int(width_m / 0.45))
@@ -52,8 +52,12 @@ def vanity(room: Room, at: Frame, width_m: float = 1.2, depth_m: float = 0.48) -
         for z, tall in ((0.22, 0.29), (0.52, 0.27)):
             room.box(at, (x, depth_m / 2 - 0.018, z), (wide - 0.014, 0.018, tall), "wood", 0.006)
             room.rod(
-                at, (x - 0.07, depth_m / 2 + 0.008, z + tall - 0.05), (x + 0.07, depth_m / 2 + 0.008, z + tall - 0.05), 0.007, "chrome"
-            )  # fmt: skip
+                at,
+                (x - 0.07, depth_m / 2 + 0.008, z + tall - 0.05),
+                (x + 0.07, depth_m / 2 + 0.008, z + tall - 0.05),
+                0.007,
+                "chrome",
+            )
     bowl = [(0, 0), (0.1, 0), (0.19, 0.09), (0.21, 0.13), (0.195, 0.13), (0.1, 0.03), (0, 0.025)]
     room.turned(at, (0, 0.03, top), bowl, "porcelain", scale_xy=(1.15, 0.85), slices=28)
     tap(room, at.moved(0, -0.18), top, 0.25, 0.14)
@@ -159,7 +163,7 @@ def towel_shelf(
     room: Room, at: Frame, width_m: float = 0.7, height_m: float = 1.5, depth_m: float = 0.3, material: str = "pine"
 ) -> None:
     """Open shelves with towels, baskets and bottles."""
-    for x in (-1, 1):
+    for x in (-1.0, 1.0):
         for y in (-1, 1):
             room.box(
                 at, (x * (width_m / 2 - 0.02), y * (depth_m / 2 - 0.02), 0), (0.036, 0.036, height_m), material, 0.005

@@ -39,9 +39,14 @@ def _pillows(room: Room, at: Frame, width_m: float, half_length_m: float) -> Non
             segments=3,
         )
         room.box(
-            at.moved(x * 0.86, -half_length_m + 0.5, 0, -side * 6.0), (0, 0, 0.54), (0.42, 0.14, 0.36), cushion, 0.066,
-            turn("x", 30), segments=3,
-        )  # fmt: skip
+            at.moved(x * 0.86, -half_length_m + 0.5, 0, -side * 6.0),
+            (0, 0, 0.54),
+            (0.42, 0.14, 0.36),
+            cushion,
+            0.066,
+            turn("x", 30),
+            segments=3,
+        )
 
 
 def nightstand(room: Room, at: Frame, lamp: bool = True, material: str = "wood") -> None:

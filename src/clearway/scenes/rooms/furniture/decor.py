@@ -22,9 +22,12 @@ VASE_MATERIALS = ("terracotta", "porcelain", "blue", "second accent", "cream")
 def painting(room: Room, at: Frame, width_m: float, height_m: float, frame: str = "black") -> None:
     """A framed picture on a wall frame, centred on it."""
     room.picture(
-        at, (0, 0.02, 0), (width_m, height_m),
-        lambda rng: pictures.painting(rng, 256, round(256 * width_m / height_m)), specular=0.1,
-    )  # fmt: skip
+        at,
+        (0, 0.02, 0),
+        (width_m, height_m),
+        lambda rng: pictures.painting(rng, 256, round(256 * width_m / height_m)),
+        specular=0.1,
+    )
     _border(room, at, width_m, height_m, 0.03, frame)
 
 
@@ -32,9 +35,12 @@ def _border(room: Room, at: Frame, width_m: float, height_m: float, thick_m: flo
     """Four bars around a rectangle on a wall."""
     for side in (-1, 1):
         room.box(
-            at, (side * (width_m + thick_m) / 2, 0.017, -height_m / 2 - thick_m), (thick_m, 0.034, height_m + 2 * thick_m),
-            material, 0.005,
-        )  # fmt: skip
+            at,
+            (side * (width_m + thick_m) / 2, 0.017, -height_m / 2 - thick_m),
+            (thick_m, 0.034, height_m + 2 * thick_m),
+            material,
+            0.005,
+        )
     for z in (-height_m / 2 - thick_m, height_m / 2):
         room.box(at, (0, 0.017, z), (width_m, 0.033, thick_m), material, 0.005)
 
@@ -67,9 +73,12 @@ def wall_shelf(room: Room, at: Frame, width_m: float = 0.8, material: str = "woo
 def row_of_books(room: Room, at: Frame, width_m: float, height_m: float, depth_m: float) -> None:
     """Books side by side, centred on the frame, spines to +y."""
     room.picture(
-        at, (0, depth_m / 2 + 0.003, height_m / 2), (width_m, height_m),
-        lambda rng: pictures.books(rng, 112, max(48, round(112 * width_m / height_m))), specular=0.1,
-    )  # fmt: skip
+        at,
+        (0, depth_m / 2 + 0.003, height_m / 2),
+        (width_m, height_m),
+        lambda rng: pictures.books(rng, 112, max(48, round(112 * width_m / height_m))),
+        specular=0.1,
+    )
     room.box(at, (0, 0, 0), (width_m, depth_m, height_m * 0.66), "linen", 0.004, segments=0)
 
 
@@ -146,9 +155,13 @@ def _leaves(room: Room, at: Frame, z_m: float, height_m: float, count: int) -> N
         stem = height_m * rng.uniform(0.0, 0.3) * math.sin(rise)
         centre: Point = tuple(np.array([0, 0, z_m + stem]) + direction * length * 0.95)
         room.ball(
-            at, centre, (0.028 + 0.03 * height_m, 0.007, length), str(rng.choice(("leaf", "young leaf"))),
-            along(direction), 8,
-        )  # fmt: skip
+            at,
+            centre,
+            (0.028 + 0.03 * height_m, 0.007, length),
+            str(rng.choice(("leaf", "young leaf"))),
+            along(direction),
+            8,
+        )
 
 
 def basket(room: Room, at: Frame, height_m: float = 0.5, material: str = "basket") -> None:

@@ -11,9 +11,14 @@ LYING = turn("x", -90)
 
 
 def counter(
-    room: Room, at: Frame, length_m: float, top: str = "granite", depth_m: float = DEPTH_M, every_second_drawers: bool = True,
+    room: Room,
+    at: Frame,
+    length_m: float,
+    top: str = "granite",
+    depth_m: float = DEPTH_M,
+    every_second_drawers: bool = True,
     front: str = "cabinet",
-) -> None:  # fmt: skip
+) -> None:
     """Base cabinets under a worktop; the frame's origin is the middle of the footprint."""
     room.box(at, (0, -0.02, 0.09), (length_m, depth_m - 0.05, WORKTOP_M - 0.13), front, segments=0)
     room.box(at, (0, -0.05, 0), (length_m - 0.01, depth_m - 0.12, 0.1), "rubber", segments=0)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.scenes.rooms.frame import Frame
-from clearway.scenes.rooms.room import CEILING_GROUP, Lamp, Room
+from clearway.scenes.rooms.groups import CEILING_GROUP
+from clearway.scenes.rooms.parts import Lamp
+from clearway.scenes.rooms.room import Room
 
 WARM = np.array([1.0, 0.9, 0.74])
 NEUTRAL = np.array([1.0, 0.95, 0.87])
@@ -16,10 +18,7 @@ def _light(
     room: Room, at: Frame, centre_m: tuple[float, float, float], radius_m: float, colour: np.ndarray, power: float
 ) -> None:
     """Note a lamp for the baked light."""
-    centre = at.point(*centre_m)
-    if room.mirrored:
-        centre[0] = room.width_m - centre[0]
-    room.lamps.append(Lamp(centre, radius_m, colour, power))
+    room.lamps.append(Lamp(room.place(at, centre_m), radius_m, colour, power))
 
 
 def ceiling_lamp(room: Room, at: Frame, radius_m: float = 0.28, power: float = 1.6) -> None:
@@ -39,7 +38,7 @@ def pendant(room: Room, at: Frame, z_m: float = 1.75, material: str = "black", p
     outside = [(0.2, 0), (0.17, 0.09), (0.06, 0.17), (0.022, 0.19), (0.02, 0.24), (0, 0.24)]
     inside = [(0.02, 0.186), (0.055, 0.165), (0.165, 0.085), (0.197, 0)]
     room.turned(at, (0, 0, z_m), outside, material, slices=24, group=CEILING_GROUP)
-    room.turned(at, (0, 0, z_m), list(reversed(inside))[::-1], "trim", slices=24, group=CEILING_GROUP)
+    room.turned(at, (0, 0, z_m), inside, "trim", slices=24, group=CEILING_GROUP)
     room.ball(at, (0, 0, z_m + 0.06), (0.055, 0.055, 0.06), "bulb", group=CEILING_GROUP)
     room.cylinder(at, (0, 0, room.height_m - 0.03), 0.05, 0.03, material, group=CEILING_GROUP)
 

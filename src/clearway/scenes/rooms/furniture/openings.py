@@ -6,20 +6,25 @@ import numpy as np
 
 from clearway.scenes.rooms import pictures
 from clearway.scenes.rooms.frame import Frame
-from clearway.scenes.rooms.room import Room, Window
+from clearway.scenes.rooms.parts import Window
+from clearway.scenes.rooms.room import Room
 
 FRAME_M = 0.06
 
 
 def window(room: Room, at: Frame, width_m: float, height_m: float, curtains: bool = True, panes: int = 2) -> None:
     """A window with a view and a sill; `at` is the middle of its lower edge on the wall."""
-    centre, right, inward = _pane(room, at, height_m)
-    del right
+    centre = room.place(at, (0, 0, height_m / 2))
+    inward = room.direction(at, 0, 1, 0)
     room.windows.append(Window(centre, inward, width_m, height_m))
     room.picture(
-        at, (0, 0.012, height_m / 2), (width_m, height_m), lambda rng: pictures.outdoor(rng, 256, round(256 * width_m / height_m)),
-        emission=0.95, specular=0.0,
-    )  # fmt: skip
+        at,
+        (0, 0.012, height_m / 2),
+        (width_m, height_m),
+        lambda rng: pictures.outdoor(rng, 256, round(256 * width_m / height_m)),
+        emission=0.95,
+        specular=0.0,
+    )
     for x in np.linspace(-width_m / 2, width_m / 2, panes + 1):
         thick = FRAME_M if abs(x) > width_m / 2 - 0.01 else 0.04
         room.box(at, (x, 0.025, -FRAME_M / 2), (thick, 0.05, height_m + FRAME_M), "trim", 0.006)
@@ -28,14 +33,6 @@ def window(room: Room, at: Frame, width_m: float, height_m: float, curtains: boo
     room.box(at, (0, 0.08, -FRAME_M / 2 - 0.03), (width_m + 0.2, 0.16, 0.03), "trim", 0.008)
     if curtains:
         _curtains(room, at, width_m, height_m)
-
-
-def _pane(room: Room, at: Frame, height_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle, direction to the right and inward normal of a pane in the room."""
-    centre = at.point(0, 0, height_m / 2)
-    if room.mirrored:
-        centre[0] = room.width_m - centre[0]
-    return centre, room.direction(at, 1, 0, 0), room.direction(at, 0, 1, 0)
 
 
 def _curtains(room: Room, at: Frame, width_m: float, height_m: float) -> None:
@@ -57,9 +54,12 @@ def door(room: Room, at: Frame, material: str = "wood", width_m: float = 0.85, p
     for row in range(panels):
         for column in (-1, 1):
             room.box(
-                at, (column * width_m / 4 * 0.92, 0.024, 0.16 + row * span), (width_m / 2 - 0.15, 0.014, span - 0.12),
-                material, 0.012,
-            )  # fmt: skip
+                at,
+                (column * width_m / 4 * 0.92, 0.024, 0.16 + row * span),
+                (width_m / 2 - 0.15, 0.014, span - 0.12),
+                material,
+                0.012,
+            )
     for side in (-1, 1):
         room.box(at, (side * (width_m / 2 + 0.04), 0.02, 0), (0.08, 0.044, height + 0.08), "trim", 0.008)
     room.box(at, (0, 0.02, height), (width_m, 0.042, 0.08), "trim", 0.008)

@@ -11,7 +11,7 @@ ARM_M = 0.18
 def sofa(room: Room, at: Frame, length_m: float = 2.0, depth_m: float = 0.9, material: str = "upholstery") -> None:
     """A sofa; short ones are armchairs. Origin in the middle of its footprint."""
     seats = 3 if length_m > 1.9 else 2 if length_m > 1.2 else 1
-    for x in (-1, 1):
+    for x in (-1.0, 1.0):
         for y in (-1, 1):
             room.cylinder(at, (x * (length_m / 2 - 0.1), y * (depth_m / 2 - 0.1), 0), 0.025, 0.1, "walnut")
     room.box(at, (0, 0, 0.1), (length_m - 0.02, depth_m - 0.02, 0.2), material, 0.03, segments=2)
@@ -91,7 +91,7 @@ def stool(room: Room, at: Frame, height_m: float = 0.44, material: str = "pine")
 
 def bench(room: Room, at: Frame, length_m: float = 1.2, depth_m: float = 0.4) -> None:
     """A padded bench, as at the foot of a bed."""
-    for x in (-1, 1):
+    for x in (-1.0, 1.0):
         for y in (-1, 1):
             room.box(at, (x * (length_m / 2 - 0.05), y * (depth_m / 2 - 0.05), 0), (0.045, 0.045, 0.36), "wood", 0.006)
     room.box(at, (0, 0, 0.34), (length_m, depth_m, 0.05), "wood", 0.006)

@@ -11,9 +11,15 @@ BOARD_M = 0.024
 
 
 def bookcase(
-    room: Room, at: Frame, width_m: float = 0.9, height_m: float = 1.9, depth_m: float = 0.32, material: str = "wood",
-    shelves: int = 5, open_back: bool = False,
-) -> None:  # fmt: skip
+    room: Room,
+    at: Frame,
+    width_m: float = 0.9,
+    height_m: float = 1.9,
+    depth_m: float = 0.32,
+    material: str = "wood",
+    shelves: int = 5,
+    open_back: bool = False,
+) -> None:
     """Shelves with books and ornaments; with an open back it divides a room."""
     for side in (-1, 1):
         room.box(at, (side * (width_m - BOARD_M) / 2, 0, 0), (BOARD_M, depth_m, height_m), material, 0.004)
@@ -58,18 +64,28 @@ def wardrobe(
         for z, tall in ((0.18, 0.7), (0.98, height_m - 1.12)):
             room.box(at, (x, depth_m / 2 - 0.004, z), (leaf - 0.16, 0.012, tall), "white", 0.01)
         room.rod(
-            at, (x + inner * (leaf / 2 - 0.05), depth_m / 2 + 0.02, 0.95), (x + inner * (leaf / 2 - 0.05), depth_m / 2 + 0.02, 1.15),
-            0.009, "brass",
-        )  # fmt: skip
+            at,
+            (x + inner * (leaf / 2 - 0.05), depth_m / 2 + 0.02, 0.95),
+            (x + inner * (leaf / 2 - 0.05), depth_m / 2 + 0.02, 1.15),
+            0.009,
+            "brass",
+        )
     room.block(at, (0, 0, height_m / 2), (width_m, depth_m, height_m))
 
 
 def drawers(
-    room: Room, at: Frame, width_m: float = 1.0, height_m: float = 0.85, depth_m: float = 0.44, rows: int = 3,
-    columns: int = 2, material: str = "wood", front: str | None = None,
-) -> None:  # fmt: skip
+    room: Room,
+    at: Frame,
+    width_m: float = 1.0,
+    height_m: float = 0.85,
+    depth_m: float = 0.44,
+    rows: int = 3,
+    columns: int = 2,
+    material: str = "wood",
+    front: str | None = None,
+) -> None:
     """A chest of drawers on short feet."""
-    for x in (-1, 1):
+    for x in (-1.0, 1.0):
         for y in (-1, 1):
             room.cylinder(at, (x * (width_m / 2 - 0.06), y * (depth_m / 2 - 0.06), 0), 0.02, 0.1, "walnut")
     room.box(at, (0, -0.008, 0.09), (width_m - 0.02, depth_m - 0.016, height_m - 0.11), material, 0.006)
@@ -90,7 +106,7 @@ def sideboard(
     """A low cupboard with doors, and things on top."""
     room.box(at, (0, -0.008, 0.1), (width_m - 0.02, depth_m - 0.016, height_m - 0.13), material, 0.006)
     room.box(at, (0, 0, height_m - 0.03), (width_m, depth_m, 0.03), material, 0.008)
-    for x in (-1, 1):
+    for x in (-1.0, 1.0):
         for y in (-1, 1):
             room.box(at, (x * (width_m / 2 - 0.06), y * (depth_m / 2 - 0.06), 0), (0.04, 0.04, 0.11), material, 0.005)
     count = max(2, round(width_m / 0.45))
@@ -102,9 +118,12 @@ def sideboard(
         )
         room.box(at, (x, depth_m / 2 - 0.002, 0.17), (leaf - 0.12, 0.012, height_m - 0.27), material, 0.008)
         room.ball(
-            at, (x + (leaf / 2 - 0.035) * (1 if number % 2 == 0 else -1), depth_m / 2 + 0.014, height_m * 0.55),
-            (0.014, 0.014, 0.014), "brass", slices=8,
-        )  # fmt: skip
+            at,
+            (x + (leaf / 2 - 0.035) * (1 if number % 2 == 0 else -1), depth_m / 2 + 0.014, height_m * 0.55),
+            (0.014, 0.014, 0.014),
+            "brass",
+            slices=8,
+        )
     decor.ornament(room, at.moved(-width_m * 0.32, 0), height_m)
     decor.stack_of_books(room, at.moved(width_m * 0.05, 0), height_m)
     decor.pot_plant(room, at.moved(width_m * 0.34, 0), height_m)

@@ -22,8 +22,12 @@ def _legs(
     for x in (-1, 1):
         for y in (-1, 1):
             room.box(
-                at, (x * (length_m / 2 - inset_m), y * (depth_m / 2 - inset_m), 0), (side_m, side_m, height_m), material, 0.007
-            )  # fmt: skip
+                at,
+                (x * (length_m / 2 - inset_m), y * (depth_m / 2 - inset_m), 0),
+                (side_m, side_m, height_m),
+                material,
+                0.007,
+            )
 
 
 def dining_table(room: Room, at: Frame, length_m: float = 1.6, depth_m: float = 0.9, material: str = "wood") -> None:
@@ -79,9 +83,12 @@ def desk(room: Room, at: Frame, length_m: float = 1.3, depth_m: float = 0.6, mat
     for number in range(3):
         room.box(at, (left, depth_m / 2 - 0.03, 0.06 + number * 0.21), (0.34, 0.016, 0.195), "white", 0.006)
         room.rod(
-            at, (left - 0.06, depth_m / 2 - 0.01, 0.2 + number * 0.21), (left + 0.06, depth_m / 2 - 0.01, 0.2 + number * 0.21),
-            0.007, "chrome",
-        )  # fmt: skip
+            at,
+            (left - 0.06, depth_m / 2 - 0.01, 0.2 + number * 0.21),
+            (left + 0.06, depth_m / 2 - 0.01, 0.2 + number * 0.21),
+            0.007,
+            "chrome",
+        )
     room.box(at, (length_m / 2 - 0.03, 0, 0), (0.04, depth_m - 0.04, top - 0.03), material, 0.005)
     room.box(at, (0.05, -depth_m / 2 + 0.03, 0.35), (length_m - 0.4, 0.018, 0.36), material, 0.004)
     monitor(room, at.moved(0.15, -depth_m / 2 + 0.2), top)
