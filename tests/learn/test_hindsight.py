@@ -25,9 +25,7 @@ def navigation_of(world: World, envs: int, reward: Reward = COLLISION_AWARE) -> 
     return Navigation(world, reward, torch.arange(envs), choice=TargetChoice.by_scene(world, scene))
 
 
-def acted(
-    world: World, walks: list[tuple[int, int, list[int]]], cut_after: dict[int, int] | None = None
-) -> Rollout:
+def acted(world: World, walks: list[tuple[int, int, list[int]]], cut_after: dict[int, int] | None = None) -> Rollout:
     """The rollout of environments that begin at a state, want a target and take the given actions.
 
     An episode that ends (the target reached, or the step in `cut_after` by environment) begins anew in the
@@ -171,9 +169,7 @@ def test_what_the_told_policy_would_not_do_counts_less() -> None:
     world = corridor_world()
     rollout = acted(world, [(4, 2, [FORWARD, RIGHT])])
     network = small_network(world, seed=4)
-    scores, value = network(
-        world.features[rollout.history[0]], world.features[[8]], torch.zeros(1, dtype=torch.int64)
-    )
+    scores, value = network(world.features[rollout.history[0]], world.features[[8]], torch.zeros(1, dtype=torch.int64))
     log_pi = torch.log_softmax(scores, 1)[0, FORWARD].item()
     acted_as_if_certain = torch.zeros(2, 1)
     batch = told_by(world, rollout, acted_as_if_certain, COLLISION_AWARE, trace_lambda=0.95)

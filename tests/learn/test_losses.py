@@ -11,9 +11,7 @@ LOG_4 = math.log(4)
 SETTINGS = {"entropy_weight": 0.1, "value_weight": 0.5, "ratio_clip": 0.2, "sum_loss": False}
 
 
-def made_batch(
-    action: list[int], log_prob: list[float], advantage: list[float], value_target: list[float]
-) -> Batch:
+def made_batch(action: list[int], log_prob: list[float], advantage: list[float], value_target: list[float]) -> Batch:
     """A batch whose states do not matter."""
     count = len(action)
     return Batch(

@@ -51,9 +51,7 @@ def test_nothing_crosses_the_end_of_an_episode() -> None:
         (0.5, [0.4921875, 0.9375, 1.75], [-0.015625, -0.125, -0.25]),
     ],
 )
-def test_vtrace_worked_by_hand(
-    trace_lambda: float, targets: list[float], advantages: list[float]
-) -> None:
+def test_vtrace_worked_by_hand(trace_lambda: float, targets: list[float], advantages: list[float]) -> None:
     # rho = [0.5, 1 (of 2), 0.25]; delta = [0, 0, -0.25]
     target, advantage = vtrace(
         column(0.0, 0.0, 1.0),
@@ -95,8 +93,6 @@ def test_vtrace_segments_do_not_see_each_other_or_what_lies_between() -> None:
 
 
 def test_a_step_that_the_policy_would_never_take_teaches_nothing() -> None:
-    target, advantage = vtrace(
-        column(10.0), column(0.0), column(3.0), column(0.0), column(1.0).bool(), 0.95
-    )
+    target, advantage = vtrace(column(10.0), column(0.0), column(3.0), column(0.0), column(1.0).bool(), 0.95)
     assert target.item() == 3.0
     assert advantage.item() == 0.0

@@ -106,9 +106,7 @@ def test_kept_activations_are_those_of_the_histories_stored() -> None:
     history, target = by_scene(rollout.history, scenes), by_scene(rollout.target, scenes)
     fresh = trainer.lookup.forward(history, target, [len(history) // scenes] * scenes)
     for name in ("seen", "fused", "special", "output"):
-        torch.testing.assert_close(
-            getattr(rollout.kept, name), getattr(fresh, name), rtol=1e-5, atol=1e-6
-        )
+        torch.testing.assert_close(getattr(rollout.kept, name), getattr(fresh, name), rtol=1e-5, atol=1e-6)
     states = trainer.scale(trainer.world.features)
     scores, value = trainer.network(
         states[history], states[trainer.world.target_state][target], trainer.world.target_scene[target]
@@ -140,8 +138,7 @@ def test_a_seed_repeats_bit_for_bit_and_another_differs() -> None:
 
 def test_an_environment_walks_the_same_way_in_any_batch() -> None:
     few, many = (
-        collected(Trainer(corridor_world(), small_learner(envs=envs), COLLISION_AWARE, seed=1))
-        for envs in (4, 12)
+        collected(Trainer(corridor_world(), small_learner(envs=envs), COLLISION_AWARE, seed=1)) for envs in (4, 12)
     )
     for name in ("history", "target", "action", "reward", "truncated"):
         assert torch.equal(getattr(few, name), getattr(many, name)[:, :4])

@@ -20,9 +20,7 @@ from small_runs import corridor_world, equal_bits, small_learner, small_trainer,
 A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, step_limit=5)
 
 
-def predicted(
-    trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor
-) -> tuple[Tensor, Tensor]:
+def predicted(trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     """Scores (..., A) and values (...) of the naive network for states (..., K) and targets (...)."""
     world, states = trainer.world, trainer.scale(trainer.world.features)
     rows, wanted = history.reshape(-1, history.shape[-1]), target.reshape(-1)

@@ -31,9 +31,7 @@ def made_network(seed: int = 0) -> tuple[SiameseActorCritic, LookupNetwork]:
     return network, LookupNetwork(network, features, torch.tensor(TARGET_STATE))
 
 
-def made_rows(
-    rows_per_scene: tuple[int, ...], any_target: bool, seed: int = 0
-) -> tuple[Tensor, Tensor, Tensor]:
+def made_rows(rows_per_scene: tuple[int, ...], any_target: bool, seed: int = 0) -> tuple[Tensor, Tensor, Tensor]:
     """Histories (B, K), targets (B,), scenes (B,), ordered by scene; states and whole histories repeat."""
     rng = torch.Generator().manual_seed(seed)
     history, target, scene = [], [], []
@@ -76,9 +74,7 @@ def check_against_autograd(rows_per_scene: tuple[int, ...], any_target: bool, to
 
 
 @pytest.mark.parametrize(("rows_per_scene", "any_target"), CASES)
-def test_outputs_and_every_gradient_equal_autograd_s(
-    rows_per_scene: tuple[int, ...], any_target: bool
-) -> None:
+def test_outputs_and_every_gradient_equal_autograd_s(rows_per_scene: tuple[int, ...], any_target: bool) -> None:
     check_against_autograd(rows_per_scene, any_target, tolerance=1e-5)
 
 
@@ -95,9 +91,7 @@ def test_forward_follows_the_parameters_after_refresh() -> None:
         for parameter in network.parameters():
             parameter.mul_(0.5)
         lookup.refresh()
-        scores, value = network(
-            lookup.features[history], lookup.features[lookup.target_state][target], scene
-        )
+        scores, value = network(lookup.features[history], lookup.features[lookup.target_state][target], scene)
     kept = lookup.forward(history, target, (5, 5, 5))
     torch.testing.assert_close(kept.scores, scores, rtol=1e-5, atol=1e-6)
     torch.testing.assert_close(kept.value, value, rtol=1e-5, atol=1e-6)

@@ -169,16 +169,18 @@ class RunFolder:
         """Keep other processes from training in this folder.
 
         Raises:
-            RunError: another process trains here.
+            RunError: another process trains here, or the folder cannot be made or written to.
         """
         from filelock import FileLock, Timeout
 
-        self.path.mkdir(parents=True, exist_ok=True)
         lock = FileLock(self.path / ".lock", timeout=0)
         try:
+            self.path.mkdir(parents=True, exist_ok=True)
             lock.acquire()
         except Timeout as error:
             raise RunError(f"{self.path}: another process trains here. Choose another folder with --out") from error
+        except OSError as error:
+            raise RunError(f"{self.path}: not a folder to write to ({error}). Choose another with --out") from error
         try:
             yield
         finally:
@@ -214,11 +216,21 @@ class RunFolder:
             raise RunError(f"{path}: a setting is missing or unknown ({error}). Restore it or train again") from error
 
     def metrics(self) -> list[dict[str, float]]:
-        """All rows of metrics.jsonl; a last line that was cut off is left out."""
+        """All rows of metrics.jsonl; a last line that was cut off is left out.
+
+        Raises:
+            RunError: a line is not JSON.
+        """
         if not self.metrics_path.exists():
             return []
         lines = self.metrics_path.read_text().splitlines(keepends=True)
-        return [json.loads(line) for line in lines if line.endswith("\n")]
+        return [self._row(number, line) for number, line in enumerate(lines, 1) if line.endswith("\n")]
+
+    def _row(self, number: int, line: str) -> dict[str, float]:
+        try:
+            return json.loads(line)
+        except ValueError as error:
+            raise RunError(f"{self.metrics_path}, line {number}: not JSON ({error}). Remove the line") from error
 
     def forget_metrics_after(self, frames: int) -> None:
         """Drop rows that training will write again when it resumes from a checkpoint at `frames`."""

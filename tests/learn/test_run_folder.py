@@ -1,0 +1,152 @@
+import json
+import subprocess
+import sys
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.errors import RunError
+from clearway.learn.config import PAPER_A2C
+from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
+from clearway.reward import BUMP
+from made import corridor_scene
+from small_runs import small_request
+
+
+def made_record() -> RunRecord:
+    return small_request(learner=PAPER_A2C, reward=BUMP, paths={"grid": Path("grid.h5")}).record()
+
+
+def test_record_round_trip(tmp_path: Path) -> None:
+    folder, record = RunFolder(tmp_path / "run"), made_record()
+    assert not folder.exists
+    folder.write_record(record)
+    assert folder.exists
+    again = folder.read_record()
+    assert again == record
+    assert again.learner == PAPER_A2C
+    assert again.reward == BUMP
+    assert again.targets == {"corridor": (0, 8, 16), "grid": (5, 22)}
+    assert [scene.encoder for scene in again.scenes] == ["made-up", "made-up"]
+    assert again.scenes[0].path is None
+    assert again.scenes[1].path == str(Path("grid.h5").resolve())
+    assert set(again.versions) >= {"python", "clearway", "torch", "numpy"}
+    assert again.hardware["threads"] == 1
+
+
+def test_the_same_experiment_may_run_elsewhere_but_not_with_other_settings() -> None:
+    record = made_record()
+    elsewhere = replace(record, versions={}, hardware={}, command=("x",))
+    scenes = tuple(replace(scene, path="/elsewhere") for scene in record.scenes)
+    assert record.same_experiment(replace(elsewhere, scenes=scenes))
+    others = [
+        replace(record, seed=record.seed + 1),
+        replace(record, zone_level="cell"),
+        replace(record, reward=replace(BUMP, blocked=-0.2)),
+        replace(record, learner=replace(PAPER_A2C, envs=99)),
+        replace(record, scenes=scenes[:1]),
+        replace(record, scenes=(replace(scenes[0], digest="0"), scenes[1])),
+        replace(record, scenes=(replace(scenes[0], targets=(0, 8)), scenes[1])),
+    ]
+    assert not any(record.same_experiment(other) for other in others)
+
+
+def test_digest_changes_with_what_training_sees() -> None:
+    scene = corridor_scene()
+    assert scene_digest(scene) == scene_digest(replace(scene, name="other", observations=None, top_view=None))
+    features, graph, places = scene.features.copy(), scene.graph.copy(), scene.locations_m.copy()
+    features[3, 2] = np.nextafter(features[3, 2], np.float32(9))
+    graph[0, 0] = 8
+    places[0, 0] += 0.5
+    changed = [{"features": features}, {"graph": graph}, {"locations_m": places}, {"features": None}]
+    digests = {scene_digest(replace(scene, **change)) for change in changed} | {scene_digest(scene)}
+    assert len(digests) == 5
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "holiday.jpg").write_bytes(b"")
+    with pytest.raises(RunError, match=r"no run here \(run.json is missing\)"):
+        RunFolder(tmp_path).read_record()
+    with pytest.raises(RunError, match="no run here"):
+        RunFolder(tmp_path / "nowhere").read_record()
+
+
+def changed(content: dict, name: str, value: object) -> str:
+    return json.dumps(content | {name: value})
+
+
+def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    content = {"format_version": 1, **asdict(made_record())}
+    cases = [
+        ("", "not readable"),
+        ("{", "not readable"),
+        ("[]", "not readable"),
+        ('{"name": "somebody else\'s run"}', "not readable"),
+        (changed(content, "format_version", 2), "newer clearway"),
+        (changed(content, "learner", {"frames": 5}), "missing or unknown"),
+        (changed(content, "learner", content["learner"] | {"magic": 1}), "magic"),
+        (changed(content, "scenes", [{"name": "x"}]), "missing or unknown"),
+        (json.dumps({k: v for k, v in content.items() if k != "seed"}), "seed"),
+    ]
+    for text, message in cases:
+        (tmp_path / "run.json").write_text(text)
+        with pytest.raises(RunError, match=message):
+            folder.read_record()
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    assert folder.read_record() == made_record()
+
+
+def test_metrics_leave_out_a_line_cut_off_and_forget_what_comes_again(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    assert folder.metrics() == []
+    rows = [{"frames": frames, "loss": frames / 7} for frames in (80, 160, 240)]
+    text = "".join(json.dumps(row) + "\n" for row in rows)
+    folder.metrics_path.write_text(text + '{"frames": 320, "lo')
+    assert folder.metrics() == rows
+    folder.forget_metrics_after(160)
+    assert folder.metrics() == rows[:2]
+    assert folder.metrics_path.read_text().endswith("}\n")
+    folder.forget_metrics_after(-1)
+    assert folder.metrics_path.read_text() == ""
+
+
+def test_metrics_that_are_no_json_lines_are_refused(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    folder.metrics_path.write_text('{"frames": 80}\nnot a row\n')
+    with pytest.raises(RunError, match=r"metrics.jsonl, line 2"):
+        folder.metrics()
+
+
+HOLD = """
+import sys
+from pathlib import Path
+from clearway.learn.run_folder import RunFolder
+with RunFolder(Path(sys.argv[1])).held():
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_second_process_is_refused_until_the_first_lets_go(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", HOLD, str(tmp_path)]
+    environment = {"PYTHONPATH": ":".join(sys.path)}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout.readline() == "held\n"
+        with pytest.raises(RunError, match="another process trains here"):
+            with RunFolder(tmp_path).held():
+                pass
+        process.kill()  # the lock of a killed process holds nobody up
+    with RunFolder(tmp_path).held():
+        pass
+
+
+def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("")
+    with pytest.raises(RunError, match="out"):
+        with RunFolder(tmp_path / "out").held():
+            pass
