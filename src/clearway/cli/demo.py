@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,8 +30,11 @@ class Demo:
     def run(self) -> None:
         """Run the demo."""
         from clearway.experiments.demo import DemoRequest, run_demo
+        from clearway.viz.demo_page import make_demo_page
 
-        result = run_demo(DemoRequest(self.out, self.seed, self.frames, self.encoder), show_progress=True)
+        request = DemoRequest(self.out, self.seed, self.frames, self.encoder)
+        result = run_demo(request, show_progress=True)
+        page = make_demo_page(result, self._command())
         if self.json:
             print_json([evaluation.to_json() for evaluation in result.evaluations])
             return
@@ -39,4 +43,8 @@ class Demo:
         from clearway.evaluate.tables import rich_table
 
         Console().print(rich_table(result.evaluations, "scenes"))
-        stderr_console().print(f"open {result.page}", highlight=False)
+        stderr_console().print(f"open {page}", highlight=False)
+
+    def _command(self) -> str:
+        words = ["clearway", "demo", "--out", str(self.out), "--seed", str(self.seed)]
+        return shlex.join([*words, "--frames", str(self.frames), "--encoder", self.encoder])

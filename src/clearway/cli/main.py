@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"clearway {__version__}")
         return
     command = tyro.cli(
-        Command,  # type: ignore[arg-type]  # a union of annotated types is not a type to mypy
+        Command,
         args=words,
         prog="clearway",
         description=DESCRIPTION,

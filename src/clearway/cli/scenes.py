@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -101,7 +101,7 @@ class Inspect:
         (path,) = scene_files([self.file])
         scene = read_scene(path)
         zones = scene_zones(scene)
-        content = {**summary(scene).to_json(), "zones": zone_counts(zones)}
+        content = {**asdict(summary(scene)), "zones": zone_counts(zones)}
         if self.map:
             from clearway.viz.maps import draw_map
 

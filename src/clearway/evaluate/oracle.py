@@ -1,4 +1,4 @@
-"""Exact yardsticks: what the best agent, and an ideally trained one, would do. Dynamic programming, no learning, no noise.
+"""Exact yardsticks: what the best agent, and an ideally trained one, would do, by dynamic programming.
 
 For one scene, target and reward:
 

@@ -1,0 +1,1 @@
+"""Experiments: what is run to show something, built from the parts below."""

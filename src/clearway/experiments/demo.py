@@ -1,0 +1,136 @@
+"""The demo: build the bathroom, train both rewards, evaluate both beside a random and a shortest-path agent."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from clearway.errors import ClearwayError
+from clearway.evaluate.report import Evaluation
+from clearway.evaluate.run import evaluate_runs
+from clearway.evaluate.showcase import Showcase, showcases
+from clearway.files import written_whole
+from clearway.learn.config import DEFAULT
+from clearway.learn.load import Agent, load_agent, run_world
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.train import RunRequest, train
+from clearway.perception import encode_scenes
+from clearway.reward import COLLISION_AWARE, SHORTEST
+from clearway.scenes.library import cached_room_scene
+from clearway.scenes.scene import Scene
+from clearway.scenes.targets import default_targets
+from clearway.scenes.thor_v1 import read_scene, write_scene
+
+ROOM = "bathroom"
+REWARDS = (COLLISION_AWARE, SHORTEST)
+MARK = "demo.json"  # tells a demo's folder from a user's own
+
+
+@dataclass(frozen=True)
+class DemoRequest:
+    """What to show.
+
+    Attributes:
+        out: folder for everything.
+        seed: of the agents.
+        frames: training frames of each agent.
+        encoder: name of the encoder.
+    """
+
+    out: Path
+    seed: int
+    frames: int
+    encoder: str
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """What came of it.
+
+    Attributes:
+        out: the folder.
+        scene: the bathroom with its features.
+        runs: run folder of each agent by the name of its reward.
+        evaluations: of both agents (sampled and argmax), the random and the shortest-path agent.
+        showcase: one episode that both agents walked.
+        seconds: of building (with encoding), training, evaluating.
+    """
+
+    out: Path
+    scene: Scene
+    runs: dict[str, RunFolder]
+    evaluations: list[Evaluation]
+    showcase: Showcase
+    seconds: dict[str, float]
+
+
+def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
+    """Run the demo in `request.out`, in place of an earlier one there.
+
+    Raises:
+        ClearwayError: the folder holds something else, or a part of the demo cannot run here.
+    """
+    _clear(request.out)
+    clock = _Clock()
+    room = cached_room_scene(ROOM, progress=show_progress)
+    (encoded,) = encode_scenes([room], request.encoder, progress=show_progress)
+    path = request.out / f"{ROOM}.h5"
+    write_scene(encoded, path)
+    scene = read_scene(path)
+    clock.lap("room and features")
+    runs = {
+        reward.name: train(
+            RunRequest(
+                scenes=[scene],
+                targets={scene.name: default_targets(scene)},
+                learner=replace(DEFAULT, frames=request.frames),
+                reward=reward,
+                seed=request.seed,
+                paths={scene.name: path},
+            ),
+            request.out / "runs" / reward.name,
+            show_progress=show_progress,
+        )
+        for reward in REWARDS
+    }
+    clock.lap("training, both agents")
+    agents = {name: load_agent(run.path) for name, run in runs.items()}
+    evaluations = evaluate_runs(agents, [scene], seed=request.seed)
+    with written_whole(request.out / "evaluation.json") as part:
+        part.write_text(json.dumps([evaluation.to_json() for evaluation in evaluations], indent=2) + "\n")
+    clock.lap("evaluation")
+    return DemoResult(
+        request.out, scene, runs, evaluations, _showcase(agents, scene, request.seed), dict(clock.seconds)
+    )
+
+
+def _showcase(agents: dict[str, Agent], scene: Scene, seed: int) -> Showcase:
+    record = next(iter(agents.values())).record
+    world = run_world(record, [scene])
+    policies = {name: agent.policy(world) for name, agent in agents.items()}
+    return showcases(world, policies, seed=seed, history_length=record.learner.history_length)[0]
+
+
+def _clear(folder: Path) -> None:
+    """An empty folder with our mark; what an earlier demo left there goes."""
+    if folder.exists():
+        if not folder.is_dir() or (any(folder.iterdir()) and not (folder / MARK).exists()):
+            raise ClearwayError(f"{folder}: exists and is not a demo's folder. Give another one with --out")
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True)
+    (folder / MARK).write_text('{"made_by": "clearway demo"}\n')
+
+
+class _Clock:
+    """Seconds of one thing after another."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._since = time.monotonic()
+
+    def lap(self, name: str) -> None:
+        now = time.monotonic()
+        self.seconds[name], self._since = now - self._since, now

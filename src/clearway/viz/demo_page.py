@@ -1,0 +1,134 @@
+"""The demo's pictures and its page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from clearway.evaluate.report import Evaluation
+from clearway.evaluate.tables import table_text
+from clearway.experiments.demo import DemoResult
+from clearway.learn.run_folder import hardware, package_versions
+from clearway.viz.contact_sheet import draw_contact_sheet
+from clearway.viz.curves import draw_curves
+from clearway.viz.maps import Walk, draw_map
+from clearway.viz.page import KeyFigure, Page, Picture, write_page
+from clearway.zones import scene_zones
+
+PICTURES = "pictures"
+VIEWS = 6  # first-person pictures of the room
+SENTENCE = (
+    "Two agents learnt to walk to the place where a picture was taken, from pictures alone: one is paid to anticipate "
+    "collisions, the other to take the shortest way."
+)
+
+
+def make_demo_page(result: DemoResult, command: str) -> Path:
+    """Draw the pictures of a demo and write its index.html; returns the page's path.
+
+    command: the command line that made the demo.
+    """
+    first = result.evaluations[0]
+    page = Page(
+        title="clearway: anticipating collisions on the way to a picture",
+        sentence=SENTENCE,
+        key_figures=_key_figures(result.evaluations),
+        maps=_maps(result),
+        rooms=_views(result),
+        table=table_text(result.evaluations, "scenes"),
+        more_tables={"Every target": table_text(result.evaluations, "targets")},
+        contact_sheets=_contact_sheets(result),
+        curves=_curves(result),
+        commands=(command,),
+        facts={
+            "encoder": first.encoder,
+            "room": f"{result.scene.name}, {result.scene.cell_count} cells, {result.scene.state_count} poses",
+            "training": _training(result),
+            "evaluation": f"{first.protocol.episodes_per_target} episodes a target from random starts, at most "
+            f"{first.protocol.step_cap:,} steps; intervals are 95 % bootstrap",
+            "seconds": ", ".join(f"{name} {seconds:.0f}" for name, seconds in result.seconds.items()),
+            "versions": ", ".join(f"{name} {version}" for name, version in package_versions().items()),
+            "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
+        },
+    )
+    return write_page(result.out, page)
+
+
+def _key_figures(evaluations: Sequence[Evaluation]) -> list[KeyFigure]:
+    shortest = evaluations[-1].average.values["steps"]
+    figures = []
+    for evaluation in evaluations:
+        if evaluation.protocol.action_selection == "sampled" and evaluation.agent in ("collision-aware", "shortest"):
+            values, intervals = evaluation.average.values, evaluation.average.intervals
+            low, high = intervals["collisions"]
+            figures += [
+                KeyFigure(f"{evaluation.agent}: steps", f"{values['steps']:.2f}", f"shortest path {shortest:.2f}"),
+                KeyFigure(
+                    f"{evaluation.agent}: collisions", f"{values['collisions']:.3f}", f"95 %: {low:.3f} to {high:.3f}"
+                ),
+            ]
+    return figures
+
+
+def _training(result: DemoResult) -> str:
+    record = next(iter(result.runs.values())).read_record()
+    return f"{record.learner.algorithm.upper()}, {record.learner.frames:,} frames an agent, seed {record.seed}"
+
+
+def _maps(result: DemoResult) -> list[Picture]:
+    show, file = result.showcase, f"{PICTURES}/map.png"
+    draw_map(
+        result.scene,
+        result.out / file,
+        zones=scene_zones(result.scene),
+        target=show.target,
+        walks=[Walk(name, walk.states) for name, walk in show.walks.items()],
+    )
+    steps = ", ".join(f"{name} {len(walk.actions)}" for name, walk in show.walks.items())
+    caption = f"The same start and target for both agents. Steps: {steps}; shortest path {show.shortest_path_steps}."
+    return [Picture(file, caption, "The room from above with zones and the ways of both agents")]
+
+
+def _contact_sheets(result: DemoResult) -> list[Picture]:
+    zones, show = scene_zones(result.scene), result.showcase
+    pictures = []
+    for name, walk in show.walks.items():
+        file = f"{PICTURES}/episode-{name}.png"
+        draw_contact_sheet(
+            result.scene,
+            result.out / file,
+            states=walk.states,
+            actions=walk.actions,
+            zones=zones,
+            target=show.target,
+            title=f"{name} agent",
+        )
+        pictures.append(Picture(file, f"What the {name} agent saw on that way."))
+    return pictures
+
+
+def _curves(result: DemoResult) -> list[Picture]:
+    file = f"{PICTURES}/curves.png"
+    draw_curves({name: run.metrics() for name, run in result.runs.items()}, result.out / file)
+    return [Picture(file, "Training episodes: sampled actions, random starts, cut after 200 steps.", "Learning curves")]
+
+
+def _views(result: DemoResult) -> list[Picture]:
+    """Pictures from poses spread over the room, the most varied of each cell."""
+    from PIL import Image
+
+    scene = result.scene
+    assert scene.observations is not None
+    pictures = []
+    for number, cell in enumerate(np.linspace(0, scene.cell_count - 1, VIEWS).astype(int)):
+        poses = np.flatnonzero(scene.cells == cell)
+        views = scene.observations[poses]
+        pose = int(np.argmax(views.reshape(len(views), -1).std(1)))
+        file = f"{PICTURES}/view-{number}.png"
+        Image.fromarray(views[pose]).save(result.out / file)
+        x_m, z_m = scene.locations_m[poses[pose]]
+        heading = scene.headings_deg[poses[pose]]
+        pictures.append(Picture(file, f"From x {x_m:.2f} m, z {z_m:.2f} m, heading {heading}°"))
+    return pictures
