@@ -49,8 +49,8 @@ def small_network(world: World, width: int = 16, seed: int = 0) -> SiameseActorC
 
 
 def small_learner(learner: Learner = DEFAULT, **changes: Any) -> Learner:
-    """Settings for 10 environments, 8 steps, 25 updates, where `changes` do not say otherwise."""
-    small: dict[str, Any] = {"frames": 2000, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
+    """Settings for 10 environments, 8 steps, 10 updates, where `changes` do not say otherwise."""
+    small: dict[str, Any] = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
     return replace(learner, **(small | changes))
 
 

@@ -117,7 +117,7 @@ def test_rewards_are_clipped_and_scaled_as_set() -> None:
 
 
 def test_schedules_run_from_start_to_end() -> None:
-    learner = small_learner(frames=800, lr_start=1e-2, lr_end=1e-3, entropy_start=0.1, entropy_end=0.001)
+    learner = small_learner(lr_start=1e-2, lr_end=1e-3, entropy_start=0.1, entropy_end=0.001)
     trainer = small_trainer(learner)
     updates = [trainer.update() for _ in range(10)]
     assert trainer.finished

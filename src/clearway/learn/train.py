@@ -93,6 +93,9 @@ def train(request: RunRequest, out: Path, *, resume: bool = False, show_progress
 def _prepare(folder: RunFolder, record: RunRecord, trainer: Trainer, resume: bool) -> float:
     """Begin a new run or load the newest checkpoint; returns the seconds trained so far."""
     if not folder.exists:
+        for left in (folder.metrics_path, folder.checkpoints):
+            if left.exists():
+                raise RunError(f"{folder.path}: holds {left.name} but no run.json. Empty it, or give another --out")
         folder.write_record(record)
         return 0.0
     if not resume:

@@ -1,0 +1,122 @@
+"""A trained agent brought back through its run folder and scene files."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from clearway.errors import RunError
+from clearway.learn.checkpoint import newest_checkpoint
+from clearway.learn.load import load_agent, run_scenes, run_world
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.train import RunRequest, save, train
+from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from small_runs import small_learner, small_request, small_scenes
+
+
+def request_with_files(folder: Path) -> RunRequest:
+    """A request whose scenes were read from files."""
+    paths = {scene.name: folder / f"{scene.name}.h5" for scene in small_scenes()}
+    for scene in small_scenes():
+        write_scene(scene, paths[scene.name])
+    scenes = [read_scene(path) for path in paths.values()]
+    return small_request(scenes=scenes, paths=paths, learner=small_learner(frames=160))
+
+
+def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path) -> None:
+    request = request_with_files(tmp_path)
+    trainer = request.trainer()
+    for _ in range(3):
+        trainer.update()
+    folder = RunFolder(tmp_path / "run")
+    folder.write_record(request.record())
+    save(trainer, folder, seconds=1.0)
+
+    agent = load_agent(folder.path)
+    world = run_world(agent.record, run_scenes(agent.record))
+    assert world.scene_names == ("corridor", "grid")
+    assert torch.equal(world.target_state, trainer.world.target_state)
+    target = torch.tensor([4, 0, 3, 1, 1, 2, 0, 4, 4])  # scenes in any order
+    first = world.scene_offset[world.target_scene[target]]
+    history = first[:, None] + torch.randint(20, (9, 4), generator=torch.Generator().manual_seed(0))
+    found = agent.policy(world)(history, target)
+    states = trainer.scale(trainer.world.features)
+    with torch.no_grad():
+        scores, _ = trainer.network(states[history], states[world.target_state][target], world.target_scene[target])
+    torch.testing.assert_close(found, torch.softmax(scores, 1), rtol=1e-4, atol=1e-6)
+    torch.testing.assert_close(found.sum(1), torch.ones(9))
+    assert (found.max(1).values > 0.26).any()  # three updates have moved it off the uniform policy
+
+
+def test_an_earlier_checkpoint_can_be_asked_for(tmp_path: Path) -> None:
+    request = small_request()
+    trainer, folder = request.trainer(), RunFolder(tmp_path / "run")
+    folder.write_record(request.record())
+    save(trainer, folder, seconds=0.0)
+    untrained = newest_checkpoint(folder.checkpoints)
+    trainer.update()
+    save(trainer, folder, seconds=1.0)
+    weights = [load_agent(folder.path, path).network.siamese_weight for path in (None, untrained)]
+    assert torch.equal(weights[0], trainer.network.siamese_weight)
+    assert not torch.equal(*weights)
+
+
+def changed(scene: Scene) -> Scene:
+    features = scene.features.copy()
+    features[4, 1] += np.float32(1e-3)
+    return replace(scene, features=features)
+
+
+def test_a_scene_whose_features_changed_is_refused(tmp_path: Path) -> None:
+    request = request_with_files(tmp_path)
+    record = train(request, tmp_path / "run").read_record()
+    assert [scene.name for scene in run_scenes(record)] == ["corridor", "grid"]
+    write_scene(changed(request.scenes[1]), tmp_path / "grid.h5")
+    with pytest.raises(RunError, match=r"grid\.h5: not the scene that the run was trained on"):
+        run_scenes(record)
+
+
+def test_files_given_replace_those_recorded_in_the_run_s_order(tmp_path: Path) -> None:
+    request = request_with_files(tmp_path)
+    record = train(request, tmp_path / "run").read_record()
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    for name in ("corridor.h5", "grid.h5"):
+        (tmp_path / name).rename(moved / name)
+    with pytest.raises(RunError, match="file is missing"):
+        run_scenes(record)
+    with pytest.raises(RunError, match="scene grid of the run is not among the files given"):
+        run_scenes(record, [moved / "corridor.h5"])
+    scenes = run_scenes(record, [moved / "grid.h5", moved / "corridor.h5"])
+    assert [scene.name for scene in scenes] == ["corridor", "grid"]
+
+
+def test_a_scene_made_in_memory_has_no_file_to_come_back_from(tmp_path: Path) -> None:
+    record = train(small_request(learner=small_learner(frames=80)), tmp_path / "run").read_record()
+    with pytest.raises(RunError, match="corridor: the run's scene file is missing"):
+        run_scenes(record)
+
+
+def test_a_scene_in_memory_and_read_back_from_its_file_are_the_same_to_a_run(tmp_path: Path) -> None:
+    from_files = request_with_files(tmp_path)
+    in_memory = small_request(learner=small_learner(frames=160))
+    assert in_memory.record().same_experiment(from_files.record())
+
+
+def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
+    run = train(small_request(learner=small_learner(frames=80)), tmp_path / "run")
+    wider = train(small_request(learner=small_learner(frames=80, width=24)), tmp_path / "wider")
+    with pytest.raises(RunError, match="does not fit its run"):
+        load_agent(run.path, newest_checkpoint(wider.checkpoints))
+    with pytest.raises(RunError, match="no run here"):
+        load_agent(tmp_path)
+
+
+def test_a_world_without_features_is_refused(tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=80))
+    agent = load_agent(train(request, tmp_path / "run").path)
+    with pytest.raises(RunError, match="no features"):
+        agent.policy(replace(request.trainer().world, features=None))

@@ -1,0 +1,217 @@
+"""Whole runs: files, interruption, resuming."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from clearway.errors import RunError
+from clearway.learn import checkpoint, train
+from clearway.learn.checkpoint import Progress, newest_checkpoint, read_network, read_progress, read_training
+from clearway.learn.config import PAPER_A2C
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.trainer import Trainer, Update
+from clearway.reward import SHORTEST
+from small_runs import equal_bits, small_learner, small_request
+
+
+def without_seconds(folder: RunFolder) -> list[dict[str, float]]:
+    return [{name: value for name, value in row.items() if name != "seconds"} for row in folder.metrics()]
+
+
+def interrupt_at(monkeypatch: pytest.MonkeyPatch, frames: int, number: int = signal.SIGINT) -> None:
+    """Send the signal in the middle of the update that reaches `frames`."""
+    whole = Trainer.update
+
+    def update(trainer: Trainer) -> Update:
+        if trainer.frames + trainer.frames_per_update == frames:
+            signal.raise_signal(number)
+        return whole(trainer)
+
+    monkeypatch.setattr(Trainer, "update", update)
+
+
+def test_a_run_leaves_record_metrics_and_checkpoint(tmp_path: Path) -> None:
+    request = small_request()
+    folder = train.train(request, tmp_path / "run")
+    assert folder.read_record().same_experiment(request.record())
+    rows = folder.metrics()
+    assert [row["frames"] for row in rows] == [80 * k for k in range(1, 11)]
+    assert {"seconds", "episodes", "success", "solved_targets", "loss", "entropy", "lr"} <= set(rows[0])
+    progress = read_progress(newest_checkpoint(folder.checkpoints))
+    assert (progress.frames, progress.updates) == (800, 10)
+    assert progress.seconds == pytest.approx(rows[-1]["seconds"], abs=1e-3)
+
+
+@pytest.mark.parametrize("preset", ["default", "paper"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_resumes_to_the_same_bits(
+    preset: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = small_request()
+    if preset == "paper":
+        request = replace(request, learner=small_learner(PAPER_A2C))
+    whole = train.train(request, tmp_path / "whole")
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    with monkeypatch.context() as patch:
+        interrupt_at(patch, 480, number)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(request, tmp_path / "parts")
+    assert {n: signal.getsignal(n) for n in before} == before
+    parts = RunFolder(tmp_path / "parts")
+    assert read_progress(newest_checkpoint(parts.checkpoints)).frames == 480  # the update was finished and saved
+    train.train(request, tmp_path / "parts", resume=True)
+    ends = [newest_checkpoint(folder.checkpoints) for folder in (whole, parts)]
+    assert equal_bits(*[read_network(end) for end in ends])
+    assert equal_bits(*[read_training(end) for end in ends])  # optimiser, streams, episodes, statistics
+    assert without_seconds(whole) == without_seconds(parts)
+
+
+def test_resuming_from_an_earlier_checkpoint_cuts_the_metrics_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request, out = small_request(), tmp_path / "run"
+    monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    whole = train.train(request, tmp_path / "whole")
+    folder = train.train(request, out)
+    newest = newest_checkpoint(folder.checkpoints)
+    (newest / "training.safetensors").write_bytes(b"torn")
+    with pytest.warns(UserWarning, match="an earlier checkpoint is used"):
+        train.train(request, out, resume=True)
+    assert without_seconds(folder) == without_seconds(whole)
+    assert equal_bits(*[read_network(newest_checkpoint(f.checkpoints)) for f in (whole, folder)])
+
+
+def test_resuming_a_finished_run_changes_nothing(tmp_path: Path) -> None:
+    folder = train.train(small_request(), tmp_path)
+    rows, network = folder.metrics(), read_network(newest_checkpoint(folder.checkpoints))
+    train.train(small_request(), tmp_path, resume=True)
+    assert folder.metrics() == rows
+    assert equal_bits(read_network(newest_checkpoint(folder.checkpoints)), network)
+
+
+def test_resume_begins_where_there_is_no_run_or_no_checkpoint_yet(tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=160))
+    folder = RunFolder(tmp_path / "killed early")
+    folder.write_record(request.record())
+    folder.metrics_path.write_text('{"frames": 80, "loss": 1}\n')
+    train.train(request, folder.path, resume=True)
+    new = train.train(request, tmp_path / "new", resume=True)
+    assert without_seconds(folder) == without_seconds(new)
+    assert len(new.metrics()) == 2
+
+
+def test_a_folder_that_holds_a_run_is_not_begun_anew(tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=160))
+    folder = train.train(request, tmp_path)
+    before = folder.metrics_path.read_text()
+    with pytest.raises(RunError, match="holds a run already"):
+        train.train(request, tmp_path)
+    assert folder.metrics_path.read_text() == before
+
+
+@pytest.mark.parametrize("name", ["metrics.jsonl", "checkpoints"])
+def test_what_another_run_left_without_its_run_json_is_not_mixed_in(name: str, tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=160))
+    folder = train.train(request, tmp_path)
+    (tmp_path / "run.json").unlink()
+    (folder.metrics_path if name == "checkpoints" else folder.checkpoints).rename(tmp_path / "elsewhere")
+    for resume in (False, True):
+        with pytest.raises(RunError, match=f"holds {name} but no run.json"):
+            train.train(request, tmp_path, resume=resume)
+
+
+def test_resuming_another_experiment_is_refused(tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=160))
+    train.train(request, tmp_path)
+    for other in (
+        replace(request, seed=4),
+        replace(request, reward=SHORTEST),
+        replace(request, zone_level="cell"),
+        replace(request, learner=small_learner(frames=160, discount=0.9)),
+    ):
+        with pytest.raises(RunError, match="holds another experiment"):
+            train.train(other, tmp_path, resume=True)
+    with pytest.raises(RunError, match="Give --frames 160"):
+        train.train(replace(request, learner=small_learner(frames=320)), tmp_path, resume=True)
+
+
+def test_a_full_disk_stops_the_run_and_the_checkpoint_before_it_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    save, calls = checkpoint.save_file, []
+
+    def full(*arguments: object) -> None:
+        calls.append(arguments)
+        if len(calls) > 6:  # two files a checkpoint
+            raise OSError(28, "No space left on device")
+        save(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "save_file", full)
+        with pytest.raises(RunError, match="No space left"):
+            train.train(small_request(), tmp_path / "run")
+    folder = RunFolder(tmp_path / "run")
+    assert read_progress(newest_checkpoint(folder.checkpoints)).frames == 240
+    train.train(small_request(), folder.path, resume=True)
+    assert without_seconds(folder) == without_seconds(train.train(small_request(), tmp_path / "whole"))
+
+
+def test_numbers_that_are_not_finite_stop_the_run_and_the_checkpoint_before_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    whole = Trainer.update
+
+    def update(trainer: Trainer) -> Update:
+        if trainer.updates == 2:
+            with torch.no_grad():
+                trainer.network.fusion_bias[0] = torch.nan
+        return whole(trainer)
+
+    monkeypatch.setattr(Trainer, "update", update)
+    with pytest.raises(RunError, match="nan after 240 frames"):
+        train.train(small_request(), tmp_path)
+    kept = newest_checkpoint(RunFolder(tmp_path).checkpoints)
+    assert read_progress(kept).frames == 160
+    assert all(tensor.isfinite().all() for tensor in read_network(kept).values())
+
+
+RUN = """
+import sys
+from pathlib import Path
+from clearway.learn import train
+from small_runs import small_learner, small_request
+train.set_threads(1)
+train.train(small_request(learner=small_learner(frames=800_000)), Path(sys.argv[1]))
+"""
+
+
+def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", RUN, str(tmp_path)]
+    metrics = tmp_path / "metrics.jsonl"
+    environment = os.environ | {"PYTHONPATH": ":".join(sys.path)}
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
+        deadline = time.monotonic() + 60
+        while not metrics.exists() or not metrics.stat().st_size:
+            assert process.poll() is None, process.stderr.read()
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGINT  # Python's answer to an uncaught KeyboardInterrupt
+    assert errors.rstrip().endswith("KeyboardInterrupt")
+    folder = RunFolder(tmp_path)
+    progress = read_progress(newest_checkpoint(folder.checkpoints))
+    assert progress.frames == 80 * progress.updates > 0
+    request = small_request(learner=small_learner(frames=800_000))
+    trainer = request.trainer()
+    assert train._prepare(folder, request.record(), trainer, resume=True) == progress.seconds
+    assert Progress(trainer.frames, trainer.updates, progress.seconds) == progress
