@@ -190,7 +190,7 @@ from pathlib import Path
 from clearway.learn import train
 from small_runs import small_learner, small_request
 train.set_threads(1)
-train.train(small_request(learner=small_learner(frames=800_000)), Path(sys.argv[1]))
+train.train(small_request(learner=small_learner(frames=160_000)), Path(sys.argv[1]))
 """
 
 
@@ -211,7 +211,7 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
     progress = read_progress(newest_checkpoint(folder.checkpoints))
     assert progress.frames == 80 * progress.updates > 0
-    request = small_request(learner=small_learner(frames=800_000))
+    request = small_request(learner=small_learner(frames=160_000))
     trainer = request.trainer()
     assert train._prepare(folder, request.record(), trainer, resume=True) == progress.seconds
     assert Progress(trainer.frames, trainer.updates, progress.seconds) == progress
