@@ -99,5 +99,5 @@ def with_rug(
 def aged(room: Room, wall: np.ndarray) -> np.ndarray:
     """A wall with faint stains that nowhere repeat, so that no two places look alike."""
     rows, columns = wall.shape[:2]
-    stains = textures.noise(room.rng, rows, columns, 1.3)[..., None] - 0.5
-    return np.clip(wall * (1 + 0.3 * stains), 0, 1)
+    stains = textures.noise(room.rng, rows, columns, 1.3, stretch_y=columns / rows)[..., None] - 0.5
+    return np.clip(wall * (1 + 0.16 * stains), 0, 1)

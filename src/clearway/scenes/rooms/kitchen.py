@@ -74,6 +74,7 @@ def _place_kitchen(room: Room) -> None:
     decor.painting(room, DINING_WALL.face("west", 4.0, 1.55), 0.6, 0.8)
     decor.clock(room, room.wall("north", 4.2, 1.8), 0.18)
     decor.hooks(room, DINING_WALL.face("west", 5.2, 1.6))
+    decor.painting(room, DINING_WALL.face("west", 1.6, 1.35), 1.1, 0.9, "oak")
 
 
 def _place_south_counter(room: Room) -> None:

@@ -153,9 +153,16 @@ def _add_column(room: Room, number: int, column: Column, finish: Finish) -> None
         length, reach = (width, depth / 2) if yaw % 180 == 0 else (depth, width / 2)
         face = Frame(frame.x_m, frame.y_m, yaw)  # its y points away from the column
         corner, other = face.point(length / 2, reach, 0), face.point(-length / 2, reach, 0)
-        albedo = np.roll(finish.partitions, 97 * number + 2 * yaw, axis=1)[: pixels(height), : pixels(length)]
+        albedo = _piece_of(finish.partitions, length, height, 97 * number + 2 * yaw)
         _surface(room, f"column {number} face {yaw}", corner, other - corner, up, albedo)
         if finish.skirting:
             room.box(face, (0, reach + 0.008, 0), (length + 0.032, 0.016, 0.09), finish.skirting, 0.004)
     if height < room.height_m:
         room.box(frame, (0, 0, height), (width + 0.04, depth + 0.04, 0.03), "trim", 0.008)
+
+
+def _piece_of(picture: np.ndarray, width_m: float, height_m: float, shift_px: int) -> np.ndarray:
+    """A piece of a wall's picture, cut out at a place that depends on `shift_px`."""
+    spare = max(picture.shape[1] - pixels(width_m), 0)
+    first = shift_px % (spare + 1)
+    return picture[: pixels(height_m), first : first + pixels(width_m)]

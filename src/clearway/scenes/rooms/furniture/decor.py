@@ -8,7 +8,7 @@ import numpy as np
 
 from clearway.scenes.rooms import pictures
 from clearway.scenes.rooms.frame import Frame, along, turn
-from clearway.scenes.rooms.room import Point, Room
+from clearway.scenes.rooms.room import Room
 
 LYING = turn("x", -90)
 VASES = (
@@ -129,14 +129,14 @@ def flowers(room: Room, at: Frame, z_m: float) -> None:
 def plant(room: Room, at: Frame, height_m: float = 1.2, pot: str = "terracotta") -> None:
     """A leafy plant in a pot that stands on the floor."""
     _pot(room, at, 0.0, 0.19, 0.33, pot)
-    _leaves(room, at, 0.3, height_m, 24)
+    _leaves(room, at, 0.3, height_m, 26, 0.24)
     room.post(at, 0.2, max(1.0, 0.8 * height_m))
 
 
 def pot_plant(room: Room, at: Frame, z_m: float, height_m: float = 0.32) -> None:
     """A small plant for a table or a sill."""
     _pot(room, at, z_m, 0.07, 0.11, str(room.rng.choice(("terracotta", "porcelain", "cream"))))
-    _leaves(room, at, z_m + 0.1, height_m, 12)
+    _leaves(room, at, z_m + 0.1, height_m, 12, 0.17)
 
 
 def _pot(room: Room, at: Frame, z_m: float, radius_m: float, height_m: float, material: str) -> None:
@@ -145,23 +145,19 @@ def _pot(room: Room, at: Frame, z_m: float, radius_m: float, height_m: float, ma
     room.cylinder(at, (0, 0, z_m + height_m * 0.8), radius_m * 0.86, height_m * 0.06, "soil")
 
 
-def _leaves(room: Room, at: Frame, z_m: float, height_m: float, count: int) -> None:
-    """Pointed leaves that rise from one place and lean outwards."""
+def _leaves(room: Room, at: Frame, z_m: float, height_m: float, count: int, reach_m: float) -> None:
+    """Pointed leaves that rise from one place and lean outwards, at most `reach_m` to the side."""
     rng = room.rng
+    half_width = 0.022 + 0.02 * height_m
     for number in range(count):
-        around, rise = number * 2.4 + rng.uniform(-0.3, 0.3), rng.uniform(0.35, 1.4)
+        around, rise = number * 2.4 + rng.uniform(-0.3, 0.3), rng.uniform(0.45, 1.45)
         direction = np.array([math.cos(around) * math.cos(rise), math.sin(around) * math.cos(rise), math.sin(rise)])
-        length = height_m * rng.uniform(0.2, 0.34)
-        stem = height_m * rng.uniform(0.0, 0.3) * math.sin(rise)
-        centre: Point = tuple(np.array([0, 0, z_m + stem]) + direction * length * 0.95)
-        room.ball(
-            at,
-            centre,
-            (0.028 + 0.03 * height_m, 0.007, length),
-            str(rng.choice(("leaf", "young leaf"))),
-            along(direction),
-            8,
-        )
+        longest = (reach_m - half_width) / (1.95 * math.cos(rise))
+        length = min(height_m * rng.uniform(0.2, 0.34), longest)
+        stem = height_m * rng.uniform(0.0, 0.32) * math.sin(rise)
+        x, y, z = np.array([0, 0, z_m + stem]) + direction * length * 0.95
+        green = str(rng.choice(("leaf", "young leaf")))
+        room.ball(at, (x, y, z), (half_width, 0.007, length), green, along(direction), 8)
 
 
 def basket(room: Room, at: Frame, height_m: float = 0.5, material: str = "basket") -> None:
