@@ -72,9 +72,13 @@ def naive_update(trainer: Trainer, lr: float) -> SiameseActorCritic:
 
 @torch.no_grad()
 def published_step(network: SiameseActorCritic, clip_norm: float, lr: float) -> None:
-    """The first step of the published RMSProp after clipping tensor by tensor."""
+    """The first step of the published RMSProp after clipping layer by layer and head by head."""
     for parameter in network.parameters():
-        parameter.grad *= min(1.0, clip_norm / parameter.grad.norm().item())
+        parts = [parameter.grad]
+        if len(parameter) == network.shape.scene_count and parameter is not network.fusion_weight:
+            parts = [part for head in parameter.grad for part in ((head[:4], head[4:]) if len(head) == 5 else (head,))]
+        for part in parts:
+            part *= min(1.0, clip_norm / part.norm().item())
         parameter -= lr * parameter.grad / (0.99 + 0.01 * parameter.grad**2 + 0.1).sqrt()
 
 

@@ -68,3 +68,17 @@ def test_constant_features_and_the_identity() -> None:
     constant = torch.full((4, 3), 2.5)
     assert torch.equal(FeatureScale.centred(constant)(constant), torch.zeros(4, 3))
     assert torch.equal(FeatureScale.identity(constant)(constant), constant)
+
+
+def test_layer_gradients_are_the_published_network_s_tensors() -> None:
+    """Zhu's code has a weight and a bias for every layer, and a scene layer, a policy and a value for every scene."""
+    network = SiameseActorCritic(NetworkShape(scene_count=3, feature_count=5, width=8))
+    for parameter in network.parameters():
+        parameter.grad = torch.zeros_like(parameter)
+    views = network.layer_gradients()
+    assert len(views) == 2 + 2 + 3 * (2 + 2 + 2)
+    for view in views:
+        view += 1
+    assert all((parameter.grad == 1).all() for parameter in network.parameters())  # each number lies in one of them
+    sizes = sorted(view.numel() for view in views)
+    assert sizes == sorted([160, 8, 128, 8] + 3 * [64, 8, 32, 4, 8, 1])

@@ -86,12 +86,11 @@ class SharedRMSProp:
 
 
 @torch.no_grad()
-def clip_gradients(parameters: Sequence[nn.Parameter], limit: float, each_tensor: bool) -> Tensor:
-    """Scale gradients down to a norm of at most `limit`; returns the norm of all together before that, a scalar.
+def clip_gradients(gradients: Sequence[Tensor], limit: float, each_tensor: bool) -> Tensor:
+    """Scale gradients down, in place, to a norm of at most `limit`; returns the norm of all before that, a scalar.
 
-    With `each_tensor` every parameter tensor is clipped by itself, as TensorFlow's clip_by_norm in Zhu's code.
+    With `each_tensor` every one is clipped by itself, as TensorFlow's clip_by_norm in Zhu's code.
     """
-    gradients = [parameter.grad for parameter in parameters if parameter.grad is not None]
     norms = torch.stack([torch.linalg.vector_norm(gradient) for gradient in gradients])
     norm = torch.linalg.vector_norm(norms)
     for gradient, own in zip(gradients, norms, strict=True):

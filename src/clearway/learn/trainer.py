@@ -243,7 +243,7 @@ class Trainer:
                 sum_loss=learner.sum_loss,
             )
             self.lookup.backward(*rows, activations, gradient)
-            norms.append(clip_gradients(list(self.network.parameters()), learner.clip_norm, learner.clip_each_tensor))
+            norms.append(clip_gradients(self.network.layer_gradients(), learner.clip_norm, learner.clip_each_tensor))
             self.optimiser.step(lr)
             terms.append(loss)
         return terms, norms

@@ -20,7 +20,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import embedding_bag
 
-from clearway.model.network import OUTPUTS, SiameseActorCritic
+from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
 from clearway.scenes.actions import ACTION_COUNT
 
 
@@ -142,14 +142,14 @@ class LookupNetwork:
         grad_fused, grad_seen = self._work(2, len(history))
         self._backward_scenes(rows_per_scene, kept, grad_output, grad_seen, grad_fused)
         _relu_backward_(grad_fused, kept.fused)
-        torch.sum(grad_fused, 0, out=_grad(net.fusion_bias))
-        torch.mm(grad_fused.T, kept.seen, out=_grad(net.fusion_weight)[0])
+        torch.sum(grad_fused, 0, out=grad_of(net.fusion_bias))
+        torch.mm(grad_fused.T, kept.seen, out=grad_of(net.fusion_weight)[0])
         grad_term = self._sum_by_target(target, grad_fused)  # (M, H)
-        torch.mm(grad_term.T, self.wanted, out=_grad(net.fusion_weight)[1])
+        torch.mm(grad_term.T, self.wanted, out=grad_of(net.fusion_weight)[1])
         grad_wanted = _relu_backward_(grad_term @ net.fusion_weight[1], self.wanted)
         torch.mm(grad_fused, net.fusion_weight[0], out=grad_seen)
         _relu_backward_(grad_seen, kept.seen)
-        torch.sum(grad_seen, 0, out=_grad(net.siamese_bias)).add_(grad_wanted.sum(0))
+        torch.sum(grad_seen, 0, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
         self._backward_siamese(history, grad_seen, grad_wanted)
 
     def _work(self, blocks: int, rows: int) -> list[Tensor]:
@@ -172,12 +172,12 @@ class LookupNetwork:
         for scene, count in enumerate(rows_per_scene):
             rows = slice(first, first + count)
             grad_out = grad_output[rows]
-            torch.mm(grad_out.T, kept.special[rows], out=_grad(net.output_weight)[scene])
-            torch.sum(grad_out, 0, out=_grad(net.output_bias)[scene])
+            torch.mm(grad_out.T, kept.special[rows], out=grad_of(net.output_weight)[scene])
+            torch.sum(grad_out, 0, out=grad_of(net.output_bias)[scene])
             torch.mm(grad_out, net.output_weight[scene], out=grad_special[rows])
             _relu_backward_(grad_special[rows], kept.special[rows])
-            torch.mm(grad_special[rows].T, kept.fused[rows], out=_grad(net.scene_weight)[scene])
-            torch.sum(grad_special[rows], 0, out=_grad(net.scene_bias)[scene])
+            torch.mm(grad_special[rows].T, kept.fused[rows], out=grad_of(net.scene_weight)[scene])
+            torch.sum(grad_special[rows], 0, out=grad_of(net.scene_bias)[scene])
             torch.mm(grad_special[rows], net.scene_weight[scene], out=grad_fused[rows])
             first += count
 
@@ -194,13 +194,8 @@ class LookupNetwork:
         by_state = embedding_bag(sample, grad_seen, count.cumsum(0) - count, mode="sum")  # (S * K, H)
         columns = by_state.view(len(self.features), -1)  # (S, K * H)
         columns.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
-        torch.mm(columns.T, self.features, out=_grad(self.network.siamese_weight).flatten(0, 1))
+        torch.mm(columns.T, self.features, out=grad_of(self.network.siamese_weight).flatten(0, 1))
 
     def _table_row(self, states: Tensor) -> Tensor:
         """Row of `projected`, seen as (S * K, H), for states (B, K) in their slots."""
         return states * self.history_length + self.slot
-
-
-def _grad(parameter: Tensor) -> Tensor:
-    assert parameter.grad is not None
-    return parameter.grad

@@ -86,10 +86,28 @@ class SiameseActorCritic(nn.Module):
             output[rows] = linear(special, self.output_weight[head], self.output_bias[head])
         return output[:, :ACTION_COUNT], output[:, ACTION_COUNT]
 
+    def layer_gradients(self) -> list[Tensor]:
+        """Gradients of the published network's tensors, as views.
+
+        What is stacked here is separate there: every scene's layer and outputs, and the policy's and the value's part.
+        """
+        shared = (self.siamese_weight, self.siamese_bias, self.fusion_weight, self.fusion_bias)
+        views = [grad_of(parameter) for parameter in shared]
+        views += [*grad_of(self.scene_weight), *grad_of(self.scene_bias)]
+        for head in (*grad_of(self.output_weight), *grad_of(self.output_bias)):
+            views += [head[:ACTION_COUNT], head[ACTION_COUNT:]]
+        return views
+
     def _siamese(self, features: Tensor) -> Tensor:
         """(B, K, F) -> (B, H)."""
         weight = self.siamese_weight.transpose(0, 1).flatten(1)  # (H, K * F)
         return relu(linear(features.flatten(1), weight, self.siamese_bias))
+
+
+def grad_of(parameter: Tensor) -> Tensor:
+    """The parameter's gradient, which must be there."""
+    assert parameter.grad is not None, "no gradient yet"
+    return parameter.grad
 
 
 @dataclass(frozen=True, eq=False)
