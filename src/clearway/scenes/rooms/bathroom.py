@@ -8,6 +8,7 @@ from clearway.scenes.rooms import finishes, textures
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import bathroom as fittings
 from clearway.scenes.rooms.furniture import decor, lamps, openings, storage
+from clearway.scenes.rooms.furniture.small import any_small_piece
 from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import SIDES, Column, Finish, add_surfaces, add_walls
@@ -84,11 +85,7 @@ def _place_fittings(room: Room) -> None:
     fittings.vanity(room, room.wall("south", 2.15, gap_m=0.245), 1.3)
     fittings.toilet(room, room.wall("south", 3.75, gap_m=0.36))
     fittings.washing_machine(room, room.wall("south", 4.65, gap_m=0.32))
-    corner = Frame(3.75, DEPTH_M - 0.27)
-    if room.layout_rng.random() < 0.5:
-        decor.basket(room, corner)
-    else:
-        decor.plant(room, corner, 0.9, "cream")
+    any_small_piece(room, Frame(3.75, DEPTH_M - 0.27))
 
 
 def _place_ornaments(room: Room) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from clearway.scenes.rooms import finishes, textures
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import beds, decor, lamps, openings, seating, storage, tables
+from clearway.scenes.rooms.furniture.small import any_small_piece
 from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import Column, Finish, add_surfaces, add_walls
@@ -89,7 +90,7 @@ def _place_dressing_room(room: Room) -> None:
     decor.flowers(room, chest.moved(0.42, 0), 0.85)
     decor.ornament(room, chest.moved(-0.4, 0), 0.85)
     decor.mirror(room, room.wall("north", 4.25, 1.5), 0.8, 0.9, "brass")
-    _place_in_corner(room, Frame(WIDTH_M - 0.25, DEPTH_M - 0.25))
+    any_small_piece(room, Frame(WIDTH_M - 0.25, DEPTH_M - 0.25))
     openings.door(room, room.wall("east", 5.2))
     decor.hooks(room, DRESSING_WALL.face("north", 2.6, 1.65), ("second accent", "linen", "accent"))
     decor.painting(room, DRESSING_WALL.face("north", 1.2, 1.5), 0.8, 0.6)
@@ -97,9 +98,3 @@ def _place_dressing_room(room: Room) -> None:
     decor.painting(room, room.wall("west", 5.2, 1.55), 0.5, 0.7)
     decor.clock(room, room.wall("north", 3.0, 1.8), 0.15, "brass")
     lamps.ceiling_lamp(room, Frame(3.4, 5.1), 0.22, 1.1)
-
-
-def _place_in_corner(room: Room, at: Frame) -> None:
-    """One of the small things that fill a cell."""
-    place = (decor.plant, lamps.floor_lamp, decor.basket)[int(room.layout_rng.integers(3))]
-    place(room, at)

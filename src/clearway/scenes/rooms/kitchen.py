@@ -6,6 +6,7 @@ from clearway.scenes.rooms import finishes, textures
 from clearway.scenes.rooms.finishes import WHITE
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import decor, kitchen, lamps, openings, seating, storage, tables
+from clearway.scenes.rooms.furniture.small import any_small_piece
 from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import Column, Finish, add_surfaces, add_walls
@@ -63,7 +64,7 @@ def _place_kitchen(room: Room) -> None:
     kitchen.microwave(room, west.moved(-0.8, -0.08))
     kitchen.toaster(room, west.moved(0.0, -0.1))
     kitchen.jars(room, west.moved(0.8, -0.15))
-    decor.plant(room, Frame(0.26, DEPTH_M - 0.26), 1.2)
+    any_small_piece(room, Frame(0.26, DEPTH_M - 0.26))
     decor.basket(room, Frame(0.26, 5.75), 0.6, "steel")
     storage.bookcase(room, room.wall("north", 1.25, gap_m=0.17))
     openings.door(room, room.wall("north", 3.0))

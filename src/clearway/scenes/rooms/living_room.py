@@ -6,6 +6,7 @@ from clearway.scenes.rooms import finishes
 from clearway.scenes.rooms.finishes import WHITE
 from clearway.scenes.rooms.frame import Frame
 from clearway.scenes.rooms.furniture import decor, lamps, openings, seating, storage, tables
+from clearway.scenes.rooms.furniture.small import any_small_piece
 from clearway.scenes.rooms.materials import varied
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.shell import Column, Finish, add_surfaces, add_walls
@@ -31,7 +32,8 @@ def build(seed: int, looks: bool) -> Room:
 def _finish(room: Room) -> Finish:
     """Planks with two rugs; striped paper, paint in the library and the dining room."""
     colours = room.colours
-    floor = finishes.with_rug(room, finishes.plank_floor(room), (1.9, 2.4), (2.2, 2.6))
+    wood = finishes.plank_floor(room) if room.rng.random() < 0.6 else finishes.parquet_floor(room)
+    floor = finishes.with_rug(room, wood, (1.9, 2.4), (2.2, 2.6))
     floor = finishes.with_rug(room, floor, (6.5, 3.5), (2.6, 2.6), "medallion", round_edge=True)
     paint = finishes.painted_wall(room, "north", colours.feature_wall)
     partition = finishes.papered_wall(room, "south", varied(room.rng, colours.wall), "trellis", 0.33)
@@ -56,7 +58,7 @@ def _place_sofas(room: Room) -> None:
     corner = Frame(3.0, 3.75)
     tables.side_table(room, corner)
     lamps.table_lamp(room, corner, 0.55)
-    decor.plant(room, Frame(0.26, 3.75), 1.1)
+    any_small_piece(room, Frame(0.26, 3.75))
     lamps.floor_lamp(room, Frame(0.25, 1.25))
     storage.bookcase(room, DINING_WALL.face("west", 3.25).moved(0, 0.165))
     storage.sideboard(room, room.wall("south", 3.9, gap_m=0.22), 1.2)
@@ -81,7 +83,7 @@ def _place_dining_room(room: Room) -> None:
         seating.dining_chair(room, Frame(6.5, 3.5 + side * 1.02, 90.0 + side * 90.0))
     storage.sideboard(room, room.wall("north", 6.3, gap_m=0.22), 1.4)
     storage.fireplace(room, room.wall("east", 1.0, gap_m=0.21))
-    decor.basket(room, Frame(WIDTH_M - 0.26, DEPTH_M - 0.26))
+    any_small_piece(room, Frame(WIDTH_M - 0.26, DEPTH_M - 0.26))
     openings.window(room, room.wall("east", 3.5, 0.95), 1.8, 1.3)
     openings.window(room, room.wall("south", 6.3, 0.95), 1.2, 1.3)
     decor.painting(room, room.wall("east", 1.0, 1.7), 0.9, 0.65, "brass")

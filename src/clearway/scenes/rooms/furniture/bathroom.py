@@ -103,16 +103,6 @@ def _shower_head(room: Room, at: Frame) -> None:
     room.rod(at, (0.04, -0.1, 1.02), (0.04, 0.1, 1.02), 0.02, "chrome")
 
 
-def glass_screen(room: Room, at: Frame, width_m: float, height_m: float = 1.9) -> None:
-    """A pane of glass along x, 2 cm deep with its frame."""
-    room.box(at, (0, 0, 0.04), (width_m, 0.01, height_m - 0.05), "glass", segments=0)
-    for side in (-1, 1):
-        room.box(at, (side * (width_m / 2 - 0.012), 0, 0), (0.024, 0.024, height_m), "chrome", 0.004)
-    for z in (0.0, height_m - 0.03):
-        room.box(at, (0, 0, z), (width_m, 0.024, 0.03), "chrome", 0.004)
-    room.block(at, (0, 0, height_m / 2), (width_m, 0.024, height_m))
-
-
 def towel_rail(room: Room, at: Frame, towel: str = "accent") -> None:
     """A heated rail with a towel, on a wall frame."""
     for side in (-1, 1):
@@ -151,29 +141,3 @@ def washing_machine(room: Room, at: Frame) -> None:
     room.box(at, (-0.1, 0, 0.85), (0.3, 0.3, 0.14), "accent", 0.03, segments=2)
     room.box(at, (0.18, -0.05, 0.85), (0.1, 0.08, 0.22), "blue", 0.02, segments=2)
     room.block(at, (0, 0, 0.43), (0.6, 0.56, 0.86))
-
-
-def folded_towels(room: Room, at: Frame, z_m: float) -> None:
-    """A pile of folded towels."""
-    for number, material in enumerate(("linen", "accent", "second accent")):
-        room.box(at, (0, 0, z_m + 0.06 * number), (0.34, 0.24, 0.062), material, 0.028, segments=2)
-
-
-def towel_shelf(
-    room: Room, at: Frame, width_m: float = 0.7, height_m: float = 1.5, depth_m: float = 0.3, material: str = "pine"
-) -> None:
-    """Open shelves with towels, baskets and bottles."""
-    for x in (-1.0, 1.0):
-        for y in (-1, 1):
-            room.box(
-                at, (x * (width_m / 2 - 0.02), y * (depth_m / 2 - 0.02), 0), (0.036, 0.036, height_m), material, 0.005
-            )
-    levels = [0.14 + number * (height_m - 0.17) / 3 for number in range(4)]
-    for z in levels:
-        room.box(at, (0, 0, z), (width_m - 0.01, depth_m - 0.01, 0.024), material, 0.004)
-    room.box(at, (-0.02, 0, levels[0] + 0.024), (width_m - 0.2, depth_m - 0.06, 0.22), "basket", 0.02)
-    folded_towels(room, at.moved(-width_m / 2 + 0.22, 0), levels[1] + 0.024)
-    room.box(at, (width_m / 2 - 0.15, 0, levels[1] + 0.024), (0.18, 0.2, 0.15), "basket", 0.02)
-    folded_towels(room, at.moved(width_m / 2 - 0.23, 0), levels[2] + 0.024)
-    bottles(room, at.moved(0.05, 0), levels[3] + 0.024)
-    room.block(at, (0, 0, height_m / 2), (width_m, depth_m, height_m))

@@ -32,7 +32,7 @@ def sofa(room: Room, at: Frame, length_m: float = 2.0, depth_m: float = 0.9, mat
 
 def _sofa_cushions(room: Room, at: Frame, length_m: float, back_y_m: float, seats: int) -> None:
     """Loose cushions in the corners."""
-    sides = (-1, 1) if seats > 1 else (int(room.rng.choice((-1, 1))) * 0,)
+    sides = (-1, 1) if seats > 1 else (0,)
     for side, material in zip(sides, ("accent", "second accent"), strict=False):
         leaning = at.moved(side * (length_m / 2 - 0.42), back_y_m + 0.4, 0, -side * 14.0)
         room.box(leaning, (0, 0, 0.46), (0.42, 0.14, 0.4), material, 0.068, turn("x", 20), segments=3)
@@ -87,16 +87,6 @@ def stool(room: Room, at: Frame, height_m: float = 0.44, material: str = "pine")
         leg = at.moved(0, 0, 0, 120.0 * number)
         room.rod(leg, (0, 0.15, 0), (0, 0.1, height_m - 0.03), 0.016, material)
     room.post(at, 0.16, height_m)
-
-
-def bench(room: Room, at: Frame, length_m: float = 1.2, depth_m: float = 0.4) -> None:
-    """A padded bench, as at the foot of a bed."""
-    for x in (-1.0, 1.0):
-        for y in (-1, 1):
-            room.box(at, (x * (length_m / 2 - 0.05), y * (depth_m / 2 - 0.05), 0), (0.045, 0.045, 0.36), "wood", 0.006)
-    room.box(at, (0, 0, 0.34), (length_m, depth_m, 0.05), "wood", 0.006)
-    room.box(at, (0, 0, 0.39), (length_m - 0.02, depth_m - 0.02, 0.09), "upholstery", 0.04, segments=3)
-    room.block(at, (0, 0, 0.24), (length_m, depth_m, 0.48))
 
 
 def pouffe(room: Room, at: Frame, material: str = "second accent") -> None:

@@ -148,21 +148,6 @@ def television(room: Room, at: Frame, width_m: float = 1.8, depth_m: float = 0.4
     room.block(at, (0, 0, 0.62), (width_m, depth_m, 1.24))
 
 
-def screen(room: Room, at: Frame, width_m: float, height_m: float = 1.75, material: str = "wood") -> None:
-    """A thin slatted room divider, 4 cm deep, along x."""
-    posts = max(2, round(width_m / 0.8) + 1)
-    for number in range(posts):
-        x = -width_m / 2 + 0.02 + (width_m - 0.04) * number / (posts - 1)
-        room.box(at, (x, 0, 0), (0.04, 0.04, height_m), material, 0.005)
-    for z in (0.08, height_m - 0.06):
-        room.box(at, (0, 0, z), (width_m - 0.04, 0.032, 0.05), material, 0.004)
-    slats = round((height_m - 0.3) / 0.115)
-    for number in range(slats):
-        z = 0.18 + number * (height_m - 0.3) / slats
-        room.box(at, (0, 0, z), (width_m - 0.05, 0.018, 0.075), material, 0.003)
-    room.block(at, (0, 0, height_m / 2), (width_m, 0.04, height_m))
-
-
 def fireplace(room: Room, at: Frame, width_m: float = 1.3, depth_m: float = 0.42) -> None:
     """A brick chimneypiece with a mantel, logs and embers; stands against a wall at -y."""
     height, jamb = 1.1, 0.3
