@@ -45,7 +45,7 @@ def painted_wall(room: Room, side: str, colour: Colour) -> np.ndarray:
     return tiled(image, *wall_size_m(room, side))
 
 
-def papered_wall(room: Room, side: str, colour: Colour, pattern: str, repeat_m: float = 0.25) -> np.ndarray:
+def papered_wall(room: Room, side: str, colour: Colour, pattern: str, repeat_m: float = 0.22) -> np.ndarray:
     """A wall with paper in two close tones."""
     darker = (colour[0] * 0.86, colour[1] * 0.85, colour[2] * 0.84)
     image = textures.wallpaper(room.rng, pixels(2), pixels(2), colour, darker, pattern, round(2 / repeat_m))
@@ -55,7 +55,7 @@ def papered_wall(room: Room, side: str, colour: Colour, pattern: str, repeat_m: 
 def boarded_wall(room: Room, side: str, above: np.ndarray, colour: Colour, height_m: float = 0.95) -> np.ndarray:
     """A wall with upright painted boards below a rail."""
     image = textures.plaster(room.rng, pixels(2), pixels(2), colour, 0.04)
-    board = np.arange(pixels(2)) / pixels(2) * 2 / 0.125
+    board = np.arange(pixels(2)) / pixels(2) * 15  # 13 cm wide: not in step with the grid's 50 cm
     image[:, np.abs(board % 1 - 0.5) > 0.45] *= 0.8
     return with_band(tiled(image, *wall_size_m(room, side)), above, height_m, np.array(colour))
 
@@ -100,4 +100,4 @@ def aged(room: Room, wall: np.ndarray) -> np.ndarray:
     """A wall with faint stains that nowhere repeat, so that no two places look alike."""
     rows, columns = wall.shape[:2]
     stains = textures.noise(room.rng, rows, columns, 1.3, stretch_y=columns / rows)[..., None] - 0.5
-    return np.clip(wall * (1 + 0.16 * stains), 0, 1)
+    return np.clip(wall * (1 + 0.22 * stains), 0, 1)

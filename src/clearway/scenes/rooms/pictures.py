@@ -157,7 +157,7 @@ def screen(rng: np.random.Generator, height: int = 144, width: int = 256) -> np.
     """A switched-off screen with a soft reflection."""
     y, x = np.mgrid[:height, :width] / np.array([height, width])[:, None, None]
     glow = np.exp(-(((x - rng.uniform(0.2, 0.8)) / 0.35) ** 2 + ((y - 0.1) / 0.5) ** 2))
-    return np.clip(np.array([0.05, 0.055, 0.065]) + 0.16 * glow[..., None], 0, 1)
+    return np.clip(np.array([0.08, 0.09, 0.105]) + 0.22 * glow[..., None], 0, 1)
 
 
 RUGS = ("lattice", "stripes", "medallion", "chevrons")

@@ -45,8 +45,8 @@ def pendant(room: Room, at: Frame, z_m: float = 1.75, material: str = "black", p
 
 def floor_lamp(room: Room, at: Frame) -> None:
     """A standard lamp with a cloth shade."""
-    _light(room, at, (0, 0, 1.75), 0.1, WARM, 0.25)
-    _light(room, at, (0, 0, 1.25), 0.1, WARM, 0.15)
+    _light(room, at, (0, 0, 1.75), 0.1, WARM, 0.16)
+    _light(room, at, (0, 0, 1.25), 0.1, WARM, 0.09)
     room.turned(at, (0, 0, 0), [(0, 0), (0.15, 0), (0.15, 0.015), (0.04, 0.03), (0.012, 0.05)], "brass")
     room.rod(at, (0, 0, 0.03), (0, 0, 1.5), 0.012, "brass")
     _shade(room, at, (0, 0, 1.36), 1.0)
