@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,14 @@ def test_separate_parts_are_counted() -> None:
 def test_a_scene_without_features_or_pictures_has_none() -> None:
     figures = summary(replace(corridor_scene(2), features=None, encoder=None, observations=None))
     assert figures.encoder is figures.spread is figures.picture_size is None
+
+
+def test_figures_as_json() -> None:
+    for scene in (corridor_scene(2), replace(corridor_scene(2), features=None, encoder=None)):
+        content = summary(scene).to_json()
+        assert content["states"] == 8
+        assert "effective_rank" in content
+        assert json.loads(json.dumps(content))["component_sizes"] == [8]
 
 
 def test_spread_counts_directions() -> None:

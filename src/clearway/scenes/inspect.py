@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -51,6 +51,12 @@ class SceneSummary:
     source: str
     room: str | None
     seed: int | None
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values; the figures of `spread` stand beside the others."""
+        figures = asdict(self)
+        spread = figures.pop("spread") or dict.fromkeys(field.name for field in fields(FeatureSpread))
+        return {**figures, **spread}
 
 
 def summary(scene: Scene) -> SceneSummary:

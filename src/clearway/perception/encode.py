@@ -1,0 +1,197 @@
+"""Choose an encoder by name, and encode scenes with it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from clearway.errors import EncoderError
+from clearway.perception import pretrained, random_resnet
+from clearway.perception.cache import Entry, cached, content_key, joint_key
+from clearway.perception.encoder import Encoder, EncoderWarning
+from clearway.perception.preprocess import Preprocessing
+from clearway.perception.random_resnet import RESNET50, ResNetShape
+from clearway.scenes.scene import EncoderRecord, Observations, Scene
+
+AUTO, TRAINED, RANDOM = "auto", "resnet50", "random-resnet50"
+BATCH_PICTURES = 32
+
+
+def find_record(
+    name: str,
+    scenes: Sequence[Scene],
+    *,
+    seed: int = 0,
+    shape: ResNetShape = RESNET50,
+    preprocessing: Preprocessing = random_resnet.PREPROCESSING,
+) -> EncoderRecord:
+    """The record of the encoder that a user asks for by name.
+
+    Args:
+        name: "resnet50" (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto"
+            (the first if it can be had, else the second), or a vision model on the Hugging Face hub or in a folder.
+        scenes: what "random-resnet50" calibrates on; their order does not matter.
+        seed: of "random-resnet50".
+        shape, preprocessing: of "random-resnet50".
+
+    Raises:
+        EncoderError: there is no such encoder, it cannot be had, or there are no pictures to calibrate on.
+
+    Warns:
+        EncoderWarning: "auto" fell back to random weights; the record's settings then hold "stands_in_for".
+    """
+    if name == RANDOM:
+        return _fitted(scenes, seed, shape, preprocessing)
+    if name == TRAINED:
+        return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
+    if name != AUTO:
+        return pretrained.find_record(name)
+    try:
+        return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
+    except EncoderError as fault:
+        text = (
+            f"The trained encoder {TRAINED} cannot be had, so {RANDOM} stands in for it: random weights, calibrated "
+            f"on these scenes. Its features tell the states apart but mean less, and fit these scenes alone. ({fault})"
+        )
+        warnings.warn(text, EncoderWarning, stacklevel=2)
+    return _standing_in(_fitted(scenes, seed, shape, preprocessing))
+
+
+def get_encoder(name: str, scenes: Sequence[Scene], *, seed: int = 0) -> Encoder:
+    """The encoder that a user asks for by name, loaded; see `find_record` for arguments, errors and warnings."""
+    return encoder_from_record(find_record(name, scenes, seed=seed))
+
+
+def encoder_from_record(record: EncoderRecord) -> Encoder:
+    """Make the encoder again that made a scene's features.
+
+    Raises:
+        EncoderError: the record does not say how, was altered, or its model cannot be had.
+    """
+    kind = record.settings.get("kind")
+    if kind == random_resnet.KIND:
+        return random_resnet.from_record(record)
+    if kind == pretrained.KIND:
+        return pretrained.from_record(record)
+    problem = f"encoder {record.name}: the features came with the scene's file, which does not say how they were made"
+    raise EncoderError(f"{problem}. Encode the scene again")
+
+
+def encode_scenes(
+    scenes: Sequence[Scene],
+    encoder: str | EncoderRecord = AUTO,
+    *,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: bool = False,
+    batch: int = BATCH_PICTURES,
+) -> list[Scene]:
+    """The scenes with features of their pictures, all by one encoder.
+
+    Features are kept in the user's cache folder by the content of the pictures and the encoder's identity.
+
+    Args:
+        scenes: scenes with pictures; those to be trained together must be encoded together.
+        encoder: a name, see `find_record`, or the record of an encoder to use again.
+        seed: of "random-resnet50".
+        threads: processor threads; None: as many as torch uses, one a core if nobody set it.
+        progress: show a progress bar, if standard error is a terminal.
+        batch: pictures that go through the network together.
+
+    Raises:
+        EncoderError: see `find_record`; or a scene has no pictures.
+        SceneError: the pictures of a scene's file are damaged.
+    """
+    with _threads(threads), _progress_bar(sum(scene.state_count for scene in scenes), progress) as show_done:
+        record = find_record(encoder, scenes, seed=seed) if isinstance(encoder, str) else encoder
+        load = lru_cache(partial(encoder_from_record, record))  # at most once, and only where features are not cached
+        encoded, done = [], 0
+        for scene in scenes:
+            pictures = _pictures(scene)
+            key = joint_key(content_key(pictures), record.identity)
+            make = partial(_encode_all, load, pictures, batch, show_done, done)
+            features = cached("features", key, make).arrays["features"]
+            done += scene.state_count
+            show_done(done)
+            encoded.append(scene.with_features(features, record))
+    return encoded
+
+
+def _encode_all(
+    load: Callable[[], Encoder],
+    pictures: Observations,
+    batch: int,
+    show_done: Callable[[int], None],
+    done_before: int,
+) -> Entry:
+    """The features (S, F) float32 of all pictures of a scene, to be cached."""
+    encoder = load()
+    features = np.empty((pictures.shape[0], encoder.feature_count), np.float32)
+    for start in range(0, len(features), batch):
+        part = pictures[start : start + batch]
+        features[start : start + len(part)] = encoder.encode(part)
+        show_done(done_before + start + len(part))
+    return Entry({"features": features})
+
+
+def _pictures(scene: Scene) -> Observations:
+    if scene.observations is None:
+        raise EncoderError(f"scene {scene.name} has no pictures to encode. Use the features that its file holds")
+    return scene.observations
+
+
+def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessing: Preprocessing) -> EncoderRecord:
+    """The record of a random ResNet calibrated on the scenes, from the cache if it was fitted before."""
+    if not scenes:
+        raise EncoderError(f"encoder {RANDOM} is calibrated on the scenes' pictures, and there are none. Name a scene")
+    by_key = {content_key(_pictures(scene)): _pictures(scene) for scene in scenes}
+    ordered = [by_key[key] for key in sorted(by_key)]
+
+    def make() -> Entry:
+        record = random_resnet.fit_record(ordered, seed=seed, shape=shape, preprocessing=preprocessing, name=RANDOM)
+        return Entry(record.arrays, {"identity": record.identity, "settings": dict(record.settings)})
+
+    request = joint_key(random_resnet.VERSION, seed, shape.to_json(), preprocessing.to_json(), sorted(by_key))
+    entry = cached("encoders", request, make)
+    settings = entry.note["settings"]
+    assert isinstance(settings, dict)
+    return EncoderRecord(RANDOM, str(entry.note["identity"]), settings, entry.arrays)
+
+
+def _standing_in(record: EncoderRecord) -> EncoderRecord:
+    return replace(record, settings={**record.settings, "stands_in_for": TRAINED})
+
+
+@contextmanager
+def _threads(count: int | None) -> Iterator[None]:
+    """Let torch use `count` threads meanwhile; None leaves it as it is, with one a core."""
+    if count is None:
+        yield
+        return
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+@contextmanager
+def _progress_bar(total: int, wanted: bool) -> Iterator[Callable[[int], None]]:
+    """A progress bar on standard error; yields what to call with the pictures done so far."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("pictures,"))
+    shown = wanted and console.is_terminal
+    with Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, disable=not shown) as bar:
+        task = bar.add_task("encoding", total=total)
+        yield lambda done: bar.update(task, completed=done)

@@ -1,0 +1,89 @@
+"""`Encoder`, what every encoder offers, and `NetworkEncoder`, a frozen network behind a preprocessing step.
+
+An encoder is described by its `EncoderRecord` alone: records are found or fitted first, and the network is only
+loaded where features are not in the cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from clearway.errors import EncoderError
+from clearway.perception.preprocess import Preprocessing, to_pixels
+from clearway.scenes.scene import EncoderRecord
+
+if TYPE_CHECKING:
+    import torch
+
+IDENTITY_LETTERS = 12
+
+
+class EncoderWarning(UserWarning):
+    """Another encoder than the best one was used."""
+
+
+class Encoder(Protocol):
+    """Turns pictures into frozen features."""
+
+    @property
+    def record(self) -> EncoderRecord:
+        """All that is needed to make this encoder again."""
+
+    @property
+    def feature_count(self) -> int:
+        """F."""
+
+    def encode(self, pictures: np.ndarray) -> np.ndarray:
+        """Features (B, F) float32 of pictures (B, height, width, 3) uint8."""
+
+
+@dataclass(frozen=True)
+class NetworkEncoder:
+    """A frozen network that sees preprocessed pictures.
+
+    Attributes:
+        record: what the encoder is.
+        preprocessing: how a picture becomes the network's input.
+        features_of: pooled features (B, F) of pixels (B, 3, height, width).
+        feature_count: F.
+        mean, std: (F,) float32 statistics by which features are standardised; None leaves them as they are.
+    """
+
+    record: EncoderRecord
+    preprocessing: Preprocessing
+    features_of: Callable[[torch.Tensor], torch.Tensor]
+    feature_count: int
+    mean: np.ndarray | None = None
+    std: np.ndarray | None = None
+
+    def encode(self, pictures: np.ndarray) -> np.ndarray:
+        """Features (B, F) float32 of pictures (B, height, width, 3) uint8.
+
+        Equal bit for bit for equal batches at an equal number of threads.
+
+        Raises:
+            EncoderError: the pictures are of another shape or type, or a feature is NaN or Inf.
+        """
+        import torch
+
+        with torch.inference_mode():
+            features = self.features_of(to_pixels(pictures, self.preprocessing)).numpy()
+        if self.mean is not None and self.std is not None:
+            features = (features - self.mean) / self.std
+        if not np.isfinite(features).all():
+            raise EncoderError(f"encoder {self.record.name} made NaN or Inf of a picture. Use another encoder")
+        return np.ascontiguousarray(features, dtype=np.float32)
+
+
+def identity_of(settings: Mapping[str, object], contents: Iterable[bytes | memoryview]) -> str:
+    """Short hash of an encoder: its settings and whatever bytes determine it besides."""
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode())
+    for content in contents:
+        digest.update(content)
+    return digest.hexdigest()[:IDENTITY_LETTERS]

@@ -1,0 +1,132 @@
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from transformers import ResNetConfig, ResNetModel
+
+from clearway.errors import EncoderError
+from clearway.perception import EncoderWarning, encode, encode_scenes, encoder_from_record, random_resnet
+from clearway.perception.preprocess import Preprocessing
+from clearway.perception.random_resnet import ResNetShape
+from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from made import corridor_scene, grid_scene
+
+TINY = ResNetShape(8, (16, 32), (1, 1), "bottleneck")
+
+
+@pytest.fixture(autouse=True)
+def tiny_architecture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A small network stands for ResNet-50."""
+    small = partial(encode.find_record, shape=TINY, preprocessing=Preprocessing(16, 16))
+    monkeypatch.setattr(encode, "find_record", small)
+
+
+def rooms() -> list[Scene]:
+    made = [grid_scene(0, name="a"), grid_scene(1, name="b"), corridor_scene(3)]
+    return [replace(scene, features=None, encoder=None) for scene in made]
+
+
+@pytest.fixture
+def folder_model(tmp_path: Path) -> str:
+    torch.manual_seed(0)
+    network = ResNetModel(ResNetConfig(embedding_size=8, hidden_sizes=[16, 32], depths=[1, 1])).eval()
+    network.save_pretrained(tmp_path / "model")
+    return str(tmp_path / "model")
+
+
+def test_scenes_are_encoded_together_by_one_encoder() -> None:
+    scenes = encode_scenes(rooms(), "random-resnet50", seed=4)
+    assert {scene.encoder.identity for scene in scenes} == {scenes[0].encoder.identity}
+    assert {scene.encoder.name for scene in scenes} == {"random-resnet50"}
+    assert scenes[0].encoder.settings["seed"] == 4
+    for scene in scenes:
+        assert scene.features.shape == (scene.state_count, 32)
+        assert scene.features.dtype == np.float32
+
+
+def test_the_record_in_a_file_makes_the_same_features(tmp_path: Path) -> None:
+    scene = encode_scenes(rooms(), "random-resnet50")[0]
+    write_scene(scene, tmp_path / "a.h5")
+    again = read_scene(tmp_path / "a.h5")
+    encoder = encoder_from_record(again.encoder)
+    assert np.array_equal(encoder.encode(again.observations[:32]), scene.features[:32])
+
+
+def test_a_record_encodes_other_scenes_too() -> None:
+    record = encode_scenes(rooms()[:2], "random-resnet50")[0].encoder
+    (other,) = encode_scenes(rooms()[2:], record)
+    assert other.encoder is record
+
+
+def test_batches_do_not_matter(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = encode_scenes(rooms(), "random-resnet50", batch=7)
+    monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / "other"))
+    second = encode_scenes(rooms(), "random-resnet50", batch=64, threads=1)
+    for a, b in zip(first, second, strict=True):
+        assert np.allclose(a.features, b.features, atol=1e-3)
+
+
+def test_the_order_of_scenes_does_not_matter() -> None:
+    first = encode_scenes(rooms(), "random-resnet50")
+    second = encode_scenes(rooms()[::-1], "random-resnet50")
+    assert first[0].encoder.identity == second[0].encoder.identity
+    assert np.array_equal(first[0].features, second[-1].features)
+
+
+def test_what_is_cached_needs_no_network(monkeypatch: pytest.MonkeyPatch, folder_model: str) -> None:
+    asked = ("random-resnet50", folder_model)
+    first = [encode_scenes(rooms(), encoder) for encoder in asked]
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a network was loaded")
+
+    monkeypatch.setattr(random_resnet, "_random_network", refuse)
+    monkeypatch.setattr(encode, "encoder_from_record", refuse)
+    for encoder, scenes in zip(asked, first, strict=True):
+        for a, b in zip(scenes, encode_scenes(rooms(), encoder), strict=True):
+            assert np.array_equal(a.features, b.features)
+
+
+def test_a_damaged_cache_is_made_again(own_cache: Path) -> None:
+    first = encode_scenes(rooms(), "random-resnet50")
+    for path in own_cache.rglob("*.safetensors"):
+        path.write_bytes(path.read_bytes()[:-40])
+    second = encode_scenes(rooms(), "random-resnet50")
+    assert first[0].encoder.identity == second[0].encoder.identity
+    assert np.array_equal(first[1].features, second[1].features)
+
+
+def test_a_folder_is_an_encoder(folder_model: str) -> None:
+    scenes = encode_scenes(rooms(), folder_model)
+    encoder = encoder_from_record(scenes[0].encoder)
+    assert np.allclose(encoder.encode(scenes[2].observations[:]), scenes[2].features, atol=1e-5)
+
+
+def test_auto_takes_the_trained_encoder_where_it_can(monkeypatch: pytest.MonkeyPatch, folder_model: str) -> None:
+    monkeypatch.setattr("clearway.perception.pretrained.RESNET50_MODEL", folder_model)
+    (scene,) = encode_scenes(rooms()[:1], "auto")
+    assert scene.encoder.name == "resnet50"
+    assert "stands_in_for" not in scene.encoder.settings
+
+
+def test_auto_falls_back_with_a_warning_every_time() -> None:
+    for _ in range(2):
+        with pytest.warns(EncoderWarning, match="random-resnet50 stands in"):
+            (scene,) = encode_scenes(rooms()[:1])
+    assert scene.encoder.name == "random-resnet50"
+    assert scene.encoder.settings["stands_in_for"] == "resnet50"
+    assert encoder_from_record(scene.encoder).feature_count == 32
+
+
+def test_what_cannot_be_encoded_is_one_clear_error() -> None:
+    blind = replace(corridor_scene(3), observations=None)
+    with pytest.raises(EncoderError, match="scene corridor has no pictures"):
+        encode_scenes([blind], "random-resnet50")
+    with pytest.raises(EncoderError, match="Name a scene"):
+        encode_scenes([], "random-resnet50")
+    with pytest.raises(EncoderError, match="does not say how"):
+        encoder_from_record(corridor_scene(3).encoder)
