@@ -210,8 +210,11 @@ class NaiveA2C:
     def chunk(self, columns: list[Tensor]) -> Batch:
         """One batch from (T, N, ...) columns, its rows ordered by scene."""
         scenes, steps = self.world.scene_count, len(columns[0])
-        rows = [c.unflatten(1, (scenes, self.per_scene)).transpose(0, 1).flatten(0, 2) for c in columns]
-        return Batch(*rows, (steps * self.per_scene,) * scenes)
+        history, target, action, log_prob, advantage, value_target = (
+            c.unflatten(1, (scenes, self.per_scene)).transpose(0, 1).flatten(0, 2) for c in columns
+        )
+        counts = (steps * self.per_scene,) * scenes
+        return Batch(history, target, action, log_prob, advantage, value_target, counts)
 
 
 # ------------------------------------------------------------------------------------------------------ measurement
