@@ -210,6 +210,13 @@ def test_a_world_without_features_is_refused() -> None:
         Trainer(replace(small_world(), features=None), small_learner(), COLLISION_AWARE, 0)
 
 
+@pytest.mark.parametrize("seed", [-1, 2**31])
+def test_seeds_out_of_range_are_refused(seed: int) -> None:
+    with pytest.raises(RunError, match="seed is"):
+        small_trainer(small_learner(), seed=seed)
+    small_trainer(small_learner(), seed=2**31 - 1).update()
+
+
 def test_fewer_environments_than_scenes_are_refused() -> None:
     with pytest.raises(RunError, match="1 environments for 2 scenes"):
         small_trainer(small_learner(envs=1, minibatches=1))

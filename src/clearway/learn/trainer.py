@@ -28,6 +28,7 @@ from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCriti
 from clearway.reward import Reward
 
 SHUFFLE_SALT = 1_000_003
+SEED_LIMIT = 1 << 31  # seeds of environments are seed * 2**32 + number, in 64 bits
 
 
 @dataclass(frozen=True)
@@ -65,11 +66,13 @@ class Trainer:
         seed: of parameters, environments, actions and shuffling.
 
     Raises:
-        RunError: features are missing or not finite, there are fewer environments than scenes, or fewer rows of a
+        RunError: the seed is out of range, features are missing or not finite, there are fewer environments than scenes, or fewer rows of a
             scene than minibatches.
     """
 
     def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
+        if not 0 <= seed < SEED_LIMIT:
+            raise RunError(f"seed is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
         features = _checked_features(world)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
