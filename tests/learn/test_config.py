@@ -68,7 +68,8 @@ def test_the_default_is_the_recipe() -> None:
         "width": 512,
     }
     assert {name: asdict(DEFAULT)[name] for name in recipe} == recipe
-    assert PRESETS == {"default": DEFAULT, "paper": PAPER_A2C}
+    assert PRESETS["default"] == DEFAULT
+    assert PRESETS["paper"] == PAPER_A2C
 
 
 def test_as_a2c_makes_one_pass_and_changes_nothing_else() -> None:
