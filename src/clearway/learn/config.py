@@ -1,4 +1,4 @@
-"""The learner's settings and the two named sets of them."""
+"""The learner's settings and the named sets of them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from typing import Literal
 
 from clearway.errors import RunError
 
-Algorithm = Literal["ppo", "a2c"]
-PresetName = Literal["default", "paper"]
+Algorithm = Literal["ppo", "a2c", "a3c"]
+PresetName = Literal["default", "paper", "paper-a3c"]
+
+
+_A3C_NEEDS = {"epochs": 1, "minibatches": 1, "hindsight": False, "balance": 0, "optimiser": "rmsprop"}
 
 
 @dataclass(frozen=True)
@@ -19,9 +22,9 @@ class Learner:
     frames: int = 1_600_000
     """Training frames over all environments; schedules end here."""
     envs: int = 400
-    """Environments side by side, divided evenly among the scenes."""
+    """Environments side by side, divided evenly among the scenes. Of a3c: workers, divided evenly among the targets."""
     rollout_steps: int = 20
-    """Steps of every environment between updates."""
+    """Steps of every environment between updates. Of a3c: the most steps of a segment."""
     step_limit: int = 200
     """Steps after which a training episode is cut."""
     bootstrap_cut: bool = True
@@ -94,6 +97,21 @@ class Learner:
                 raise RunError(f"{name} is {getattr(self, name)}, expected at least 0. Give a larger {name}")
         if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):
             raise RunError("a2c makes one pass over each rollout. Set epochs and minibatches to 1, or use ppo")
+        if self.algorithm == "a3c":
+            for name, needed in _A3C_NEEDS.items():
+                if getattr(self, name) != needed:
+                    raise RunError(
+                        f"a3c with {name} {getattr(self, name)}, expected {needed}. Set {name} to {needed}, "
+                        "or take the preset paper-a3c"
+                    )
+
+    def lr_at(self, frames: int) -> float:
+        """Learning rate after that many frames."""
+        return self.lr_start + (self.lr_end - self.lr_start) * min(frames / self.frames, 1.0)
+
+    def entropy_weight_at(self, frames: int) -> float:
+        """Weight of the entropy bonus after that many frames."""
+        return self.entropy_start * (self.entropy_end / self.entropy_start) ** min(frames / self.frames, 1.0)
 
     def as_a2c(self) -> Learner:
         """The same settings with one update a rollout."""
@@ -131,4 +149,7 @@ PAPER_A2C = Learner(
 )
 """The published settings, synchronous: 5-step returns, discount 0.99, entropy 0.01, RMSProp, rewards clipped."""
 
-PRESETS: dict[PresetName, Learner] = {"default": DEFAULT, "paper": PAPER_A2C}
+PAPER_A3C = replace(PAPER_A2C, algorithm="a3c", envs=20)
+"""The published algorithm: 20 asynchronous workers, a target each; more targets need more workers (`envs`)."""
+
+PRESETS: dict[PresetName, Learner] = {"default": DEFAULT, "paper": PAPER_A2C, "paper-a3c": PAPER_A3C}

@@ -5,15 +5,23 @@ from __future__ import annotations
 import importlib.util
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from torch import Tensor
 
-from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
-from clearway.learn.trainer import Trainer, Update
+from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS, EpisodeStatistics
+from clearway.learn.trainer import Update
 
 
-def metrics_row(trainer: Trainer, update: Update, seconds: float) -> dict[str, float]:
+class Counting(Protocol):
+    """What a row needs of a trainer."""
+
+    frames: int
+    updates: int
+    statistics: EpisodeStatistics
+
+
+def metrics_row(trainer: Counting, update: Update, seconds: float) -> dict[str, float]:
     """One row of figures: the episodes ended since the last row, and the latest update's.
 
     seconds: training time so far, checkpoints and evaluation left out.

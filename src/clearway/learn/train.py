@@ -6,15 +6,18 @@ import signal
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import torch
+from torch import Tensor
 
 from clearway.choices import ZoneLevel
-from clearway.envs.world import make_world
+from clearway.envs.world import World, make_world
 from clearway.errors import RunError
+from clearway.learn.a3c.trainer import AsyncTrainer
 from clearway.learn.checkpoint import (
     Progress,
     newest_checkpoint,
@@ -27,12 +30,41 @@ from clearway.learn.config import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, RunRecord, record_of
-from clearway.learn.trainer import Trainer
+from clearway.learn.statistics import EpisodeStatistics
+from clearway.learn.trainer import Trainer, Update
+from clearway.model.network import FeatureScale
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
+
+
+class Learning(Protocol):
+    """What a run needs of a trainer, synchronous or not."""
+
+    world: World
+    learner: Learner
+    statistics: EpisodeStatistics
+    scale: FeatureScale
+    frames: int
+    updates: int
+
+    @property
+    def finished(self) -> bool:
+        """All frames of the settings are used."""
+
+    def update(self) -> Update:
+        """Learn from some more frames."""
+
+    def tensors(self) -> dict[str, Tensor]:
+        """All that `load_tensors` needs to go on, besides `frames` and `updates`."""
+
+    def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
+        """Go on from where `tensors` was called, after that many frames and updates."""
+
+    def close(self) -> None:
+        """Give back what lives outside this process's own memory, such as other processes."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +94,11 @@ class RunRequest:
             self.scenes, self.paths or {}, self.targets, self.learner, self.reward, self.seed, self.zone_level
         )
 
-    def trainer(self) -> Trainer:
-        """A trainer at its first frame."""
+    def trainer(self) -> Learning:
+        """A trainer at its first frame. A3C runs in as many processes as torch has threads."""
         world = make_world(self.scenes, self.targets, self.zone_level).to(self.device)
+        if self.learner.algorithm == "a3c":
+            return AsyncTrainer(world, self.learner, self.reward, self.seed, torch.get_num_threads())
         return Trainer(world, self.learner, self.reward, self.seed)
 
 
@@ -85,12 +119,16 @@ def train(request: RunRequest, out: Path, *, resume: bool = False, show_progress
     with folder.held():
         trainer = request.trainer()
         seconds = _prepare(folder, request.record(), trainer, resume)
-        with progress_view(trainer.learner.frames, show_progress) as view, _interruption() as interrupted:
+        with (
+            closing(trainer),
+            progress_view(trainer.learner.frames, show_progress) as view,
+            _interruption() as interrupted,
+        ):
             _run(trainer, folder, view, interrupted, seconds)
     return folder
 
 
-def _prepare(folder: RunFolder, record: RunRecord, trainer: Trainer, resume: bool) -> float:
+def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bool) -> float:
     """Begin a new run or load the newest checkpoint; returns the seconds trained so far."""
     if not folder.exists:
         for left in (folder.metrics_path, folder.checkpoints):
@@ -122,10 +160,11 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Trainer, resume: boo
     return progress.seconds
 
 
-def _run(trainer: Trainer, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float) -> None:
+def _run(
+    trainer: Learning, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float
+) -> None:
     """Update until the frames are used or the user interrupts; ends with a checkpoint either way."""
-    updates = -(-trainer.learner.frames // trainer.frames_per_update)
-    updates_a_row = max(1, updates // ROWS_A_RUN)
+    rows = _rows_due(trainer)
     log = MetricsLog(folder.metrics_path)
     saved_at = time.monotonic()
     try:
@@ -133,8 +172,9 @@ def _run(trainer: Trainer, folder: RunFolder, view: ProgressView, interrupted: t
             started = time.monotonic()
             update = trainer.update()
             seconds += time.monotonic() - started
-            if trainer.updates % updates_a_row == 0 or trainer.finished:
+            if _rows_due(trainer) > rows:
                 log.write(metrics_row(trainer, update, seconds))
+                rows = _rows_due(trainer)
             view.show(trainer.frames, trainer.statistics.solved, trainer.world.target_count)
             if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
                 save(trainer, folder, seconds)
@@ -146,7 +186,12 @@ def _run(trainer: Trainer, folder: RunFolder, view: ProgressView, interrupted: t
         raise KeyboardInterrupt
 
 
-def save(trainer: Trainer, folder: RunFolder, seconds: float) -> None:
+def _rows_due(trainer: Learning) -> int:
+    """Rows of metrics that training has come by; the last is due with the last frame."""
+    return trainer.frames * ROWS_A_RUN // trainer.learner.frames
+
+
+def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
     """Write a checkpoint of the trainer as it stands."""
     tensors = trainer.tensors()
     network = {key: value for key, value in tensors.items() if key.startswith("network.")}

@@ -66,14 +66,13 @@ class Trainer:
         seed: of parameters, environments, actions and shuffling.
 
     Raises:
-        RunError: the seed is out of range, features are missing or not finite, there are fewer environments than scenes, or fewer rows of a
-            scene than minibatches.
+        RunError: the seed is out of range, features are missing or not finite, there are fewer environments than
+            scenes, or fewer rows of a scene than minibatches.
     """
 
     def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
-        if not 0 <= seed < SEED_LIMIT:
-            raise RunError(f"seed is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
-        features = _checked_features(world)
+        check_seed(seed)
+        features = checked_features(world)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
         per_scene = learner.envs // world.scene_count
@@ -125,9 +124,8 @@ class Trainer:
         Raises:
             RunError: the loss or a gradient is not finite.
         """
-        learner, progress = self.learner, self.frames / self.learner.frames
-        lr = learner.lr_start + (learner.lr_end - learner.lr_start) * min(progress, 1.0)
-        entropy_weight = learner.entropy_start * (learner.entropy_end / learner.entropy_start) ** min(progress, 1.0)
+        learner = self.learner
+        lr, entropy_weight = learner.lr_at(self.frames), learner.entropy_weight_at(self.frames)
         self.lookup.refresh()
         rollout = self.collector.collect(self.statistics)
         batch, explained = self._batch(rollout)
@@ -151,7 +149,7 @@ class Trainer:
             lr=lr,
             entropy_weight=entropy_weight,
         )
-        self._check_finite(result)
+        check_finite(result, self.frames)
         return result
 
     def _begin_staggered(self) -> None:
@@ -275,13 +273,8 @@ class Trainer:
             weight = 1 + self.learner.balance * (1 - self.statistics.recent_success)
             choice.reweigh(torch.where(choice.weights > 0, weight[choice.members], 0.0))
 
-    def _check_finite(self, update: Update) -> None:
-        for name, value in (("loss", update.loss), ("gradient norm", update.gradient_norm)):
-            if not math.isfinite(value):
-                raise RunError(
-                    f"the {name} is {value} after {self.frames} frames. Training stopped; "
-                    "lower the learning rate or check the features"
-                )
+    def close(self) -> None:
+        """Nothing is held that would have to be given back; see `Learning` in `train`."""
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on bit for bit, besides `frames` and `updates`."""
@@ -340,7 +333,36 @@ def _mean(scalars: list[Tensor]) -> float:
     return float(torch.stack(scalars).mean())
 
 
-def _checked_features(world: World) -> Tensor:
+def check_seed(seed: int) -> None:
+    """Refuse seeds that the streams of random numbers cannot be made from.
+
+    Raises:
+        RunError: the seed is out of range.
+    """
+    if not 0 <= seed < SEED_LIMIT:
+        raise RunError(f"seed is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
+
+
+def check_finite(update: Update, frames: int) -> None:
+    """Stop where an update, the last of so many frames, has gone astray.
+
+    Raises:
+        RunError: the loss or the gradient's norm is not finite.
+    """
+    for name, value in (("loss", update.loss), ("gradient norm", update.gradient_norm)):
+        if not math.isfinite(value):
+            raise RunError(
+                f"the {name} is {value} after {frames} frames. Training stopped; "
+                "lower the learning rate or check the features"
+            )
+
+
+def checked_features(world: World) -> Tensor:
+    """The world's features (S, F).
+
+    Raises:
+        RunError: there are none, or some are not finite.
+    """
     if world.features is None:
         raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
     if not torch.isfinite(world.features).all():
