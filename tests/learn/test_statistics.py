@@ -26,6 +26,7 @@ def test_episodes_are_counted_for_their_target_when_they_end() -> None:
     assert statistics.take().tolist() == [[1, 0, 3, 2], [0, 0, 0, 0], [1, 1, 2, 2]]
     assert statistics.take().any().item() is False  # taken
     assert statistics.open_steps.tolist() == [1, 0]
+    assert statistics.open_collisions.tolist() == [0, 0]
 
 
 def test_figures_are_means_over_ended_episodes() -> None:
