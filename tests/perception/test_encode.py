@@ -70,8 +70,9 @@ def test_batches_do_not_matter(own_cache: Path, monkeypatch: pytest.MonkeyPatch)
         assert np.allclose(a.features, b.features, atol=1e-3)
 
 
-def test_the_order_of_scenes_does_not_matter() -> None:
+def test_the_order_of_scenes_does_not_matter(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = encode_scenes(rooms(), "random-resnet50")
+    monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / "other"))
     second = encode_scenes(rooms()[::-1], "random-resnet50")
     assert first[0].encoder.identity == second[0].encoder.identity
     assert np.array_equal(first[0].features, second[-1].features)

@@ -148,6 +148,11 @@ def pickle_only(folder: Path) -> None:
     (folder / "model.safetensors").rename(folder / "pytorch_model.bin")
 
 
+def hide_a_pickle_behind_safetensors(folder: Path) -> None:
+    (folder / "model.safetensors").rename(folder / "other.safetensors")
+    torch.save(tiny_resnet().state_dict(), folder / "pytorch_model.bin")
+
+
 def cut_weights(folder: Path) -> None:
     path = folder / "model.safetensors"
     path.write_bytes(path.read_bytes()[:-1000])
@@ -174,6 +179,7 @@ def deepen(folder: Path) -> None:
     ("spoil", "problem"),
     [
         (pickle_only, "no \\*.safetensors"),
+        (hide_a_pickle_behind_safetensors, "cannot be loaded"),
         (cut_weights, "cannot be loaded"),
         (bring_code, "cannot be loaded"),
         (widen, "encoder '"),

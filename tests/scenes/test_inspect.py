@@ -57,11 +57,12 @@ def test_spread_counts_directions() -> None:
     assert feature_spread(np.ones((5, 4))).effective_rank == 0
 
 
-def test_spread_finds_the_closest_pair_across_blocks() -> None:
+@pytest.mark.parametrize("pair", [(7, 1400), (1100, 1400)])
+def test_spread_finds_the_closest_pair_across_blocks(pair: tuple[int, int]) -> None:
     features = np.random.default_rng(1).normal(size=(1500, 8)).astype(np.float32)
-    features[1400] = 3 * features[7]
+    features[pair[1]] = 3 * features[pair[0]]
     spread = feature_spread(features)
-    assert spread.closest_states == (7, 1400)
+    assert spread.closest_states == pair
     assert spread.closest_cosine_distance < 1e-6
 
 
