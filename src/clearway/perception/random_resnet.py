@@ -6,7 +6,7 @@ standardised over that sample. Seed and statistics are kept in the record, so th
 
 Pictures are 128x128 here: on our bathroom and bedroom the features' effective rank was 19 and 22 and the closest
 pair of states 0.15 and 0.08 apart (cosine distance), against 11 and 10, 0.09 and 0.03 at 224x224, at a third
-of the cost. A sample of 256 pictures was no better than one of 64.
+of the pixels. A sample of 256 pictures was no better than one of 64.
 """
 
 from __future__ import annotations
