@@ -93,9 +93,7 @@ def made_up_features(locations_m: np.ndarray, headings_deg: np.ndarray, count: i
     return _waves(locations_m, headings_deg, count, seed=1234).astype(np.float32)
 
 
-def made_up_pictures(
-    locations_m: np.ndarray, headings_deg: np.ndarray, size: tuple[int, int] = (12, 16)
-) -> np.ndarray:
+def made_up_pictures(locations_m: np.ndarray, headings_deg: np.ndarray, size: tuple[int, int] = (12, 16)) -> np.ndarray:
     """Tiny smooth pictures of poses, (S, height, width, 3) uint8."""
     height, width = size
     coarse = _waves(locations_m, headings_deg, 4 * 4 * 3, seed=4321).reshape(-1, 4, 4, 3)
