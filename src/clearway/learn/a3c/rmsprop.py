@@ -34,7 +34,6 @@ class SharedRMSPropUpdate:
     def __init__(self, alpha: float = ALPHA, epsilon: float = EPSILON) -> None:
         self.alpha = alpha
         self.added = torch.tensor((1 - alpha) * epsilon)
-        self.gradient, self.root = torch.empty(BLOCK_ELEMENTS), torch.empty(BLOCK_ELEMENTS)
 
     @torch.no_grad()
     def low_rank(self, weight: Tensor, square: Tensor, left: Tensor, right: Tensor, lr: Sequence[float]) -> None:
@@ -45,18 +44,16 @@ class SharedRMSPropUpdate:
             left, right: (R, J, O), (R, J, I).
             lr: R learning rates.
         """
-        outputs, inputs = weight.shape
+        inputs = weight.shape[1]
         rows = max(1, BLOCK_ELEMENTS // inputs)
-        gradient, root = self._space(rows * inputs)
-        turned = left.transpose(1, 2)  # (R, O, J)
-        for first in range(0, outputs, rows):
-            part = slice(first, min(first + rows, outputs))
-            count = (part.stop - first) * inputs
-            block_gradient = gradient[:count].view(-1, inputs)
-            block_root = root[:count].view(-1, inputs)
-            block_weight, block_square = weight[part], square[part]
-            for worker, rate in enumerate(lr):
-                torch.mm(turned[worker, part], right[worker], out=block_gradient)
+        gradient, root = torch.empty(rows, inputs), torch.empty(rows, inputs)
+        rights = right.unbind(0)
+        lefts = left.transpose(1, 2).split(rows, 1)  # (R, rows, J) each
+        for block_weight, block_square, block_left in zip(weight.split(rows), square.split(rows), lefts, strict=True):
+            block = slice(0, len(block_weight))
+            block_gradient, block_root = gradient[block], root[block]
+            for own_left, own_right, rate in zip(block_left.unbind(0), rights, lr, strict=True):
+                torch.mm(own_left, own_right, out=block_gradient)
                 self._step(block_weight, block_square, block_gradient, block_root, rate)
 
     @torch.no_grad()
@@ -71,8 +68,3 @@ class SharedRMSPropUpdate:
         square.addcmul_(gradient, gradient, value=1 - self.alpha)
         torch.sqrt(square, out=root)
         parameter.addcdiv_(gradient, root, value=-lr)
-
-    def _space(self, elements: int) -> tuple[Tensor, Tensor]:
-        if elements > len(self.gradient):
-            self.gradient, self.root = torch.empty(elements), torch.empty(elements)
-        return self.gradient, self.root

@@ -1,0 +1,212 @@
+"""Whole A3C runs in processes: ends, resumes, deaths, interruption."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from clearway.errors import RunError
+from clearway.learn import train
+from clearway.learn.a3c.process import world_tensors
+from clearway.learn.a3c.shared import SharedTensors
+from clearway.learn.a3c.trainer import AsyncTrainer
+from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
+from clearway.learn.config import PAPER_A3C
+from clearway.learn.load import load_agent
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.train import RunRequest
+from clearway.learn.trainer import Update
+from clearway.reward import COLLISION_AWARE
+from small_runs import equal_bits, small_learner, small_request, small_world
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
+
+
+def a3c_request(frames: int) -> RunRequest:
+    return small_request(learner=small_learner(PAPER_A3C, frames=frames, rollout_steps=5))
+
+
+def async_trainer(frames: int, processes: int) -> AsyncTrainer:
+    return AsyncTrainer(small_world(), a3c_request(frames).learner, COLLISION_AWARE, 3, processes)
+
+
+def without_seconds(folder: RunFolder) -> list[dict[str, float]]:
+    return [{name: value for name, value in row.items() if name != "seconds"} for row in folder.metrics()]
+
+
+def children_of(process: int) -> list[int]:
+    """Worker processes of a process; multiprocessing's own helper is none."""
+    found = [int(pid) for pid in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    return [pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def wait_until_gone(processes: list[int]) -> None:
+    deadline = time.monotonic() + 30
+    while any(Path(f"/proc/{pid}").exists() and "Z" not in state_of(pid) for pid in processes):
+        assert time.monotonic() < deadline, "worker processes outlive their parent"
+        time.sleep(0.05)
+
+
+def state_of(process: int) -> str:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return "Z"
+
+
+@pytest.mark.slow
+def test_one_process_repeats_and_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    request = a3c_request(400)
+    whole = train.train(request, tmp_path / "whole")
+    parts = RunFolder(tmp_path / "parts")
+    with monkeypatch.context() as patch:
+        go_on = AsyncTrainer.update
+
+        def update(trainer: AsyncTrainer) -> Update:
+            if trainer.frames >= 150:
+                signal.raise_signal(signal.SIGINT)
+            return go_on(trainer)
+
+        patch.setattr(AsyncTrainer, "update", update)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(request, parts.path)
+    assert 150 <= read_progress(newest_checkpoint(parts.checkpoints)).frames < 400
+    train.train(request, parts.path, resume=True)
+    ends = [newest_checkpoint(folder.checkpoints) for folder in (whole, parts)]
+    assert equal_bits(*[read_network(end) for end in ends])
+    assert equal_bits(*[read_training(end) for end in ends])
+    progress = read_progress(ends[0])
+    assert 400 <= progress.frames < 450  # ten workers of five steps: the round that reaches the budget is finished
+    assert whole.metrics()[-1]["lr"] < whole.metrics()[0]["lr"] <= PAPER_A3C.lr_start
+    world = small_world()
+    policy = load_agent(whole.path).policy(world)
+    probabilities = policy(torch.zeros(2, 4, dtype=torch.int64), torch.tensor([0, 2]))
+    assert torch.allclose(probabilities.sum(1), torch.ones(2))
+
+
+@pytest.fixture
+def two_processes() -> Iterator[AsyncTrainer]:
+    with closing(async_trainer(10_000_000, processes=2)) as trainer:
+        trainer.update()
+        yield trainer
+
+
+def test_pauses_go_on_and_a_killed_worker_is_named(two_processes: AsyncTrainer) -> None:
+    trainer = two_processes
+    numbers = [process.pid for process in trainer._processes]
+    before = {name: tensor.clone() for name, tensor in trainer.tensors().items()}
+    frames = trainer.frames
+    time.sleep(0.2)
+    assert equal_bits(before, trainer.tensors()), "a worker went on while paused"
+    assert trainer.frames == frames == int(trainer.shared["frames"].sum())
+    trainer.update()
+    assert trainer.frames >= frames + trainer.frames_per_update
+    os.kill(numbers[1], signal.SIGKILL)
+    with pytest.raises(RunError, match=r"process 2 of 2 was killed by SIGKILL after \d+ frames.*--resume"):
+        while True:
+            trainer.update()
+    trainer.close()
+    wait_until_gone([number for number in numbers if number])
+
+
+RUN = """
+import sys
+from pathlib import Path
+import torch
+from clearway.learn.train import train
+from small_runs import small_learner, small_request
+from clearway.learn.config import PAPER_A3C
+torch.set_num_threads(2)
+train(small_request(learner=small_learner(PAPER_A3C, frames=10_000_000, rollout_steps=5)), Path(sys.argv[1]))
+"""
+
+
+def run_until_metrics(folder: Path) -> tuple[subprocess.Popen, list[int]]:
+    """A run of its own process group that has written metrics, and its workers."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", RUN, str(folder)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": ":".join(sys.path)},
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while len(workers := children_of(process.pid)) < 2 or not all(has_begun(pid) for pid in workers):
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return process, workers
+
+
+def has_begun(process: int) -> bool:
+    """The worker has begun: it maps the shared memory."""
+    return "clearway-a3c" in Path(f"/proc/{process}/maps").read_text()
+
+
+@needs_proc
+def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
+    process, workers = run_until_metrics(tmp_path)
+    with process:
+        process.kill()
+    wait_until_gone(workers)
+
+
+@pytest.mark.slow
+@needs_proc
+def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
+    process, workers = run_until_metrics(tmp_path)
+    with process:
+        os.killpg(process.pid, signal.SIGINT)  # a terminal signals all processes of the run
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGINT
+    assert errors.count("Traceback") == 1, errors  # the parent's own
+    wait_until_gone(workers)
+    trainer = a3c_request(10_000_000).trainer()
+    folder = RunFolder(tmp_path)
+    train._prepare(folder, a3c_request(10_000_000).record(), trainer, resume=True)
+    assert trainer.frames == read_progress(newest_checkpoint(folder.checkpoints)).frames > 0
+
+
+def test_too_few_workers_are_refused() -> None:
+    learner = replace(a3c_request(100).learner, envs=4)
+    with pytest.raises(RunError, match="4 workers for 5 targets"):
+        AsyncTrainer(small_world(), learner, COLLISION_AWARE, 0)
+
+
+def test_more_processes_than_workers_are_not_started() -> None:
+    assert async_trainer(100, processes=64).process_count == 10
+
+
+def test_a_loss_that_is_not_finite_stops_training() -> None:
+    with closing(async_trainer(1000, processes=1)) as trainer:
+        trainer.shared["parameters.output_bias"][0, 4] = torch.nan
+        with pytest.raises(RunError, match="nan after"):
+            trainer.update()
+
+
+def test_shared_tensors_keep_shapes_types_and_values() -> None:
+    tables = world_tensors(small_world())
+    shared = SharedTensors.holding(tables)
+    assert equal_bits(dict(shared), tables)
+    assert [shared[name].dtype for name in tables] == [tensor.dtype for tensor in tables.values()]
+    shared["world.zone"][3] = 77
+    assert shared.part("world")["zone"][3] == 77
+    tables["world.zone"][3] = 77
+    assert equal_bits(dict(shared), tables)
+
+
+def test_memory_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full, raising=False)
+    with pytest.raises(RunError, match="no 0 MB of memory"):
+        SharedTensors.holding({"a": torch.ones(3)})
