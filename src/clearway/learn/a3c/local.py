@@ -151,4 +151,4 @@ def _head_rows(rows_per_scene: list[int]) -> list[tuple[int, slice]]:
 
 def _projected(rows: Tensor, weight: Tensor) -> Tensor:
     """(B, O) product of rows (B, F) and weight^T, weight (O, F)."""
-    return torch.mm(weight, rows.T).T
+    return torch.mm(weight, rows.T.contiguous()).T  # the fastest order for few rows
