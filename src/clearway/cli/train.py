@@ -46,9 +46,9 @@ class Train:
     zones: ZoneLevel = "pose"
     """Whether zones are those of poses or of whole cells."""
     algorithm: Algorithm | None = None
-    """ppo or a2c, instead of the preset's own."""
+    """ppo, a2c or a3c, instead of the preset's own; a3c goes with the presets paper and paper-a3c."""
     preset: PresetName = "default"
-    """default is our recipe; paper is the published settings, synchronous."""
+    """default is our recipe; paper is the published settings, synchronous; paper-a3c the same with asynchronous workers."""
     set: tuple[str, ...] = ()
     """Single settings of the learner, for example --set envs=200 clip_rewards=true (all: clearway.learn.config)."""
     frames: int | None = None
@@ -56,7 +56,7 @@ class Train:
     seed: int = 0
     """Of parameters, environments, actions and the choice of targets."""
     threads: int | None = None
-    """Threads of torch; results repeat bit for bit at one number of threads."""
+    """Threads of torch, or processes of a3c. Results repeat bit for bit at one number of threads, and a3c's with 1."""
     device: str = "cpu"
     """cpu or cuda."""
     resume: bool = False
@@ -92,8 +92,8 @@ class Train:
         learner = PRESETS[self.preset]
         if self.algorithm == "a2c":
             learner = learner.as_a2c()
-        elif self.algorithm == "ppo":
-            learner = replace(learner, algorithm="ppo")
+        elif self.algorithm is not None:
+            learner = replace(learner, algorithm=self.algorithm)
         if self.frames is not None:
             learner = replace(learner, frames=self.frames)
         return with_settings(learner, self.set)
