@@ -48,7 +48,7 @@ class Train:
     algorithm: Algorithm | None = None
     """ppo, a2c or a3c, instead of the preset's own; a3c goes with the presets paper and paper-a3c."""
     preset: PresetName = "default"
-    """default is our recipe; paper is the published settings, synchronous; paper-a3c the same with asynchronous workers."""
+    """default is our recipe; paper is the published settings, synchronous; paper-a3c is the published algorithm."""
     set: tuple[str, ...] = ()
     """Single settings of the learner, for example --set envs=200 clip_rewards=true (all: clearway.learn.config)."""
     frames: int | None = None
