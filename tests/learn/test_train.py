@@ -215,3 +215,9 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     trainer = request.trainer()
     assert train._prepare(folder, request.record(), trainer, resume=True) == progress.seconds
     assert Progress(trainer.frames, trainer.updates, progress.seconds) == progress
+
+
+def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    for name in ("nonsense", "cuda:99"):
+        with pytest.raises(RunError, match=f"device {name}: cannot be used here"):
+            train.train(small_request(device=name), tmp_path)

@@ -96,7 +96,7 @@ class RunRequest:
 
     def trainer(self) -> Learning:
         """A trainer at its first frame. A3C runs in as many processes as torch has threads."""
-        world = make_world(self.scenes, self.targets, self.zone_level).to(self.device)
+        world = make_world(self.scenes, self.targets, self.zone_level).to(usable_device(self.device))
         if self.learner.algorithm == "a3c":
             return AsyncTrainer(world, self.learner, self.reward, self.seed, torch.get_num_threads())
         return Trainer(world, self.learner, self.reward, self.seed)
@@ -222,6 +222,21 @@ def _interruption() -> Iterator[threading.Event]:
     finally:
         for number, old in before.items():
             signal.signal(number, old)
+
+
+def usable_device(name: str) -> torch.device:
+    """The torch device of that name.
+
+    Raises:
+        RunError: there is none on this machine.
+    """
+    try:
+        device = torch.device(name)
+        torch.empty(1, device=device)
+    except (RuntimeError, AssertionError) as error:  # torch without CUDA asserts
+        reason = str(error).splitlines()[0]
+        raise RunError(f"device {name}: cannot be used here ({reason}). Give another --device, such as cpu") from error
+    return device
 
 
 def set_threads(count: int | None) -> None:
