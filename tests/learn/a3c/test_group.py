@@ -123,3 +123,13 @@ def test_figures_are_means_over_the_updates() -> None:
 def test_what_a3c_does_not_have_is_refused(change: dict) -> None:
     with pytest.raises(RunError, match=f"a3c with {next(iter(change))}"):
         replace(PAPER_A3C, **change)
+
+
+def test_the_published_settings() -> None:
+    paper = PAPER_A3C
+    assert (paper.algorithm, paper.envs, paper.rollout_steps, paper.step_limit) == ("a3c", 20, 5, 5000)
+    assert (paper.discount, paper.entropy_start, paper.entropy_end, paper.value_weight / 2) == (0.99, 0.01, 0.01, 0.25)
+    assert (paper.lr_at(0), paper.lr_at(paper.frames // 2), paper.lr_at(paper.frames)) == (7e-4, 3.5e-4, 0)
+    assert (paper.clip_norm, paper.clip_each_tensor, paper.sum_loss) == (40, True, True)
+    assert (paper.clip_rewards, paper.reward_scale, paper.bootstrap_cut, paper.gae_lambda) == (True, 1, False, 1)
+    assert (paper.width, paper.history_length, paper.centre_features) == (512, 4, False)

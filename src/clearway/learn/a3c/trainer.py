@@ -198,12 +198,13 @@ class AsyncTrainer:
 
     def _messages(self) -> Iterator[Report | Message]:
         """At least one message of the processes."""
-        for ready in wait(self._connections):
-            number = self._connections.index(ready)  # type: ignore[arg-type]  # only connections are waited for
-            try:
-                yield self._connections[number].recv()
-            except (EOFError, ConnectionError):
-                raise self._death(number) from None
+        ready = wait(self._connections)
+        for number, connection in enumerate(self._connections):
+            if connection in ready:
+                try:
+                    yield connection.recv()
+                except (EOFError, ConnectionError):
+                    raise self._death(number) from None
 
     def _death(self, number: int) -> RunError:
         """What to say of a process whose connection is closed."""
