@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
-
-from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-SCENE_SUFFIXES = (".h5", ".hdf5")
 
 
 def print_json(content: object) -> None:
@@ -45,25 +40,3 @@ def showing_warnings() -> Iterator[None]:
         warnings.simplefilter("ignore", FutureWarning)
         warnings.showwarning = show
         yield
-
-
-def scene_files(paths: Sequence[Path]) -> list[Path]:
-    """The scene files that some paths name: files as they are, folders by the scene files in them.
-
-    Raises:
-        ClearwayError: a path does not exist, or a folder holds no scene file.
-    """
-    files: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
-            if not found:
-                raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
-            files += found
-        elif path.exists():
-            files.append(path)
-        else:
-            raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
-    if not files:
-        raise ClearwayError("no scene file given. Name at least one, or make one with clearway scenes build")
-    return files

@@ -9,7 +9,8 @@ from typing import Annotated
 
 import tyro
 
-from clearway.cli.console import print_json, scene_files, stderr_console
+from clearway.cli.arguments import scene_files
+from clearway.cli.console import print_json, stderr_console
 from clearway.errors import RunError
 
 

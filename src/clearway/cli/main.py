@@ -15,6 +15,7 @@ import tyro
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
+from clearway.cli.oracle import Oracle
 from clearway.cli.scenes import Build, Import, Inspect
 from clearway.cli.train import Train
 from clearway.errors import ClearwayError
@@ -45,6 +46,7 @@ Command = (
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Oracle, tyro.conf.subcommand("oracle")]
 )
 
 
@@ -66,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(_exit_code(command))
 
 
-def _exit_code(command: Demo | Scenes | Train | Evaluate) -> int:
+def _exit_code(command: Demo | Scenes | Train | Evaluate | Oracle) -> int:
     try:
         with showing_warnings():
             command.run()

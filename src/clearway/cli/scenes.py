@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
 from clearway.choices import RoomName
-from clearway.cli.console import print_json, scene_files, stderr_console
+from clearway.cli.arguments import scene_files
+from clearway.cli.console import print_json, stderr_console
 from clearway.errors import ClearwayError
 
 
@@ -101,7 +102,7 @@ class Inspect:
         (path,) = scene_files([self.file])
         scene = read_scene(path)
         zones = scene_zones(scene)
-        content = {**asdict(summary(scene)), "zones": zone_counts(zones)}
+        content = {**summary(scene).to_json(), "zones": zone_counts(zones)}
         if self.map:
             from clearway.viz.maps import draw_map
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
 from clearway.choices import RewardName, ZoneLevel
-from clearway.cli.console import scene_files, stderr_console
-from clearway.errors import ClearwayError, RunError
+from clearway.cli.arguments import chosen_reward, chosen_targets, scene_files
+from clearway.cli.console import stderr_console
+from clearway.errors import RunError
 from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
-
-if TYPE_CHECKING:
-    from clearway.reward import Reward
-    from clearway.scenes.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ class Train:
             scenes=scenes,
             targets=chosen_targets(scenes, self.targets, self.seed),
             learner=self._learner(),
-            reward=self._reward(),
+            reward=chosen_reward(self.reward, self.alpha, self.beta, self.gamma, self.terminal),
             seed=self.seed,
             zone_level=self.zones,
             paths={scene.name: path for scene, path in zip(scenes, files, strict=True)},
@@ -82,11 +79,6 @@ class Train:
         )
         train(request, self.out, resume=self.resume, show_progress=True)
         stderr_console().print(f"{self.out}: trained. Next: clearway evaluate {self.out}", highlight=False)
-
-    def _reward(self) -> Reward:
-        from clearway.reward import REWARDS
-
-        return REWARDS[self.reward].with_changes(self.alpha, self.beta, self.gamma, self.terminal)
 
     def _learner(self) -> Learner:
         learner = PRESETS[self.preset]
@@ -124,28 +116,3 @@ def _parsed(word: str, text: str, example: object) -> object:
         return type(example)(text)  # type: ignore[call-arg]  # int, float or str
     except ValueError as error:
         raise RunError(f"--set {word}: expected a value of type {type(example).__name__}. Correct it") from error
-
-
-def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> dict[str, tuple[int, ...]]:
-    """Targets by scene name from the command line's words; scenes without any get their default ones.
-
-    Raises:
-        ClearwayError: a word cannot be read, names no scene given, or leaves open which scene it means.
-    """
-    from clearway.scenes.targets import default_targets
-
-    names = [scene.name for scene in scenes]
-    named: dict[str, tuple[int, ...]] = {}
-    for word in words:
-        name, equals, states = word.rpartition("=")
-        if not equals:
-            if len(scenes) > 1:
-                raise ClearwayError(f"--targets {word}: several scenes are given. Write SCENE={word}")
-            name = names[0]
-        if name not in names:
-            raise ClearwayError(f"--targets {word}: no scene of that name. Name one of {', '.join(names)}")
-        try:
-            named[name] = named.get(name, ()) + tuple(int(state) for state in states.split(","))
-        except ValueError as error:
-            raise ClearwayError(f"--targets {word}: expected state numbers such as 26,37,43. Correct it") from error
-    return {scene.name: named.get(scene.name) or default_targets(scene, seed) for scene in scenes}

@@ -44,7 +44,7 @@ class EpisodeTable:
         collisions: (N,) int64, blocked moves.
         reached: (N,) bool, the target was reached before the cap.
         shortest_path_steps: (N,) int64, fewest steps from the start to the target.
-        zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`).
+        zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
         trajectories: the walks, one an episode; None unless asked for.
     """
 

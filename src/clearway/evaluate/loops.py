@@ -32,7 +32,7 @@ class Tally:
 
     def plus_step(self, happened: Transition) -> Tally:
         """One step later."""
-        arrived = torch.nn.functional.one_hot(happened.zone, ZONE_COUNT)
+        arrived = torch.nn.functional.one_hot(happened.zone, ZONE_COUNT) * ~happened.reached[:, None]
         return Tally(self.steps + 1, self.collisions + happened.blocked, self.zone_steps + arrived)
 
     def plus_rounds(self, rounds: Tensor, since: Tally) -> Tally:

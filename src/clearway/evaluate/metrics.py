@@ -91,6 +91,8 @@ METRICS: dict[str, Metric] = {
     "sc": Metric(sc),
     "spl": Metric(spl),
     "collision_free_spl": Metric(collision_free_spl),
+    "collision_visits": Metric(_steps_in(Zone.COLLISION)),
+    "precollision_visits": Metric(_steps_in(Zone.PRECOLLISION)),
     "share_free": Metric(_steps_in(Zone.FREE), steps),
     "share_precollision": Metric(_steps_in(Zone.PRECOLLISION), steps),
     "share_collision": Metric(_steps_in(Zone.COLLISION), steps),

@@ -31,6 +31,7 @@ DISCOUNT = 0.99
 ENTROPY_WEIGHT = 0.01
 TIE = 1e-9  # action values closer than this are equal
 CONVERGED = 1e-11
+NEAR = 1e-2  # error of values below which Newton's method takes over
 MOST_ROUNDS = 1000
 
 
@@ -138,7 +139,10 @@ def optimal_policy(task: Task, discount: float = DISCOUNT) -> np.ndarray:
 
 
 def soft_policy(task: Task, discount: float = DISCOUNT, entropy_weight: float = ENTROPY_WEIGHT) -> np.ndarray:
-    """The fixed point pi = softmax(Q^pi / entropy_weight), (S, A), by evaluating each policy exactly.
+    """The fixed point pi = softmax(Q^pi / entropy_weight), (S, A).
+
+    Far from it each policy is evaluated exactly; near it Newton's method solves V = sum_a pi_V(a) Q_V(a), with
+    d V / d Q_a = pi(a) (1 + (Q_a - V) / entropy_weight).
 
     Raises:
         SceneError: the policies do not settle, which a larger entropy weight or a smaller discount mends.
@@ -148,9 +152,15 @@ def soft_policy(task: Task, discount: float = DISCOUNT, entropy_weight: float = 
         values = action_values(task, value, discount)
         policy = np.exp((values - values.max(1, keepdims=True)) / entropy_weight)
         policy /= policy.sum(1, keepdims=True)
-        before, value = value, _policy_value(task, policy, discount)
-        if np.abs(value - before).max() < CONVERGED:
+        renewed = (policy * values).sum(1)
+        error = np.abs(renewed - value).max()
+        if error < CONVERGED:
             return policy
+        if error > NEAR:
+            value = _policy_value(task, policy, discount)
+        else:
+            slope = policy * (1 + (values - renewed[:, None]) / entropy_weight)
+            value = value + _discounted_solve(task, slope, discount, renewed - value)
     raise SceneError(
         f"target {task.target}",
         f"the soft policy did not settle in {MOST_ROUNDS} rounds",
@@ -187,19 +197,24 @@ def expected(task: Task, policy: np.ndarray) -> Expected:
     return Expected(steps, collisions, collision_visits, precollision_visits)
 
 
-def _transitions(task: Task, policy: np.ndarray) -> csr_array:
-    """(S, S) probabilities of going from row to column."""
-    count = len(policy)
+def _transitions(task: Task, weights: np.ndarray) -> csr_array:
+    """(S, S): weights (S, A) of actions added up by where they lead; for a policy, transition probabilities."""
+    count = len(weights)
     rows = np.repeat(np.arange(count), ACTION_COUNT)
-    return csr_array((policy.reshape(-1), (rows, task.next_state.reshape(-1))), shape=(count, count))
+    return csr_array((weights.reshape(-1), (rows, task.next_state.reshape(-1))), shape=(count, count))
 
 
 def _policy_value(task: Task, policy: np.ndarray, discount: float) -> np.ndarray:
     """V^pi (S,), the target's own value counted as 0."""
-    stays = np.ones(len(policy))
+    return _discounted_solve(task, policy, discount, (policy * task.reward).sum(1))
+
+
+def _discounted_solve(task: Task, weights: np.ndarray, discount: float, right: np.ndarray) -> np.ndarray:
+    """X with x(s) = right(s) + discount sum_a weights(s, a) x(s'), where the target's own x counts as 0."""
+    stays = np.ones(len(weights))
     stays[task.target] = 0.0
-    onward = _transitions(task, policy).multiply(stays[None, :])
-    return _solve(eye_array(len(policy)) - discount * onward, (policy * task.reward).sum(1))
+    onward = _transitions(task, weights).multiply(stays[None, :])
+    return _solve(eye_array(len(weights)) - discount * onward, right)
 
 
 def _solve(matrix: csr_array, right: np.ndarray) -> np.ndarray:

@@ -17,19 +17,21 @@ def evaluate_agents(
     world: World,
     agents: Mapping[str, Policy],
     *,
+    references: Mapping[str, Policy] | None = None,
     encoder: str,
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
     seed: int = 0,
     history_length: int = HISTORY_LENGTH,
 ) -> list[Evaluation]:
-    """Every agent with sampled actions and with argmax, then the random and the shortest-path agent.
+    """Every agent with sampled actions and with argmax, then the references, random and shortest-path agent.
 
-    All face the same starts. Order: "sampled" and "argmax" of each agent in turn, "random", "shortest path".
+    All face the same starts. Order: each agent "sampled" and "argmax", references, "random", "shortest path".
 
     Args:
         world: scenes and targets.
         agents: policies by the agent's name.
+        references: further policies to compare with, sampled only.
         encoder: name of the encoder whose features the agents see.
         episodes_per_target: how many each.
         step_cap: steps after which an episode has failed.
@@ -39,6 +41,7 @@ def evaluate_agents(
     rows: list[tuple[str, ActionSelection, Policy]] = []
     for name, policy in agents.items():
         rows += [(name, "sampled", policy), (name, "argmax", argmax(policy))]
+    rows += [(name, "sampled", policy) for name, policy in (references or {}).items()]
     rows += [(RANDOM, "sampled", random_policy()), (SHORTEST_PATH, "sampled", shortest_path_policy(world))]
     evaluations = []
     for name, selection, policy in rows:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluate.optimum import optimum_policies, world_yardsticks
+from clearway.evaluate.policies import Policy
 from clearway.evaluate.protocol import evaluate_agents
 from clearway.evaluate.report import Evaluation
 from clearway.learn.load import Agent, run_world
+from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 
 
@@ -20,7 +25,7 @@ def evaluate_run(
     step_cap: int = STEP_CAP,
     seed: int = 0,
 ) -> list[Evaluation]:
-    """The agent of a run, sampled and by argmax, beside the random and the shortest-path agent.
+    """The agent of a run, sampled and by argmax, beside exact optima, the random and the shortest-path agent.
 
     The first evaluation is the paper's: sampled actions.
     """
@@ -41,7 +46,7 @@ def evaluate_runs(
     step_cap: int = STEP_CAP,
     seed: int = 0,
 ) -> list[Evaluation]:
-    """Agents of several runs on the same scenes and targets, beside the random and the shortest-path agent.
+    """Agents of several runs on the same scenes and targets, beside exact optima, random and shortest-path agent.
 
     Raises:
         RunError: the runs have other targets, or networks of another history length.
@@ -55,12 +60,24 @@ def evaluate_runs(
     return evaluate_agents(
         world,
         {name: agent.policy(world) for name, agent in agents.items()},
+        references=_optima(world, [record.reward for record in records]),
         encoder=encoder_names(scenes),
         episodes_per_target=episodes_per_target,
         step_cap=step_cap,
         seed=seed,
         history_length=first.learner.history_length,
     )
+
+
+def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
+    """What would be best under each reward, exactly, and where the published loss comes to rest (see `oracle`)."""
+    found: dict[str, Policy] = {}
+    for reward in dict.fromkeys(rewards):
+        best, _ = optimum_policies(world, world_yardsticks(world, reward))
+        _, soft = optimum_policies(world, world_yardsticks(world, replace(reward, clip=True)))
+        found[f"{reward.name}: optimum"] = best
+        found[f"{reward.name}: soft optimum, clipped"] = soft
+    return found
 
 
 def encoder_names(scenes: Sequence[Scene]) -> str:

@@ -1,0 +1,77 @@
+"""What several commands read from the command line alike: scene files, targets, rewards."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clearway.choices import RewardName
+from clearway.errors import ClearwayError
+
+if TYPE_CHECKING:
+    from clearway.reward import Reward
+    from clearway.scenes.scene import Scene
+
+SCENE_SUFFIXES = (".h5", ".hdf5")
+
+
+def scene_files(paths: Sequence[Path]) -> list[Path]:
+    """The scene files that some paths name: files as they are, folders by the scene files in them.
+
+    Raises:
+        ClearwayError: a path does not exist, or a folder holds no scene file.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
+            if not found:
+                raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
+            files += found
+        elif path.exists():
+            files.append(path)
+        else:
+            raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
+    if not files:
+        raise ClearwayError("no scene file given. Name at least one, or make one with clearway scenes build")
+    return files
+
+
+def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> dict[str, tuple[int, ...]]:
+    """Targets by scene name from the command line's words; scenes without any get their default ones.
+
+    Raises:
+        ClearwayError: a word cannot be read, names no scene given, or leaves open which scene it means.
+    """
+    from clearway.scenes.targets import default_targets
+
+    names = [scene.name for scene in scenes]
+    named: dict[str, tuple[int, ...]] = {}
+    for word in words:
+        name, equals, states = word.rpartition("=")
+        if not equals:
+            if len(scenes) > 1:
+                raise ClearwayError(f"--targets {word}: several scenes are given. Write SCENE={word}")
+            name = names[0]
+        if name not in names:
+            raise ClearwayError(f"--targets {word}: no scene of that name. Name one of {', '.join(names)}")
+        try:
+            named[name] = named.get(name, ()) + tuple(int(state) for state in states.split(","))
+        except ValueError as error:
+            raise ClearwayError(f"--targets {word}: expected state numbers such as 26,37,43. Correct it") from error
+    return {scene.name: named.get(scene.name) or default_targets(scene, seed) for scene in scenes}
+
+
+def chosen_reward(
+    name: RewardName,
+    alpha: float | None,
+    beta: float | None,
+    gamma: float | None,
+    terminal: float | None,
+    clip: bool | None = None,
+) -> Reward:
+    """The reward of a name with single values changed; None changes nothing."""
+    from clearway.reward import REWARDS
+
+    return REWARDS[name].with_changes(alpha, beta, gamma, terminal, clip)

@@ -1,0 +1,87 @@
+"""`clearway oracle`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from clearway.choices import RewardName, ZoneLevel
+from clearway.cli.arguments import chosen_reward, chosen_targets, scene_files
+from clearway.cli.console import print_json
+from clearway.errors import ClearwayError
+
+if TYPE_CHECKING:
+    from clearway.evaluate.optimum import TargetYardstick
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """Exact yardsticks without learning: shortest path, optimal policy and soft fixed point of each target.
+
+    Example: clearway oracle bathroom.h5 --reward collision-aware --entropy 0.01
+    """
+
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Scene files, or folders of them."""
+    targets: tuple[str, ...] = ()
+    """Target states, as for clearway train."""
+    reward: RewardName = "collision-aware"
+    """The reward."""
+    alpha: float | None = None
+    """Reward of an ordinary step, instead of the reward's own."""
+    beta: float | None = None
+    """Reward of a step into the collision zone, instead of the reward's own."""
+    gamma: float | None = None
+    """Reward of a step into the precollision zone, instead of the reward's own."""
+    terminal: float | None = None
+    """Reward of reaching the target, instead of the reward's own."""
+    clip: bool = True
+    """Clip rewards to [-1, 1], so that the target is worth 1, as in Zhu's training loop."""
+    zones: ZoneLevel = "pose"
+    """Whether zones are those of poses or of whole cells."""
+    entropy: float = 0.01
+    """Entropy weight of the soft fixed point."""
+    discount: float = 0.99
+    """Discount of the reward."""
+    seed: int = 0
+    """Of the default targets."""
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:
+        """Solve and print."""
+        from clearway.envs.world import make_world
+        from clearway.evaluate.optimum import world_yardsticks
+        from clearway.scenes.thor_v1 import read_scene
+
+        if not 0 < self.discount < 1:
+            raise ClearwayError(f"--discount is {self.discount}, expected between 0 and 1. Give such a value")
+        if not self.entropy > 0:
+            raise ClearwayError(f"--entropy is {self.entropy}, expected more than 0. Give a positive weight")
+        scenes = [replace(read_scene(path), features=None) for path in scene_files(self.files)]
+        world = make_world(scenes, chosen_targets(scenes, self.targets, self.seed), self.zones)
+        reward = chosen_reward(self.reward, self.alpha, self.beta, self.gamma, self.terminal, self.clip)
+        found = world_yardsticks(world, reward, discount=self.discount, entropy_weight=self.entropy)
+        if self.json:
+            print_json([one.to_json() for one in found])
+        else:
+            _print_table(found)
+
+
+def _print_table(found: list[TargetYardstick]) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, caption="means over all starts; a visit is an arrival", caption_justify="left")
+    for heading in ("scene", "target", "shortest", "optimal", "collision visits", "soft", "collisions", "visits"):
+        table.add_column(heading, justify="left" if heading == "scene" else "right")
+    for one in found:
+        optimal, soft = one.yardstick.optimal, one.yardstick.soft
+        figures = (optimal.steps, optimal.collision_visits, soft.steps, soft.collisions, soft.collision_visits)
+        steps = f"{one.yardstick.shortest_path_steps:.2f}"
+        table.add_row(one.scene, str(one.target), steps, *(f"{figure:.3f}" for figure in figures))
+    Console().print(table)
