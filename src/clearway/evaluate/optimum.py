@@ -14,6 +14,8 @@ from clearway.evaluate.policies import Policy
 from clearway.reward import Reward
 from clearway.scenes.actions import BLOCKED
 
+OPTIMUM, SOFT_FIXED_POINT = "optimum", "soft fixed point"  # names of the two policies in tables
+
 
 @dataclass(frozen=True)
 class TargetYardstick:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
-from clearway.evaluate.optimum import optimum_policies, world_yardsticks
+from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_policies, world_yardsticks
 from clearway.evaluate.policies import Policy
 from clearway.evaluate.protocol import evaluate_agents
 from clearway.evaluate.report import Evaluation
@@ -75,8 +75,8 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
     for reward in dict.fromkeys(rewards):
         best, _ = optimum_policies(world, world_yardsticks(world, reward))
         _, soft = optimum_policies(world, world_yardsticks(world, replace(reward, clip=True)))
-        found[f"{reward.name}: optimum"] = best
-        found[f"{reward.name}: soft optimum, clipped"] = soft
+        found[f"{OPTIMUM} ({reward.name})"] = best
+        found[f"{SOFT_FIXED_POINT} ({reward.name})"] = soft
     return found
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT
 from clearway.evaluate.report import Evaluation, Result
 
 if TYPE_CHECKING:
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 
 Level = Literal["average", "scenes", "targets"]
 MARK = "✗"
+REFERENCES = {
+    OPTIMUM: "the exact best policy under that reward, ties taken alike",
+    SOFT_FIXED_POINT: "where the published loss comes to rest, exactly (entropy weight 0.01, rewards clipped)",
+}
 
 
 @dataclass(frozen=True)
@@ -78,17 +83,21 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, n
 
     Args:
         evaluations: at least one.
-        level: one row an evaluation ("average"), or one for each of its "scenes" or "targets".
+        level: one row an evaluation ("average"), or one for each of its "scenes" or "targets"; a single scene is the
+            average.
         narrow: the main figures alone, which fit a terminal.
     """
     assert evaluations, "a table needs at least one evaluation"
+    if level == "scenes" and len(evaluations[0].scenes) == 1:
+        level = "average"
     columns = [column for column in COLUMNS if column.main or not narrow]
     where = () if level == "average" else ("scene",)
     headings = (*where, "agent", "solved", *(column.heading for column in columns))
+    names = [evaluation.agent for evaluation in evaluations]
     rows = tuple(
         (
             *_place(result, level),
-            Cell(evaluation.agent, evaluation.protocol.action_selection),
+            Cell(evaluation.agent, evaluation.protocol.action_selection if names.count(evaluation.agent) > 1 else ""),
             _solved(result),
             *(column.cell(result) for column in columns),
         )
@@ -115,7 +124,11 @@ def rich_table(evaluations: Sequence[Evaluation], level: Level = "average") -> T
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), caption="\n".join(content.notes), caption_justify="left")
     first_figure = content.headings.index("solved")
     for index, heading in enumerate(content.headings):
-        table.add_column(heading, justify="left" if index < first_figure else "right", overflow="fold")
+        if index < first_figure:
+            longest = max(len(word) for row in content.rows for word in row[index].text.split())
+            table.add_column(heading, overflow="fold", min_width=longest)
+        else:
+            table.add_column(heading, justify="right", no_wrap=True)
     for row in content.rows:
         texts = []
         for cell in row:
@@ -159,6 +172,9 @@ def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
         f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_cap:,} "
         f"steps, seed {protocol.seed}. Ranges: 95 % bootstrap intervals over episodes.",
     ]
+    for name, meaning in REFERENCES.items():
+        if any(evaluation.agent.startswith(name) for evaluation in evaluations):
+            notes.append(f"{name.capitalize()}: {meaning}.")
     if any(evaluation.average.failed_targets for evaluation in evaluations):
         notes.append(
             f"{MARK} Not every episode reached its target; a failed episode counts with all its "
