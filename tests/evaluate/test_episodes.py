@@ -7,7 +7,8 @@ from torch import Tensor
 
 from clearway.envs.world import World, make_world
 from clearway.evaluate.episodes import EpisodeTable, run_episodes
-from clearway.evaluate.policies import Policy, argmax, random_policy, shortest_path_policy
+from clearway.evaluate.policies import argmax, random_policy, shortest_path_policy
+from clearway.model.policy import Policy
 from clearway.scenes.actions import Action
 from clearway.zones import Zone
 from made import corridor_scene, grid_scene, scene_of_cells

@@ -16,7 +16,7 @@ from clearway.envs.navigation import HISTORY_LENGTH, Navigation, Transition
 from clearway.envs.streams import Streams, stream_keys
 from clearway.envs.world import World
 from clearway.evaluate.loops import LoopSkipper, Tally
-from clearway.evaluate.policies import Policy
+from clearway.model.policy import Policy
 from clearway.reward import COLLISION_AWARE
 
 EPISODES_PER_TARGET = 100

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from clearway.envs.world import World
 from clearway.evaluate.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, make_task, yardstick
-from clearway.evaluate.policies import Policy
+from clearway.model.policy import Policy
 from clearway.reward import Reward
 from clearway.scenes.actions import BLOCKED
 

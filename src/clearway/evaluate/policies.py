@@ -1,23 +1,16 @@
-"""Policies as functions: what an agent does, given where it is and where it has to go.
+"""Policies to compare an agent with, and the ways in which it can choose its actions.
 
 Axis letters: B batch, K poses of history (newest last), A actions, M targets, S states of all scenes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import torch
 from torch import Tensor
 
 from clearway.envs.world import World
+from clearway.model.policy import Policy
 from clearway.scenes.actions import ACTION_COUNT
-
-Policy = Callable[[Tensor, Tensor], Tensor]
-"""history (B, K) int64 states in the world's numbering, target (B,) int64 -> probabilities of actions (B, A).
-
-A pure function: the same history and target give the same probabilities. They need not sum to one exactly.
-"""
 
 
 def random_policy() -> Policy:

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.world import World
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP, run_episodes
-from clearway.evaluate.policies import Policy, argmax, random_policy, shortest_path_policy
+from clearway.evaluate.policies import argmax, random_policy, shortest_path_policy
 from clearway.evaluate.report import ActionSelection, Evaluation, Protocol, summarise
+from clearway.model.policy import Policy
 
 RANDOM, SHORTEST_PATH = "random", "shortest path"
 

@@ -9,10 +9,10 @@ from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_policies, world_yardsticks
-from clearway.evaluate.policies import Policy
 from clearway.evaluate.protocol import evaluate_agents
 from clearway.evaluate.report import Evaluation
 from clearway.learn.load import Agent, run_world
+from clearway.model.policy import Policy
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 

@@ -10,7 +10,7 @@ import numpy as np
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.world import World
 from clearway.evaluate.episodes import Trajectory, run_episodes
-from clearway.evaluate.policies import Policy
+from clearway.model.policy import Policy
 
 EPISODES = 20  # a target, to choose from
 STEP_CAP = 500

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-import torch
-from torch import Tensor
 
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
@@ -15,10 +12,9 @@ from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.model.policy import Policy, network_policy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
-
-Policy = Callable[[Tensor, Tensor], Tensor]
 
 
 @dataclass(frozen=True)
@@ -40,17 +36,7 @@ class Agent:
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
         lookup = LookupNetwork(self.network, self.scale(world.features), world.target_state)
-        scene_of_target = world.target_scene
-
-        def probabilities(history: Tensor, target: Tensor) -> Tensor:
-            order = torch.argsort(scene_of_target[target], stable=True)
-            counts = torch.bincount(scene_of_target[target], minlength=world.scene_count).tolist()
-            scores = lookup.forward(history[order], target[order], counts).scores
-            placed = torch.empty_like(scores)
-            placed[order] = torch.softmax(scores, 1)
-            return placed
-
-        return probabilities
+        return network_policy(lookup, world)
 
 
 def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:

@@ -1,0 +1,36 @@
+"""`Policy`: what an agent does, given where it is and where it has to go; and the network as one.
+
+Axis letters: B batch, K poses of history (newest last), A actions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from clearway.envs.world import World
+from clearway.model.lookup import LookupNetwork
+
+Policy = Callable[[Tensor, Tensor], Tensor]
+"""history (B, K) int64 states in the world's numbering, target (B,) int64 -> probabilities of actions (B, A).
+
+A pure function: the same history and target give the same probabilities. They need not sum to one exactly.
+"""
+
+
+def network_policy(network: LookupNetwork, world: World) -> Policy:
+    """The network's policy in the world whose states and targets it was made for; rows may come in any order."""
+    scene_of_target = world.target_scene
+
+    def probabilities(history: Tensor, target: Tensor) -> Tensor:
+        scene = scene_of_target[target]
+        order = torch.argsort(scene, stable=True)
+        rows_per_scene = torch.bincount(scene, minlength=world.scene_count).tolist()
+        scores = network.forward(history[order], target[order], rows_per_scene).scores
+        placed = torch.empty_like(scores)
+        placed[order] = torch.softmax(scores, 1)
+        return placed
+
+    return probabilities
