@@ -10,7 +10,7 @@ from typing import Protocol
 
 from clearway import files
 from clearway.errors import SceneError
-from clearway.scenes import rooms
+from clearway.scenes import grid, rooms
 from clearway.scenes.build import build_scene, scene_name, shaping_versions
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -72,12 +72,13 @@ def scene_path(name: str, seed: int) -> Path:
 
 
 def _sources_hash() -> str:
-    """Hash of the room builder's source files, so that a change of them makes a new scene."""
+    """Hash of the source files of the room builder and of its graph, so that a change of them makes a new scene."""
     folder = Path(rooms.__file__).parent
+    sources = {source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
     digest = hashlib.sha256()
-    for source in sorted(folder.rglob("*.py")):
+    for name, source in {**sources, "grid": Path(grid.__file__)}.items():
         content = source.read_bytes()
-        digest.update(f"{source.relative_to(folder).as_posix()} {len(content)}\n".encode())
+        digest.update(f"{name} {len(content)}\n".encode())
         digest.update(content)
     return digest.hexdigest()
 

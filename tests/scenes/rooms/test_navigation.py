@@ -6,12 +6,8 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import Action
-from clearway.scenes.rooms.navigation import (
-    find_grid,
-    mean_degree,
-    mean_shortest_path,
-    pose_graph,
-)
+from clearway.scenes.grid import pose_graph
+from clearway.scenes.rooms.navigation import find_grid, mean_degree, mean_shortest_path
 from clearway.scenes.rooms.obstacles import AgentShape
 from small_rooms import SmallRoom
 
@@ -150,15 +146,6 @@ def test_four_right_turns_and_back_and_forth_return():
     went = moved >= 0
     np.testing.assert_array_equal(graph[moved[went], Action.MOVE_BACKWARD], states[went])
     np.testing.assert_array_equal(states[went] % 4, moved[went] % 4)
-
-
-def test_pose_graph_of_two_cells_side_by_side():
-    graph = pose_graph(np.array([[0, 0], [1, 0]]), np.array([[0, 1]]))
-    assert graph[0].tolist() == [-1, 1, 3, -1]  # looking along +z
-    assert graph[1].tolist() == [5, 2, 0, -1]  # looking along +x: forward to the other cell
-    assert graph[3].tolist() == [-1, 0, 2, 7]  # looking along -x: backward to it
-    assert graph[7].tolist() == [3, 4, 6, -1]
-    assert mean_degree(graph) == 1.0
 
 
 def test_mean_shortest_path_of_one_cell():

@@ -12,12 +12,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from clearway.errors import SceneError
-from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.graph import distances
+from clearway.scenes.grid import HEADING_COUNT, neighbour_pairs, pose_graph
 from clearway.scenes.rooms.obstacles import MARGIN_REACH_M, AgentShape, CollisionRoom, Obstacles
-
-HEADING_COUNT = 4
-HEADING_STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))  # (x, z) grid step of a move at 0, 90, 180, 270 degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +70,7 @@ def find_grid(room: CollisionRoom, agent: AgentShape | None = None) -> Navigatio
             room.name, "the agent fits nowhere in the room", "Give the room more free floor or another seed."
         )
     cells, locations_m = points[free], points_m[free]
-    pairs, axes = _neighbour_pairs(cells)
+    pairs, axes = neighbour_pairs(cells)
     move_gaps_m = obstacles.moving_gaps_m(locations_m[pairs].mean(axis=1), axes)
     edges = pairs[move_gaps_m > agent.clearance_m]
 
@@ -89,25 +87,6 @@ def find_grid(room: CollisionRoom, agent: AgentShape | None = None) -> Navigatio
         component_sizes=sizes,
         smallest_margin_m=float(min(margins_m.min(), MARGIN_REACH_M)),
     )
-
-
-def pose_graph(cells: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """The graph of poses, (4 C, A) int32, from (C, 2) grid cells and (E, 2) free moves between them."""
-    neighbours = np.full((len(cells), HEADING_COUNT), BLOCKED)
-    for near, far in (edges.T, edges.T[::-1]):
-        for heading, step in enumerate(HEADING_STEPS):
-            ahead = np.all(cells[far] - cells[near] == step, axis=1)
-            neighbours[near[ahead], heading] = far[ahead]
-
-    headings = np.arange(HEADING_COUNT)
-    cell = np.arange(len(cells))[:, None]
-    behind = np.roll(neighbours, 2, axis=1)
-    graph = np.empty((len(cells), HEADING_COUNT, ACTION_COUNT), np.int32)
-    graph[..., Action.MOVE_FORWARD] = np.where(neighbours == BLOCKED, BLOCKED, 4 * neighbours + headings)
-    graph[..., Action.MOVE_BACKWARD] = np.where(behind == BLOCKED, BLOCKED, 4 * behind + headings)
-    graph[..., Action.TURN_RIGHT] = 4 * cell + (headings + 1) % HEADING_COUNT
-    graph[..., Action.TURN_LEFT] = 4 * cell + (headings - 1) % HEADING_COUNT
-    return graph.reshape(-1, ACTION_COUNT)
 
 
 def mean_degree(graph: np.ndarray) -> float:
@@ -136,18 +115,6 @@ def _wall_gaps_m(room: CollisionRoom, points_m: np.ndarray, radius_m: float) -> 
     """Gap between the agent at each of (N, 2) points and the nearest edge of the floor, (N,)."""
     extent_m = np.array([room.width_m, room.depth_m])
     return np.minimum(points_m, extent_m - points_m).min(axis=1) - radius_m
-
-
-def _neighbour_pairs(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of neighbouring cells, (P, 2) lower first, and the axis of each pair, (P,) 0 for x, 1 for z."""
-    number = {(int(column), int(row)): index for index, (column, row) in enumerate(cells)}
-    pairs, axes = [], []
-    for (column, row), index in number.items():
-        for axis, neighbour in enumerate(((column + 1, row), (column, row + 1))):
-            if neighbour in number:
-                pairs.append((index, number[neighbour]))
-                axes.append(axis)
-    return np.array(pairs, np.int64).reshape(-1, 2), np.array(axes, np.int64)
 
 
 def _components(count: int, edges: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:

@@ -1,0 +1,37 @@
+import subprocess
+import sys
+
+import numpy as np
+
+from clearway.scenes.grid import neighbour_pairs, pose_graph
+
+
+def test_pose_graph_of_two_cells_side_by_side() -> None:
+    graph = pose_graph(np.array([[0, 0], [1, 0]]), np.array([[0, 1]]))
+    assert graph[0].tolist() == [-1, 1, 3, -1]  # looking along +z
+    assert graph[1].tolist() == [5, 2, 0, -1]  # looking along +x: forward to the other cell
+    assert graph[3].tolist() == [-1, 0, 2, 7]  # looking along -x: backward to it
+    assert graph[7].tolist() == [3, 4, 6, -1]
+
+
+def test_no_edges_leave_only_turns() -> None:
+    graph = pose_graph(np.array([[0, 0], [0, 1]]), np.zeros((0, 2), np.int64))
+    assert (graph[:, [0, 3]] == -1).all()
+    assert graph[4].tolist() == [-1, 5, 7, -1]
+
+
+def test_neighbours_share_a_side() -> None:
+    cells = np.array([[5, 5], [-1, 0], [0, 0], [-1, 1], [0, 2]])
+    pairs, axes = neighbour_pairs(cells)
+    assert pairs.tolist() == [[1, 2], [1, 3]]
+    assert axes.tolist() == [0, 1]
+
+
+def test_a_single_cell_has_no_neighbours() -> None:
+    pairs, axes = neighbour_pairs(np.array([[3, 4]]))
+    assert pairs.shape == (0, 2) and axes.shape == (0,)
+
+
+def test_a_grid_needs_no_simulator() -> None:
+    script = "import sys, clearway.scenes.grid; sys.exit('mujoco' in sys.modules)"
+    subprocess.run([sys.executable, "-c", script], check=True, env={"PYTHONPATH": ":".join(sys.path)})
