@@ -81,6 +81,11 @@ def test_targets_that_do_not_fit(targets: dict[str, list[int]], message: str) ->
         make_world([corridor_scene(5)], targets)
 
 
+def test_targets_of_a_scene_that_is_not_there() -> None:
+    with pytest.raises(SceneError, match=r"^hall: targets are given .* not among the scenes.*Name targets of corridor"):
+        make_world([corridor_scene(5)], {"corridor": [0], "hall": [3]})
+
+
 def test_a_target_that_nothing_leads_to() -> None:
     scene = corridor_scene(2)
     graph = scene.graph.copy()

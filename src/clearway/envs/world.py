@@ -107,8 +107,8 @@ def make_world(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zo
         zone_level: whether zones are those of poses or of cells.
 
     Raises:
-        SceneError: names repeat, a scene has no target, a target is out of range, repeated or out of reach,
-            or the scenes' features do not belong together.
+        SceneError: names repeat, a scene has no target, targets are given for a scene that is not there, a target is
+            out of range, repeated or out of reach, or the scenes' features do not belong together.
     """
     _check_set(scenes, targets)
     offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
@@ -158,6 +158,10 @@ def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) ->
     for name in names:
         if names.count(name) > 1:
             raise SceneError(name, "two scenes have this name", "Rename one of the files")
+    for name in targets:
+        if name not in names:
+            problem = "targets are given for this scene, which is not among the scenes"
+            raise SceneError(name, problem, f"Name targets of {', '.join(names)} alone, or add the scene")
     for scene in scenes:
         chosen = list(targets.get(scene.name, ()))
         if not chosen:
