@@ -294,7 +294,8 @@ BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] =
     (lambda: {"num_envs": 0}, EnvError, "at least 1 environment"),
     (lambda: {"history_length": 0}, EnvError, "at least 1 pose"),
     (lambda: {"max_episode_steps": 0}, EnvError, "at least 1 step"),
-    (lambda: {"targets": {"other": [0]}}, SceneError, "the scene has no target"),
+    (lambda: {"targets": {}}, SceneError, "the scene has no target"),
+    (lambda: {"targets": {"other": [0]}}, SceneError, "other: targets are given for this scene"),
     (lambda: {"scenes": replace(corridor_scene(3), features=None)}, EnvError, "observations='pictures'"),
     (
         lambda: {"scenes": replace(corridor_scene(3), observations=None), "observations": "pictures"},
