@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,8 +11,8 @@ import tyro
 from clearway.choices import RewardName, ZoneLevel
 from clearway.cli.arguments import chosen_reward, chosen_targets, scene_files
 from clearway.cli.console import stderr_console
-from clearway.errors import RunError
 from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
+from clearway.learn.settings import with_settings
 
 
 @dataclass(frozen=True)
@@ -89,30 +88,3 @@ class Train:
         if self.frames is not None:
             learner = replace(learner, frames=self.frames)
         return with_settings(learner, self.set)
-
-
-def with_settings(learner: Learner, words: Sequence[str]) -> Learner:
-    """The learner with settings such as "envs=200" changed.
-
-    Raises:
-        RunError: a word is not name=value, or names no setting, or its value has the wrong type.
-    """
-    known = {field.name: getattr(learner, field.name) for field in fields(learner)}
-    changes: dict[str, object] = {}
-    for word in words:
-        name, equals, text = word.partition("=")
-        if not equals or name not in known:
-            raise RunError(f"--set {word}: expected name=value with a name among {', '.join(known)}. Correct it")
-        changes[name] = _parsed(word, text, known[name])
-    return replace(learner, **changes)  # type: ignore[arg-type]  # types follow the fields' own values
-
-
-def _parsed(word: str, text: str, example: object) -> object:
-    if isinstance(example, bool):
-        if text not in ("true", "false"):
-            raise RunError(f"--set {word}: expected true or false. Correct it")
-        return text == "true"
-    try:
-        return type(example)(text)  # type: ignore[call-arg]  # int, float or str
-    except ValueError as error:
-        raise RunError(f"--set {word}: expected a value of type {type(example).__name__}. Correct it") from error
