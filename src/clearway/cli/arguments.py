@@ -1,7 +1,8 @@
-"""What several commands read from the command line alike: scene files, targets, rewards."""
+"""What several commands read from the command line alike: numbers, scene files, targets, rewards."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,33 @@ if TYPE_CHECKING:
     from clearway.scenes.scene import Scene
 
 SCENE_SUFFIXES = (".h5", ".hdf5")
+
+
+def check_at_least(lowest: int, **values: int | None) -> None:
+    """Check options by name, for example `step_cap=...` for --step-cap; None was not given. Raises ClearwayError."""
+    for name, value in values.items():
+        if value is not None and value < lowest:
+            raise ClearwayError(f"{_option(name)} is {value}, expected at least {lowest}. Give a larger number")
+
+
+def check_seeds(**seeds: int) -> None:
+    """Check options that are seeds, by name. Raises ClearwayError."""
+    from clearway.learn.trainer import SEED_LIMIT
+
+    for name, seed in seeds.items():
+        if not 0 <= seed < SEED_LIMIT:
+            raise ClearwayError(f"{_option(name)} is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
+
+
+def check_finite(**values: float | None) -> None:
+    """Check that options, by name, are neither NaN nor infinite; None was not given. Raises ClearwayError."""
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise ClearwayError(f"{_option(name)} is {value}, expected a finite number. Correct it")
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def scene_files(paths: Sequence[Path]) -> list[Path]:
@@ -71,7 +99,12 @@ def chosen_reward(
     terminal: float | None,
     clip: bool | None = None,
 ) -> Reward:
-    """The reward of a name with single values changed; None changes nothing."""
+    """The reward of a name with single values changed; None changes nothing.
+
+    Raises:
+        ClearwayError: a value is NaN or infinite.
+    """
     from clearway.reward import REWARDS
 
+    check_finite(alpha=alpha, beta=beta, gamma=gamma, terminal=terminal)
     return REWARDS[name].with_changes(alpha, beta, gamma, terminal, clip)

@@ -26,7 +26,7 @@ def stderr_console() -> Console:
 
 @contextmanager
 def showing_warnings() -> Iterator[None]:
-    """Print warnings as framed text on standard error; each once."""
+    """Print warnings as framed text on standard error, each once, whatever Python was told about warnings."""
 
     def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
         from rich.panel import Panel
@@ -36,6 +36,7 @@ def showing_warnings() -> Iterator[None]:
         stderr_console().print(frame)
 
     with warnings.catch_warnings():
+        warnings.simplefilter("default", UserWarning)
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.simplefilter("ignore", FutureWarning)
         warnings.showwarning = show

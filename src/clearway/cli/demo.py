@@ -6,6 +6,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+from clearway.cli.arguments import check_seeds
 from clearway.cli.console import print_json, stderr_console
 
 
@@ -32,6 +33,7 @@ class Demo:
         from clearway.experiments.demo import DemoRequest, run_demo
         from clearway.viz.demo_page import make_demo_page
 
+        check_seeds(seed=self.seed)
         request = DemoRequest(self.out, self.seed, self.frames, self.encoder)
         result = run_demo(request, show_progress=True)
         page = make_demo_page(result, self._command())

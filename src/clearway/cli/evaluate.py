@@ -9,9 +9,8 @@ from typing import Annotated
 
 import tyro
 
-from clearway.cli.arguments import scene_files
+from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, stderr_console
-from clearway.errors import RunError
 
 
 @dataclass(frozen=True)
@@ -46,9 +45,8 @@ class Evaluate:
         from clearway.files import written_whole
         from clearway.learn.load import load_agent, run_scenes
 
-        for name, value in (("--episodes", self.episodes), ("--step-cap", self.step_cap)):
-            if value < 1:
-                raise RunError(f"{name} is {value}, expected at least 1. Give a larger number")
+        check_at_least(1, episodes=self.episodes, step_cap=self.step_cap)
+        check_seeds(seed=self.seed)
         agent = load_agent(self.folder, self.checkpoint)
         scenes = run_scenes(agent.record, scene_files(self.scenes) if self.scenes else None)
         evaluations = evaluate_run(

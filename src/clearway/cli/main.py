@@ -16,6 +16,7 @@ from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
 from clearway.cli.oracle import Oracle
+from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.scenes import Build, Import, Inspect
 from clearway.cli.train import Train
 from clearway.errors import ClearwayError
@@ -28,7 +29,10 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build rooms, import dumps, inspect."""
+    """Scene files: build rooms, import dumps, inspect.
+
+    Example: clearway scenes inspect bathroom.h5
+    """
 
     command: (
         Annotated[Build, tyro.conf.subcommand("build")]
@@ -58,24 +62,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         print(f"clearway {__version__}")
         return
-    command = tyro.cli(
-        Command,
-        args=words,
-        prog="clearway",
-        description=DESCRIPTION,
-        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-    )
-    sys.exit(_exit_code(command))
+    sys.exit(_exit_code(words))
 
 
-def _exit_code(command: Demo | Scenes | Train | Evaluate | Oracle) -> int:
+def _exit_code(words: Sequence[str]) -> int:
     try:
+        with refusals_in_one_line():
+            command = tyro.cli(
+                Command,
+                args=words,
+                prog="clearway",
+                description=DESCRIPTION,
+                config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+            )
         with showing_warnings():
             command.run()
     except ClearwayError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        return _refused(str(error))
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _refused(f"{where}{error.strerror or error}. Check the path, its permissions and the space left")
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
     return 0
+
+
+def _refused(message: str) -> int:
+    """Say what was wrong in one line; returns the exit code."""
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return 2

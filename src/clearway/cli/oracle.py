@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from clearway.choices import RewardName, ZoneLevel
-from clearway.cli.arguments import chosen_reward, chosen_targets, scene_files
+from clearway.cli.arguments import check_finite, check_seeds, chosen_reward, chosen_targets, scene_files
 from clearway.cli.console import print_json
 from clearway.errors import ClearwayError
 
@@ -57,6 +57,8 @@ class Oracle:
         from clearway.evaluate.optimum import world_yardsticks
         from clearway.scenes.thor_v1 import read_scene
 
+        check_seeds(seed=self.seed)
+        check_finite(entropy=self.entropy)
         if not 0 < self.discount < 1:
             raise ClearwayError(f"--discount is {self.discount}, expected between 0 and 1. Give such a value")
         if not self.entropy > 0:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from clearway.choices import RoomName
-from clearway.cli.arguments import scene_files
+from clearway.cli.arguments import check_seeds, scene_files
 from clearway.cli.console import print_json, stderr_console
 from clearway.errors import ClearwayError
 
@@ -39,6 +39,7 @@ class Build:
         from clearway.scenes.rooms import ROOM_NAMES
         from clearway.scenes.thor_v1 import write_scene
 
+        check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)
         if self.room == "all" and self.out.suffix:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
         names = ROOM_NAMES if self.room == "all" else (self.room,)
@@ -70,11 +71,15 @@ class Import:
         from clearway.perception import encode_scenes
         from clearway.scenes.thor_v1 import read_scene, write_scene
 
-        scenes = [read_scene(path) for path in scene_files(self.files)]
+        if self.encoder:
+            check_seeds(encoder_seed=self.encoder_seed)
+        files = scene_files(self.files)
+        scenes = [read_scene(path) for path in files]
+        paths = [self.out / f"{scene.name}.h5" for scene in scenes]
+        _check_nothing_is_lost(files, paths)
         if self.encoder:
             scenes = encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True)
-        for scene in scenes:
-            path = self.out / f"{scene.name}.h5"
+        for scene, path in zip(scenes, paths, strict=True):
             write_scene(scene, path)
             stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
 
@@ -99,7 +104,9 @@ class Inspect:
         from clearway.scenes.thor_v1 import read_scene
         from clearway.zones import scene_zones, zone_counts
 
-        (path,) = scene_files([self.file])
+        path, *others = scene_files([self.file])
+        if others:
+            raise ClearwayError(f"{self.file}: a folder of {1 + len(others)} scene files. Name one, such as {path}")
         scene = read_scene(path)
         zones = scene_zones(scene)
         content = {**summary(scene).to_json(), "zones": zone_counts(zones)}
@@ -111,6 +118,16 @@ class Inspect:
             print_json(content)
         else:
             _print_table(content)
+
+
+def _check_nothing_is_lost(files: list[Path], paths: list[Path]) -> None:
+    """Check that no file would be written over one of those that are read, or over another one of `paths`."""
+    read = {file.resolve() for file in files}
+    for file, path in zip(files, paths, strict=True):
+        if path.resolve() in read:
+            raise ClearwayError(f"{path}: would be written over a file to be imported. Give another folder with --out")
+        if paths.count(path) > 1:
+            raise ClearwayError(f"{file}: another file to be imported has this name. Import them one by one")
 
 
 def _print_table(content: dict[str, object]) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from clearway.choices import RewardName, ZoneLevel
-from clearway.cli.arguments import chosen_reward, chosen_targets, scene_files
+from clearway.cli.arguments import check_at_least, check_seeds, chosen_reward, chosen_targets, scene_files
 from clearway.cli.console import stderr_console
 from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
 from clearway.learn.settings import with_settings
@@ -63,6 +63,8 @@ class Train:
         from clearway.learn.train import RunRequest, set_threads, train
         from clearway.scenes.thor_v1 import read_scene
 
+        check_at_least(1, threads=self.threads)
+        check_seeds(seed=self.seed)
         set_threads(self.threads)
         files = scene_files(self.files)
         scenes = [read_scene(path) for path in files]

@@ -73,10 +73,12 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     Raises:
         ClearwayError: the folder holds something else, or a part of the demo cannot run here.
     """
-    _clear(request.out)
+    learner = replace(DEFAULT, frames=request.frames)
+    _claim(request.out)
     clock = _Clock()
     room = cached_room_scene(ROOM, progress=show_progress)
     (encoded,) = encode_scenes([room], request.encoder, progress=show_progress)
+    _empty(request.out)
     path = request.out / f"{ROOM}.h5"
     write_scene(encoded, path)
     scene = read_scene(path)
@@ -86,7 +88,7 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
             RunRequest(
                 scenes=[scene],
                 targets={scene.name: default_targets(scene)},
-                learner=replace(DEFAULT, frames=request.frames),
+                learner=learner,
                 reward=reward,
                 seed=request.seed,
                 paths={scene.name: path},
@@ -114,14 +116,21 @@ def _showcase(agents: dict[str, Agent], scene: Scene, seed: int) -> Showcase:
     return showcases(world, policies, seed=seed, history_length=record.learner.history_length)[0]
 
 
-def _clear(folder: Path) -> None:
-    """An empty folder with our mark; what an earlier demo left there goes."""
-    if folder.exists():
-        if not folder.is_dir() or (any(folder.iterdir()) and not (folder / MARK).exists()):
-            raise ClearwayError(f"{folder}: exists and is not a demo's folder. Give another one with --out")
-        shutil.rmtree(folder)
-    folder.mkdir(parents=True)
+def _claim(folder: Path) -> None:
+    """Make the folder, or see that it is empty or an earlier demo's, and leave our mark."""
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / MARK).exists())):
+        raise ClearwayError(f"{folder}: exists and is not a demo's folder. Give another one with --out")
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / MARK).write_text('{"made_by": "clearway demo"}\n')
+
+
+def _empty(folder: Path) -> None:
+    """Remove what an earlier demo left, all but the mark."""
+    for left in folder.iterdir():
+        if left.is_dir() and not left.is_symlink():
+            shutil.rmtree(left)
+        elif left.name != MARK:
+            left.unlink()
 
 
 class _Clock:
