@@ -1,0 +1,148 @@
+"""Words that a command cannot use: one line that says which and what to do, exit code 2."""
+
+import os
+
+import pytest
+
+from clearway.cli.parse import one_line
+from clearway.learn.checkpoint import newest_checkpoint
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ((), ("demo", "scenes", "clearway --help")),
+        (("dance",), ("dance", "evaluate", "clearway --help")),
+        (("scenes",), ("build", "import", "inspect")),
+        (("scenes", "inspect"), ("Missing from clearway scenes inspect: PATH",)),
+        (("scenes", "build", "--room", "attic", "--out", "x"), ("attic", "bathroom")),
+        (("train", "x.h5"), ("--out",)),
+        (("train", "x.h5", "--out"), ("--out", "Missing value")),
+        (("train", "x.h5", "--out", "run", "--nope", "3"), ("--nope",)),
+        (("train", "x.h5", "--out", "run", "--alpha", "low"), ("--alpha", "'low'")),
+        (("train", "x.h5", "--out", "run", "--frames", "1e6"), ("--frames", "'1e6'")),
+        (("train", "x.h5", "--out", "run", "--preset", "best"), ("best", "paper")),
+        (("evaluate", "run", "--episodes", "many"), ("--episodes", "'many'")),
+    ],
+    ids=" ".join,
+)
+def test_words_that_the_parser_cannot_read(clearway, words, parts):
+    line = clearway(*words).refusal(*parts)
+    assert "│" not in line and "─" not in line
+
+
+def test_a_refusal_in_colours_is_one_plain_line():
+    framed = "\x1b[31m╭─ Bad ──╮\x1b[0m\n│ \x1b[1mFirst\x1b[0m,   │\n│ still. │\n│ ────── │\n│ See x  │\n╰────────╯\n"
+    assert one_line(framed) == "First, still. See x"
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("--set", "colour=blue"), ("--set colour=blue", "rollout_steps")),
+        (("--set", "envs"), ("--set envs", "name=value")),
+        (("--set", "envs=many"), ("--set envs=many",)),
+        (("--set", "envs=20", "clip_rewards=maybe"), ("clip_rewards=maybe", "true or false")),
+        (("--set", "algorithm=magic"), ("algorithm=magic", "ppo")),
+        (("--set", "discount=1.5"), ("discount is 1.5",)),
+        (("--algorithm", "a3c"), ("a3c", "paper-a3c")),
+        (("--alpha", "nan"), ("--alpha is nan",)),
+        (("--terminal", "inf"), ("--terminal is inf",)),
+        (("--frames", "-5"), ("frames is -5",)),
+        (("--seed", "-1"), ("--seed is -1", "0 to 2147483647")),
+        (("--seed", str(2**31)), ("--seed is 2147483648",)),
+        (("--threads", "0"), ("--threads is 0",)),
+        (("--device", "abacus"), ("device abacus",)),
+        (("--targets", "bathroom_02=x"), ("--targets bathroom_02=x", "state numbers")),
+        (("--targets", "26,,37"), ("--targets 26,,37", "state numbers")),
+        (("--targets", "attic=26"), ("--targets attic=26", "bathroom_02")),
+        (("--targets", "76"), ("bathroom_02", "target 76 is out of range", "0 to 75")),
+        (("--targets", "-1"), ("target -1 is out of range",)),
+        (("--targets", "26", "26"), ("named twice",)),
+    ],
+    ids=" ".join,
+)
+def test_training_that_cannot_be(clearway, trained, tmp_path, words, parts):
+    clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(*parts)
+    assert not (tmp_path / "run" / "run.json").exists()
+
+
+def test_targets_that_leave_open_which_scene(clearway, dump, tmp_path):
+    files = [dump(tmp_path / f"{name}.h5") for name in ("one", "two")]
+    answer = clearway("train", *files, "--out", tmp_path / "run", "--targets", "26")
+    answer.refusal("--targets 26", "several scenes", "SCENE=26")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("train", "FILE", "--out", "run"),
+        ("scenes", "import", "FILE", "--out", "x"),
+        ("scenes", "inspect", "FILE"),
+        ("oracle", "FILE"),
+        ("evaluate", "FILE"),
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_missing_files_and_empty_folders(clearway, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    for name in ("missing.h5", "empty"):
+        clearway(*(name if word == "FILE" else word for word in words)).refusal(name)
+    assert os.listdir() == ["empty"]
+
+
+def test_no_file_at_all(clearway, tmp_path):
+    clearway("train", "--out", tmp_path / "run").refusal("no scene file given")
+
+
+def test_a_folder_of_several_files_is_not_one_scene(clearway, dump, tmp_path):
+    for name in ("one", "two"):
+        dump(tmp_path / f"{name}.h5")
+    clearway("scenes", "inspect", tmp_path).refusal(str(tmp_path), "2 scene files", "one.h5")
+
+
+def test_all_rooms_need_a_folder(clearway, tmp_path):
+    path = tmp_path / "rooms.h5"
+    clearway("scenes", "build", "--room", "all", "--out", path).refusal(str(path), "four files", "--out")
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("words", [("--seed", "-1"), ("--encoder-seed", "-1")], ids=" ".join)
+def test_rooms_have_no_negative_seed(clearway, tmp_path, words):
+    answer = clearway("scenes", "build", "--room", "bathroom", "--out", tmp_path / "x.h5", *words)
+    answer.refusal(f"{words[0]} is -1")
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (("--episodes", "0"), "--episodes is 0"),
+        (("--step-cap", "-3"), "--step-cap is -3"),
+        (("--seed", "-1"), "--seed is -1"),
+        (("--checkpoint", "nowhere"), "nowhere"),
+        (("--scenes", "nowhere"), "nowhere"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_evaluation_that_cannot_be(clearway, trained, words, part):
+    clearway("evaluate", trained.run, *words).refusal(part)
+
+
+def test_a_checkpoint_of_another_network_is_one_line_too(clearway, trained, tmp_path, small):
+    wider = tmp_path / "wider"
+    assert clearway("train", trained.scene, "--out", wider, *small, "width=24").code == 0
+    checkpoint = newest_checkpoint(wider / "checkpoints")
+    clearway("evaluate", trained.run, "--checkpoint", checkpoint).refusal(str(checkpoint), "does not fit its run")
+
+
+def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    below = tmp_path / "file" / "below"
+    source = dump(tmp_path / "attic.h5")
+    evaluate = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5)
+    clearway("scenes", "inspect", trained.scene, "--map", below).refusal(str(tmp_path / "file"))
+    clearway("scenes", "import", source, "--out", below).refusal(str(tmp_path / "file"))
+    clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))
+    clearway(*evaluate, "--pictures", below).refusal(str(tmp_path / "file"))
+    clearway("demo", "--out", below).refusal(str(tmp_path / "file"))

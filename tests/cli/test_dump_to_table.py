@@ -1,0 +1,125 @@
+"""A dump written by other code goes through every command."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clearway.scenes.targets import ZHU_TARGETS
+from clearway.scenes.thor_v1 import read_scene
+
+TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl", "shortest_path_steps"}
+
+
+@pytest.fixture(scope="module")
+def evaluated(clearway, trained):
+    """The answer to `evaluate --json`, and the run."""
+    return clearway("evaluate", trained.run, "--episodes", 4, "--step-cap", 300, "--json"), trained.run
+
+
+@pytest.mark.parametrize(("feature_axis", "unreachable"), [(10, -1), (1, 1000)])
+def test_a_dump_is_imported_as_it_is(clearway, dump, tmp_path, feature_axis, unreachable):
+    source = dump(tmp_path / "kitchen_02.h5", feature_axis=feature_axis, unreachable=unreachable)
+    answer = clearway("scenes", "import", source, "--out", tmp_path / "scenes")
+    assert (answer.code, answer.out) == (0, "")
+    assert answer.err == f"{tmp_path / 'scenes' / 'kitchen_02.h5'}: 76 states, 19 cells\n"
+    original, imported = read_scene(source), read_scene(tmp_path / "scenes" / "kitchen_02.h5")
+    assert np.array_equal(original.graph, imported.graph)
+    assert np.array_equal(original.features, imported.features)
+    assert np.array_equal(original.observations[:], imported.observations[:])
+
+
+def test_inspect_prints_the_figures_of_the_room(clearway, trained, tmp_path):
+    answer = clearway("scenes", "inspect", trained.scene, "--json", "--map", tmp_path / "map.png")
+    content = answer.json
+    assert (answer.code, answer.err) == (0, "")
+    assert (content["states"], content["cells"], content["components"]) == (76, 19, 2)
+    assert content["component_sizes"] == [72, 4]
+    assert content["encoder"] == "from file (24 features)"
+    # 6 x 3 cells: along x the ends are blocked, along z the outer rows; and all of the cell out of reach
+    assert content["zones"] == {"free": 12, "precollision": 24, "collision": 40}
+    assert content["source"] == "thor_v1"
+    with Image.open(tmp_path / "map.png") as picture:
+        assert picture.format == "PNG" and picture.width > 300
+
+
+def test_inspect_without_json_says_the_same(clearway, trained):
+    answer = clearway("scenes", "inspect", trained.scene)
+    assert answer.code == 0
+    rows = dict(line.split("  ", 1) for line in answer.out.splitlines())
+    assert rows["states"].strip() == "76"
+    assert rows["zones"].strip() == "free 12, precollision 24, collision 40"
+
+
+def test_the_run_keeps_what_the_command_line_asked_for(trained):
+    record = json.loads((trained.run / "run.json").read_text())
+    assert (record["reward"]["alpha"], record["reward"]["gamma"], record["reward"]["beta"]) == (-0.02, -0.015, -0.02)
+    learner = record["learner"]
+    assert (learner["envs"], learner["width"], learner["clip_rewards"], learner["frames"]) == (20, 16, True, 640)
+    (scene,) = record["scenes"]
+    assert tuple(scene["targets"]) == ZHU_TARGETS["bathroom_02"]  # nobody named any
+    assert Path(scene["path"]) == trained.scene.resolve()
+
+
+def test_evaluate_prints_the_agreed_json(evaluated):
+    answer, run = evaluated
+    content = answer.json
+    assert (answer.code, answer.err) == (0, "")
+    assert {"targets", "scenes", "average"} <= content.keys()
+    assert [(row["scene"], row["target"]) for row in content["targets"]] == [
+        ("bathroom_02", target) for target in ZHU_TARGETS["bathroom_02"]
+    ]
+    for row in content["targets"]:
+        assert row.keys() >= TARGET_KEYS
+        assert all(0 <= row[share] <= 1 for share in ("success", "sc", "spl"))
+        assert 1 <= row["shortest_path_steps"] <= row["steps"] <= 300
+    assert [scene["scene"] for scene in content["scenes"]] == ["bathroom_02"]
+    assert content["average"]["steps"] == pytest.approx(np.mean([row["steps"] for row in content["targets"]]))
+    assert (content["agent"], content["action_selection"]) == ("collision-aware", "sampled")
+    assert content["encoder"] == "from file (24 features)"
+    assert json.loads((run / "evaluation.json").read_text()) == content
+
+
+def test_the_other_agents_stand_beside(evaluated):
+    others = {other["agent"]: other for other in evaluated[0].json["others"]}
+    assert {"random", "shortest path"} <= others.keys()
+    assert all(row["steps"] == row["shortest_path_steps"] for row in others["shortest path"]["targets"])
+    assert others["random"]["average"]["collisions"] > others["shortest path"]["average"]["collisions"] == 0
+
+
+def test_evaluate_prints_tables_and_draws(clearway, trained, tmp_path):
+    words = ("--episodes", 2, "--step-cap", 40, "--targets", "--pictures", tmp_path / "pictures")
+    answer = clearway("evaluate", trained.run, *words)
+    assert answer.code == 0
+    assert answer.err == f"pictures: {tmp_path / 'pictures'}\n"
+    for part in ("collision-aware", "shortest path", "random", "Encoder: from file (24 features).", "bathroom_02"):
+        assert part in answer.out
+    names = sorted(path.name for path in (tmp_path / "pictures").iterdir())
+    assert names == ["curves.png", "episode-bathroom_02.png", "map-bathroom_02.png"]
+
+
+def test_scenes_may_have_moved(clearway, trained, dump, tmp_path):
+    moved = dump(tmp_path / "moved" / "bathroom_02.h5")
+    words = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5, "--json", "--scenes")
+    assert clearway(*words, moved.parent).code == 0
+    elsewhere = dump(tmp_path / "moved" / "attic.h5")
+    clearway(*words, elsewhere).refusal("bathroom_02", "--scenes")
+
+
+def test_a_run_goes_on_only_when_asked_to(clearway, trained, small):
+    words = ("train", trained.scene, "--out", trained.run, "--alpha", "-0.02", "--gamma", "-1.5e-2", *small)
+    clearway(*words).refusal(str(trained.run), "holds a run already", "--resume")
+    assert clearway(*words, "--resume").code == 0
+    clearway(*words, "--resume", "--seed", 7).refusal("another experiment")
+
+
+def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):
+    for name in ("one", "two"):
+        dump(tmp_path / "scenes" / f"{name}.h5")
+    words = ("train", tmp_path / "scenes", "--out", tmp_path / "run", *small, "--reward", "shortest")
+    assert clearway(*words, "--targets", "one=0,5", "two=7").code == 0
+    record = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert {scene["name"]: scene["targets"] for scene in record["scenes"]} == {"one": [0, 5], "two": [7]}
+    assert record["reward"]["name"] == "shortest"

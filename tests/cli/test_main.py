@@ -1,0 +1,145 @@
+"""What holds for every command: help, start-up, exit codes, warnings."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import clearway as package
+from clearway.cli.console import showing_warnings
+from clearway.cli.demo import Demo
+from clearway.cli.evaluate import Evaluate
+from clearway.cli.oracle import Oracle
+from clearway.cli.scenes import Build, Import, Inspect
+from clearway.cli.train import Train
+from clearway.errors import ClearwayError
+from clearway.perception import EncoderWarning
+
+COMMANDS = {"demo", "scenes build", "scenes import", "scenes inspect", "train", "evaluate", "oracle"}
+HEAVY = ("torch", "mujoco", "transformers", "matplotlib", "scipy", "h5py", "numpy")
+MOST_SECONDS = 0.5
+TRIES = 6  # others may be using the machine; 3 are enough on an idle one
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(package.__file__).parents[1])}
+
+
+def python(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *words], env=ENVIRONMENT, capture_output=True, text=True, check=True, timeout=60
+    )
+
+
+def seconds_of_help() -> float:
+    since = time.monotonic()
+    assert "clearway demo" in python("-m", "clearway", "--help").stdout
+    return time.monotonic() - since
+
+
+def test_help_answers_at_once():
+    assert any(seconds_of_help() < MOST_SECONDS for _ in range(TRIES))
+
+
+def test_nothing_heavy_is_imported_before_a_command_runs():
+    code = f"import sys, clearway.cli.main; print([name for name in {HEAVY} if name in sys.modules])"
+    assert python("-c", code).stdout.strip() == "[]"
+
+
+def test_python_runs_the_package():
+    assert python("-m", "clearway", "--version").stdout == f"clearway {package.__version__}\n"
+
+
+def helps(clearway, words: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
+    """Every command by its words, with its help."""
+    answer = clearway(*words, "--help")
+    assert (answer.code, answer.err) == (0, "")
+    inner = re.match(r"usage: clearway[a-z ]* \[-h\] \{([\w,-]+)\}\n", answer.out)
+    if words:
+        yield " ".join(words), answer.out
+    for name in inner[1].split(",") if inner else ():
+        yield from helps(clearway, (*words, name))
+
+
+def test_every_command_has_help_with_an_example_that_can_be_read(clearway, monkeypatch):
+    run = []
+    for kind in (Demo, Build, Import, Inspect, Train, Evaluate, Oracle):
+        monkeypatch.setattr(kind, "run", lambda command: run.append(command))
+    found = dict(helps(clearway))
+    assert found.keys() >= COMMANDS | {"scenes"}
+    for words, text in found.items():
+        (example,) = re.findall(r"^Example: clearway (.+)$", text.split("╭")[0], re.MULTILINE)
+        assert example.startswith(words)
+        assert clearway(*shlex.split(example)).code == 0, example
+    assert {type(command) for command in run} >= {Demo, Build, Import, Inspect, Train, Evaluate, Oracle}
+
+
+def raising(error: BaseException):
+    def run(self: object) -> None:
+        raise error
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted\n"),
+        (ClearwayError("x.h5: broken\n  in two ways. Mend it"), 2, "error: x.h5: broken in two ways. Mend it\n"),
+        (
+            PermissionError(13, "Permission denied", "out/x.h5"),
+            2,
+            "error: out/x.h5: Permission denied. Check the path, its permissions and the space left\n",
+        ),
+        (
+            OSError(28, "No space left on device"),
+            2,
+            "error: No space left on device. Check the path, its permissions and the space left\n",
+        ),
+    ],
+    ids=["interrupted", "refused", "forbidden", "full"],
+)
+def test_exit_codes(clearway, monkeypatch, error, code, said):
+    monkeypatch.setattr(Inspect, "run", raising(error))
+    answer = clearway("scenes", "inspect", "x.h5")
+    assert (answer.code, answer.out, answer.err) == (code, "", said)
+
+
+def test_our_own_mistakes_are_not_hidden(clearway, monkeypatch):
+    monkeypatch.setattr(Inspect, "run", raising(ZeroDivisionError()))
+    with pytest.raises(ZeroDivisionError):
+        clearway("scenes", "inspect", "x.h5")
+
+
+def test_warnings_are_framed_on_standard_error(clearway, dump, tmp_path):
+    def lie(file) -> None:
+        file["shortest_path_distance"][0, 5] = 77
+
+    path = dump(tmp_path / "attic.h5", change=lie)
+    answer = clearway("scenes", "inspect", path, "--json")
+    assert answer.code == 0
+    assert answer.json["states"] == 76  # standard output holds the JSON alone
+    top, *middle, bottom = answer.err.splitlines()
+    assert top.startswith("╭─ warning ─") and bottom.startswith("╰─")
+    text = " ".join(line.strip("│ ") for line in middle)
+    assert "shortest_path_distance is wrong for 1 pairs" in text
+    assert "Warning" not in answer.err and ".py" not in answer.err
+
+
+def test_warnings_are_shown_once_whatever_python_was_told(capsys):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with showing_warnings():
+            for _ in range(3):
+                warnings.warn("another encoder stands in", EncoderWarning, stacklevel=1)
+            warnings.warn("of no use to a user", DeprecationWarning, stacklevel=1)
+        with pytest.raises(EncoderWarning):  # outside, all is as before
+            warnings.warn("another encoder stands in", EncoderWarning, stacklevel=1)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.count("another encoder stands in") == shown.err.count("─ warning ─") == 1
+    assert "of no use" not in shown.err
