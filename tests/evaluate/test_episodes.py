@@ -13,7 +13,7 @@ from clearway.scenes.actions import Action
 from clearway.zones import Zone
 from made import corridor_scene, grid_scene, scene_of_cells
 
-COUNTS = ("target", "start", "steps", "collisions", "reached", "shortest_path_steps", "zone_steps")
+COUNTS = ("target", "start", "steps", "collisions", "reached", "shortest_path_steps", "zone_steps", "looped")
 
 
 def always(action: Action) -> Policy:

@@ -16,6 +16,7 @@ def table() -> EpisodeTable:
         reached=np.array([True, True, False, True, True]),
         shortest_path_steps=np.array([10, 10, 10, 50, 499]),
         zone_steps=np.stack([steps // 2, steps - steps // 2, 0 * steps], 1),
+        looped=np.array([False, False, True, False, False]),
     )
 
 
@@ -39,6 +40,7 @@ def value(name: str) -> list[float]:
         ("share_free", [0.5, 499 / 999]),
         ("share_precollision", [0.5, 500 / 999]),
         ("share_collision", [0, 0]),
+        ("looped", [1 / 3, 0]),
     ],
 )
 def test_worked_numbers(name, expected):

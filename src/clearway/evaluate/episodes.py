@@ -1,4 +1,4 @@
-"""Episodes by the paper's protocol, walked side by side: random starts, sampled actions, a cap on the steps.
+"""Episodes by the paper's protocol, walked side by side: random starts, a cap on the steps.
 
 Axis letters: N episodes, B of them still walking, K poses of history, A actions, M targets, Z zones, T steps.
 """
@@ -16,6 +16,8 @@ from clearway.envs.navigation import HISTORY_LENGTH, Navigation, Transition
 from clearway.envs.streams import Streams, stream_keys
 from clearway.envs.world import World
 from clearway.evaluate.loops import LoopSkipper, Tally
+from clearway.evaluate.policies import argmax
+from clearway.evaluate.selection import ActionSelection, UntriedActions
 from clearway.model.policy import Policy
 from clearway.reward import COLLISION_AWARE
 
@@ -45,6 +47,7 @@ class EpisodeTable:
         reached: (N,) bool, the target was reached before the cap.
         shortest_path_steps: (N,) int64, fewest steps from the start to the target.
         zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
+        looped: (N,) bool, found before the cap to be in a circle of actions without choice, so never to arrive.
         trajectories: the walks, one an episode; None unless asked for.
     """
 
@@ -55,6 +58,7 @@ class EpisodeTable:
     reached: np.ndarray
     shortest_path_steps: np.ndarray
     zone_steps: np.ndarray
+    looped: np.ndarray
     trajectories: tuple[Trajectory, ...] | None = None
 
     def __len__(self) -> int:
@@ -66,6 +70,7 @@ def run_episodes(
     world: World,
     policy: Policy,
     *,
+    selection: ActionSelection = "sampled",
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
     seed: int = 0,
@@ -83,6 +88,7 @@ def run_episodes(
         world: the tables; the walk happens on their device.
         policy: a pure function of history and target. A walk in a circle of actions that it is certain of is
             completed by arithmetic instead of walked to the cap; the counts are the same.
+        selection: how actions are chosen by the policy's probabilities.
         episodes_per_target: how many.
         step_cap: steps after which an episode has failed.
         seed: another seed gives other starts and other chances.
@@ -93,10 +99,12 @@ def run_episodes(
     assert episodes_per_target > 0 and step_cap > 0 and episodes_at_once > 0
     target = torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target)
     seeds = _episode_seeds(world, episodes_per_target, seed)
+    policy = argmax(policy) if selection == "argmax" else policy
+    untried = selection == "argmax-untried"
     parts = []
     with torch.no_grad():
         for chosen in torch.arange(len(target), device=world.device).split(episodes_at_once):
-            walk = _Walk(world, seeds[chosen], target[chosen], history_length, step_cap, record)
+            walk = _Walk(world, seeds[chosen], target[chosen], history_length, step_cap, record, untried)
             parts.append(walk.to_the_end(policy))
     return _joined(parts)
 
@@ -114,7 +122,14 @@ class _Walk:
     """A batch of episodes on the way. Episodes that end are written down and dropped from the batch."""
 
     def __init__(
-        self, world: World, seeds: Tensor, target: Tensor, history_length: int, step_cap: int, record: bool
+        self,
+        world: World,
+        seeds: Tensor,
+        target: Tensor,
+        history_length: int,
+        step_cap: int,
+        record: bool,
+        untried: bool,
     ) -> None:
         count = len(seeds)
         self.world, self.step_cap = world, step_cap
@@ -127,7 +142,9 @@ class _Walk:
         self.tally = Tally.zero(count, world.device)
         self.final = Tally.zero(count, world.device)
         self.reached = torch.zeros(count, dtype=torch.bool, device=world.device)
-        self.loops = None if record else LoopSkipper(self.env.history, self.tally)
+        self.looped = torch.zeros_like(self.reached)
+        self.loops = LoopSkipper(self.env.history, self.tally)
+        self.untried = UntriedActions(count, int(world.scene_offset.diff().max()), world.device) if untried else None
         self.diary: list[tuple[Tensor, Tensor, Tensor]] | None = [] if record else None
 
     def to_the_end(self, policy: Policy) -> EpisodeTable:
@@ -136,21 +153,31 @@ class _Walk:
             action, certain = self._choose(policy(self.env.history, self.env.target))
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
+            self._close_circles(certain)
             if self.diary is not None:
                 self.diary.append((self.walking, happened.state, action))
-            if self.loops is not None:
-                self.tally = self.loops.skip(self.env.history, self.tally, certain, self.step_cap)
             self._drop_ended(happened)
         return self._table()
 
     def _choose(self, probabilities: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions (B,) int64 sampled from (B, A) probabilities, and where there was no choice, (B,) bool."""
+        """Actions (B,) int64 by (B, A) probabilities, and where the history left no choice, (B,) bool."""
         bounds = probabilities.to(torch.float64).cumsum(1)
         total = bounds[:, -1]
         _check(total)
+        if self.untried is not None:
+            scene_state = self.env.state - self.world.scene_offset[self.world.target_scene[self.env.target]]
+            action = self.untried.choose(self.walking, scene_state, probabilities)
+            return action, torch.zeros_like(action, dtype=torch.bool)
         chance = self.chances.at(self.walking) * total
         action = (chance[:, None] >= bounds[:, :-1]).sum(1)
         return action, (probabilities > 0).sum(1) == 1
+
+    def _close_circles(self, certain: Tensor) -> None:
+        """Note who walks in a circle for ever, and add its rounds up to the cap, unless every step is recorded."""
+        tally, closed = self.loops.skip(self.env.history, self.tally, certain, self.step_cap)
+        self.looped[self.walking[closed]] = True
+        if self.diary is None:
+            self.tally = tally
 
     def _drop_ended(self, happened: Transition) -> None:
         ended = happened.reached | (self.tally.steps >= self.step_cap)
@@ -163,8 +190,7 @@ class _Walk:
         self.walking, self.tally = self.walking[still], self.tally.at(still)
         # There is no reset from here on, so the environment's start and target streams may keep their length.
         self.env.load_tensors({name: value[still] for name, value in self.env.tensors().items()})
-        if self.loops is not None:
-            self.loops.keep(still)
+        self.loops.keep(still)
 
     def _table(self) -> EpisodeTable:
         distance = self.world.distance_table()[self.target, self.start]
@@ -176,6 +202,7 @@ class _Walk:
             reached=_array(self.reached),
             shortest_path_steps=_array(distance),
             zone_steps=_array(self.final.zone_steps),
+            looped=_array(self.looped),
             trajectories=None if self.diary is None else _trajectories(self.start, self.final.steps, self.diary),
         )
 
@@ -211,5 +238,6 @@ def _joined(parts: list[EpisodeTable]) -> EpisodeTable:
         reached=column("reached"),
         shortest_path_steps=column("shortest_path_steps"),
         zone_steps=column("zone_steps"),
+        looped=column("looped"),
         trajectories=tuple(walk for part in walks for walk in part) if walks else None,
     )

@@ -67,25 +67,24 @@ class LoopSkipper:
         self.snapshot, self.tally = history.clone(), tally
         self.certain = torch.ones(len(history), dtype=torch.bool, device=history.device)
 
-    def skip(self, history: Tensor, tally: Tally, certain: Tensor, step_cap: int) -> Tally:
-        """The counts after one more step, all whole rounds below the cap added where a circle has closed.
+    def skip(self, history: Tensor, tally: Tally, certain: Tensor, step_cap: int) -> tuple[Tally, Tensor]:
+        """The counts after one more step, with all whole rounds below the cap where a circle has closed; where, (B,).
 
         Args:
             history: (B, K) int64, after the step.
             tally: the counts after the step.
-            certain: (B,) bool, the step's action was the only possible one.
+            certain: (B,) bool, the step's action was the only one that the history and target allow.
             step_cap: the episodes' last step.
         """
         self.walked += 1
         self.certain = self.certain & certain
-        if bool(self.certain.any()):
-            closed = self.certain & (history == self.snapshot).all(1)
-            if bool(closed.any()):
-                tally = self._rounds_added(tally, closed, step_cap)
+        closed = self.certain & (history == self.snapshot).all(1)
+        if bool(closed.any()):
+            tally = self._rounds_added(tally, closed, step_cap)
         if self.walked == self.renew_at:
             self.snapshot, self.tally, self.renew_at = history.clone(), tally, 2 * self.renew_at
             self.certain = torch.ones_like(self.certain)
-        return tally
+        return tally, closed
 
     def keep(self, still: Tensor) -> None:
         """Forget the episodes where still (B,) is False."""

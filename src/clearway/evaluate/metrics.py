@@ -60,6 +60,11 @@ def collision_free_spl(table: EpisodeTable) -> np.ndarray:
     return spl(table) * collision_free(table)
 
 
+def looped(table: EpisodeTable) -> np.ndarray:
+    """1 where the agent was caught in a circle for ever, (N,)."""
+    return table.looped.astype(np.float64)
+
+
 def _steps_in(zone: Zone) -> Column:
     return lambda table: table.zone_steps[:, zone]
 
@@ -96,6 +101,7 @@ METRICS: dict[str, Metric] = {
     "share_free": Metric(_steps_in(Zone.FREE), steps),
     "share_precollision": Metric(_steps_in(Zone.PRECOLLISION), steps),
     "share_collision": Metric(_steps_in(Zone.COLLISION), steps),
+    "looped": Metric(looped),
 }
 METRIC_NAMES = tuple(METRICS)
 

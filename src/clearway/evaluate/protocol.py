@@ -1,14 +1,16 @@
-"""The whole protocol for some agents: sampled and argmax, with the random and the shortest-path agent."""
+"""The whole protocol for some agents: each way of choosing actions, with the random and the shortest-path agent."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import get_args
 
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.world import World
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP, run_episodes
-from clearway.evaluate.policies import argmax, random_policy, shortest_path_policy
-from clearway.evaluate.report import ActionSelection, Evaluation, Protocol, summarise
+from clearway.evaluate.policies import random_policy, shortest_path_policy
+from clearway.evaluate.report import Evaluation, Protocol, summarise
+from clearway.evaluate.selection import ActionSelection
 from clearway.model.policy import Policy
 
 RANDOM, SHORTEST_PATH = "random", "shortest path"
@@ -25,9 +27,10 @@ def evaluate_agents(
     seed: int = 0,
     history_length: int = HISTORY_LENGTH,
 ) -> list[Evaluation]:
-    """Every agent with sampled actions and with argmax, then the references, random and shortest-path agent.
+    """Every agent with each way of choosing actions, then the references, random and shortest-path agent.
 
-    All face the same starts. Order: each agent "sampled" and "argmax", references, "random", "shortest path".
+    All face the same starts. Order: each agent "sampled", "argmax" and "argmax-untried", references, "random",
+    "shortest path".
 
     Args:
         world: scenes and targets.
@@ -39,9 +42,8 @@ def evaluate_agents(
         seed: of starts, chances and bootstrap.
         history_length: K, as the policies expect it.
     """
-    rows: list[tuple[str, ActionSelection, Policy]] = []
-    for name, policy in agents.items():
-        rows += [(name, "sampled", policy), (name, "argmax", argmax(policy))]
+    selections: tuple[ActionSelection, ...] = get_args(ActionSelection)
+    rows = [(name, selection, policy) for name, policy in agents.items() for selection in selections]
     rows += [(name, "sampled", policy) for name, policy in (references or {}).items()]
     rows += [(RANDOM, "sampled", random_policy()), (SHORTEST_PATH, "sampled", shortest_path_policy(world))]
     evaluations = []
@@ -49,6 +51,7 @@ def evaluate_agents(
         table = run_episodes(
             world,
             policy,
+            selection=selection,
             episodes_per_target=episodes_per_target,
             step_cap=step_cap,
             seed=seed,

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from clearway.envs.world import World
 from clearway.evaluate import bootstrap, metrics
 from clearway.evaluate.episodes import EpisodeTable
+from clearway.evaluate.selection import ActionSelection
 
-ActionSelection = Literal["sampled", "argmax"]
 Interval = tuple[float, float]
 
 

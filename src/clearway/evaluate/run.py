@@ -25,7 +25,7 @@ def evaluate_run(
     step_cap: int = STEP_CAP,
     seed: int = 0,
 ) -> list[Evaluation]:
-    """The agent of a run, sampled and by argmax, beside exact optima, the random and the shortest-path agent.
+    """The agent of a run by each way of choosing actions, beside exact optima, random and shortest-path agent.
 
     The first evaluation is the paper's: sampled actions.
     """

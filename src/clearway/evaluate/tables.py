@@ -75,6 +75,7 @@ COLUMNS = (
     _Column("SPL %", "spl", 2, percent=True, main=True),
     _Column("collision-free SPL %", "collision_free_spl", 2, percent=True),
     _Column("in collision zone %", "share_collision", 2, percent=True),
+    _Column("looped %", "looped", 2, percent=True),
 )
 
 

@@ -54,7 +54,7 @@ class DemoResult:
         out: the folder.
         scene: the bathroom with its features.
         runs: run folder of each agent by the name of its reward.
-        evaluations: of both agents (sampled and argmax), the random and the shortest-path agent.
+        evaluations: of both agents (by each way of choosing actions), the random and the shortest-path agent.
         showcase: one episode that both agents walked.
         seconds: of building (with encoding), training, evaluating.
     """
