@@ -1,0 +1,156 @@
+"""Reads floor plans from files.
+
+.npz  NumPy arrays, one a plan, named by it: (C, 2) whole numbers, x and z of each reachable cell; or a bool map (X, Z).
+.csv  Either the header "x,z" and a line for each reachable cell, or a map of 0 (blocked) and 1 (reachable).
+.txt  A map in characters: "#" is blocked, "." can be reached.
+
+Maps in .csv and .txt files are seen from above: the first line is the far end (largest z), the first column the
+smallest x; the last line is z = 0, the first column x = 0.
+"""
+
+from __future__ import annotations
+
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from clearway.errors import SceneError
+from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan
+
+BLOCKED_LETTER, FREE_LETTER = "#", "."
+SUFFIXES = (".npz", ".csv", ".txt")
+MAX_BYTES = 8 * 1024**2  # of a text file, or of an unpacked array
+PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")  # of a plan, which becomes the name of a file
+WHOLE_NUMBER = re.compile(r"-?[0-9]{1,9}")
+NPY = ".npy"
+_FAULTS = (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, MemoryError, ArithmeticError)
+
+
+def floor_plan_names(path: Path) -> tuple[str, ...]:
+    """The plans in a file, in its order; a text file holds one, of the file's own name.
+
+    Raises:
+        SceneError: there is no such file, or it cannot be read.
+    """
+    _check_file(path)
+    if path.suffix != ".npz":
+        return (path.stem,)
+    with _faults_named(path), zipfile.ZipFile(path) as archive:
+        names = tuple(name.removesuffix(NPY) for name in archive.namelist() if name.endswith(NPY))
+    if not names:
+        raise SceneError(path, "holds no array", "Store one array a plan with numpy.savez")
+    return names
+
+
+def read_floor_plan(path: Path, name: str | None = None, *, cell_size_m: float = CELL_SIZE_M) -> FloorPlan:
+    """A plan from a .npz, .csv or .txt file (formats: see the top of this file).
+
+    Args:
+        path: the file.
+        name: of the plan; may be left out where the file holds one.
+        cell_size_m: side of a cell, metres.
+
+    Raises:
+        SceneError: there is no such file or plan, it cannot be read, or it is no plan.
+    """
+    names = floor_plan_names(path)
+    if name is None and len(names) > 1:
+        raise SceneError(path, f"holds {len(names)} plans", f"Name one of {_listed(names)}")
+    chosen = names[0] if name is None else name
+    if chosen not in names:
+        raise SceneError(path, f"holds no plan named {chosen}", f"Name one of {_listed(names)}")
+    if not PLAIN_NAME.fullmatch(chosen):
+        remedy = "Use letters, digits, spaces, points and dashes alone"
+        raise SceneError(path, f"the plan's name {chosen[:100]!r} is no name for a file", remedy)
+    if path.suffix == ".npz":
+        values, dataset = _read_array(path, chosen), chosen
+    else:
+        text, dataset = _read_text(path), ""
+        values = _csv_values(path, text) if path.suffix == ".csv" else _character_map(path, text)
+    if values.dtype == np.bool_ and values.ndim == 2:
+        return FloorPlan.of_map(chosen, values, cell_size_m=cell_size_m, source=str(path), dataset=dataset)
+    return FloorPlan(chosen, values, cell_size_m=cell_size_m, source=str(path), dataset=dataset)
+
+
+def _check_file(path: Path) -> None:
+    if not path.is_file():
+        raise SceneError(path, "there is no such file", "Check the path")
+    if path.suffix not in SUFFIXES:
+        problem = f"its name ends in '{path.suffix}', expected {' or '.join(SUFFIXES)}"
+        raise SceneError(path, problem, "Rename or convert the file")
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Some names for an error, the rest counted."""
+    shown = ", ".join(names[:10])
+    return f"{shown} and {len(names) - 10} more" if len(names) > 10 else shown
+
+
+@contextmanager
+def _faults_named(path: Path, dataset: str = "") -> Iterator[None]:
+    """Turn whatever reading raises within into one `SceneError`."""
+    try:
+        yield
+    except (*_FAULTS, zipfile.BadZipFile, zlib.error) as fault:
+        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
+        remedy = "Make the file again or get another copy"
+        raise SceneError(path, f"cannot be read ({reason})", remedy, dataset) from fault
+
+
+def _read_array(path: Path, name: str) -> np.ndarray:
+    """An array of a .npz file; pickled objects are refused."""
+    with _faults_named(path, name), zipfile.ZipFile(path) as archive:
+        member = archive.getinfo(name + NPY)
+        if member.file_size > MAX_BYTES:
+            raise ValueError(f"it would unpack to more than {MAX_BYTES >> 20} MiB")
+        with archive.open(member) as file:
+            return np.lib.format.read_array(file, allow_pickle=False)
+
+
+def _read_text(path: Path) -> list[str]:
+    """The lines of a text file, without empty ones before and after."""
+    with _faults_named(path):
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
+        lines = [line.strip() for line in path.read_text("utf-8-sig").strip().splitlines()]
+    if not lines:
+        raise SceneError(path, "is empty", "Give a map or a list of cells")
+    return lines
+
+
+def _csv_values(path: Path, lines: list[str]) -> np.ndarray:
+    """Cells (C, 2) int64, or a map (X, Z) bool, from comma-separated lines."""
+    rows = [[word.strip() for word in line.split(",")] for line in lines]
+    if rows[0] == ["x", "z"]:
+        return np.array([_cell(path, number, row) for number, row in enumerate(rows[1:], 2)], np.int64).reshape(-1, 2)
+    return _map_from_above(path, rows, "0", "1")
+
+
+def _cell(path: Path, number: int, row: list[str]) -> tuple[int, int]:
+    if len(row) != 2 or not all(WHOLE_NUMBER.fullmatch(word) for word in row):
+        problem = f"line {number} is {','.join(row)[:40]!r}, expected two whole numbers, x and z"
+        raise SceneError(path, problem, "Write one cell a line")
+    return int(row[0]), int(row[1])
+
+
+def _character_map(path: Path, lines: list[str]) -> np.ndarray:
+    return _map_from_above(path, [list(line) for line in lines], BLOCKED_LETTER, FREE_LETTER)
+
+
+def _map_from_above(path: Path, rows: list[list[str]], blocked: str, free: str) -> np.ndarray:
+    """The map (X, Z) bool of rows of words, far end first."""
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(rows[0]):
+            problem = f"line {number} has {len(row)} cells, the first has {len(rows[0])}"
+            raise SceneError(path, problem, "Give all lines of a map the same length")
+        strange = next((column for column, word in enumerate(row) if word not in (blocked, free)), None)
+        if strange is not None:
+            problem = f"line {number}, column {strange + 1} holds {row[strange][:20]!r}"
+            raise SceneError(path, problem, f"Write {blocked} for blocked and {free} for reachable")
+    seen_from_above = np.array(rows) == free  # (Z, X), far end first
+    return seen_from_above[::-1].T

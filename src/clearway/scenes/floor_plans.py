@@ -1,0 +1,149 @@
+"""Floor plans: which cells of a grid can be entered. `floor_plan_scene` makes one a scene, with made-up features.
+
+Axis letters: C cells, E edges, S = 4 C states.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+import numpy as np
+
+from clearway.errors import SceneError
+from clearway.scenes.grid import HEADING_COUNT, neighbour_pairs, pose_graph
+from clearway.scenes.made_up import check_made_up, made_up_encoder, made_up_features
+from clearway.scenes.scene import Provenance, Scene
+from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES
+from clearway.version import __version__
+
+SOURCE = "floor_plan"  # stands in a scene's `made_by`
+CELL_SIZE_M = 0.25  # of the published AI2-THOR plans
+MAX_CELLS = MAX_STATES // HEADING_COUNT
+
+
+def _no_edges() -> np.ndarray:
+    return np.zeros((0, 2, 2), np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlan:
+    """The cells that can be entered, on a square grid. Neighbouring cells are joined unless the way is blocked.
+
+    Attributes:
+        name: of the plan and of its scene.
+        cells: (C, 2) int, x and z of each cell in units of the cell size, distinct; the scene keeps their order.
+        blocked_edges: (E, 2, 2) int, pairs of neighbouring cells, x and z of each, without a way between them.
+        cell_size_m: side of a cell, metres.
+        source: file that errors name; empty for a plan made in memory.
+        dataset: array of the file that errors name; empty where the file is the plan.
+
+    Raises:
+        SceneError: there are no cells or too many, one stands twice or far away, or a blocked edge is none.
+    """
+
+    name: str
+    cells: np.ndarray
+    blocked_edges: np.ndarray = field(default_factory=_no_edges)
+    cell_size_m: float = CELL_SIZE_M
+    source: str = ""
+    dataset: str = ""
+
+    def __post_init__(self) -> None:
+        """Check all of it."""
+        if not 0 < self.cell_size_m < math.inf:
+            self._refuse(f"has a cell size of {self.cell_size_m} m", "Give a length above 0")
+        if self.cells.ndim != 2 or self.cells.shape[1] != 2 or self.cells.dtype.kind not in "iu":
+            shape = f"is {self.cells.dtype} of shape {self.cells.shape}"
+            self._refuse(f"{shape}, expected whole numbers (cells, 2)", "Give x and z of every reachable cell")
+        if not 1 <= len(self.cells) <= MAX_CELLS:
+            self._refuse(f"has {len(self.cells)} reachable cells, expected 1 to {MAX_CELLS}", "Give another plan")
+        far = MAX_COORDINATE_M / self.cell_size_m
+        if (self.cells > far).any() or (self.cells < -far).any():
+            self._refuse(f"has cells more than {MAX_COORDINATE_M:,.0f} m away", "Move the plan near its origin")
+        distinct, times = np.unique(self.cells, axis=0, return_counts=True)
+        if times.max() > 1:
+            self._refuse(f"names the cell {tuple(distinct[times.argmax()].tolist())} twice", "Name every cell once")
+        self._check_blocked()
+
+    @classmethod
+    def of_map(
+        cls,
+        name: str,
+        reachable: np.ndarray,
+        blocked_edges: np.ndarray | None = None,
+        *,
+        cell_size_m: float = CELL_SIZE_M,
+        source: str = "",
+        dataset: str = "",
+    ) -> FloorPlan:
+        """The plan of a map, (X, Z) bool: element [x, z] says whether that cell can be entered; see the attributes."""
+        assert reachable.ndim == 2 and reachable.dtype == np.bool_, (reachable.shape, reachable.dtype)
+        blocked = _no_edges() if blocked_edges is None else blocked_edges
+        return cls(name, np.argwhere(reachable), blocked, cell_size_m, source, dataset)
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(E, 2) int64, indices of the neighbouring cells with a way between them."""
+        pairs, _ = neighbour_pairs(self.cells)
+        blocked = set(_ends(self.blocked_edges))
+        free = [ends not in blocked for ends in _ends(self.cells[pairs])]
+        return pairs[np.array(free, bool)]
+
+    def _check_blocked(self) -> None:
+        edges = self.blocked_edges
+        if edges.ndim != 3 or edges.shape[1:] != (2, 2) or edges.dtype.kind not in "iu":
+            shape = f"has blocked edges of {edges.dtype} and shape {edges.shape}"
+            self._refuse(f"{shape}, expected whole numbers (edges, 2, 2)", "Give x and z of the two cells of each edge")
+        pairs, _ = neighbour_pairs(self.cells)
+        unknown = set(_ends(edges)) - set(_ends(self.cells[pairs]))
+        if unknown:
+            ends = " and ".join(str(cell) for cell in sorted(unknown.pop()))
+            self._refuse(f"has a blocked edge of {ends}", "Name two neighbouring cells that can be entered")
+
+    def _refuse(self, problem: str, remedy: str) -> NoReturn:
+        raise SceneError(self.source or self.name, problem, remedy, self.dataset)
+
+
+def floor_plan_scene(plan: FloorPlan, feature_count: int = 2048, seed: int = 0) -> Scene:
+    """A plan as a scene without pictures: its cells and edges exactly, four headings, made-up features.
+
+    Scenes of the same feature count and seed can be trained together; each plan has its own features, by its name.
+
+    Args:
+        plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
+        feature_count: F.
+        seed: of the features (`made_up`).
+
+    Raises:
+        SceneError: the seed is negative, or so many features cannot be kept.
+    """
+    state_count = HEADING_COUNT * len(plan.cells)
+    check_made_up(feature_count, seed, state_count, plan.source or plan.name)
+    cells = plan.cells.astype(np.int64)
+    locations_m = np.repeat(cells, HEADING_COUNT, axis=0) * plan.cell_size_m
+    headings_deg = np.tile(np.arange(HEADING_COUNT) * 360 // HEADING_COUNT, len(cells))
+    own_seed = (seed, zlib.crc32(plan.name.encode()))
+    return Scene(
+        name=plan.name,
+        observations=None,
+        features=made_up_features(locations_m, headings_deg, feature_count, own_seed),
+        locations_m=locations_m,
+        headings_deg=headings_deg,
+        graph=pose_graph(cells, plan.edges),
+        made_by=Provenance(
+            SOURCE,
+            seed=seed,
+            versions={"clearway": __version__, "numpy": np.__version__},
+            notes={"features": "made-up smooth functions of the pose; no pictures"},
+        ),
+        encoder=made_up_encoder(feature_count, seed),
+        cell_size_m=plan.cell_size_m,
+    )
+
+
+def _ends(pairs: np.ndarray) -> list[frozenset[tuple[int, int]]]:
+    """The two cells of each pair, (E, 2, 2), without regard to which comes first."""
+    return [frozenset((tuple(one), tuple(other))) for one, other in pairs.tolist()]
