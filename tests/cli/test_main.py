@@ -16,13 +16,15 @@ import clearway as package
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
+from clearway.cli.floor_plan import FromFloorPlan
 from clearway.cli.oracle import Oracle
 from clearway.cli.scenes import Build, Import, Inspect
 from clearway.cli.train import Train
 from clearway.errors import ClearwayError
 from clearway.perception import EncoderWarning
 
-COMMANDS = {"demo", "scenes build", "scenes import", "scenes inspect", "train", "evaluate", "oracle"}
+COMMANDS = {"demo", "scenes build", "scenes import", "scenes floor-plan", "scenes inspect", "train", "evaluate", "oracle"}
+KINDS = (Demo, Build, Import, FromFloorPlan, Inspect, Train, Evaluate, Oracle)
 HEAVY = ("torch", "mujoco", "transformers", "matplotlib", "scipy", "h5py", "numpy")
 MOST_SECONDS = 0.5
 TRIES = 6  # others may be using the machine; 3 are enough on an idle one
@@ -67,7 +69,7 @@ def helps(clearway, words: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
 
 def test_every_command_has_help_with_an_example_that_can_be_read(clearway, monkeypatch):
     run = []
-    for kind in (Demo, Build, Import, Inspect, Train, Evaluate, Oracle):
+    for kind in KINDS:
         monkeypatch.setattr(kind, "run", lambda command: run.append(command))
     found = dict(helps(clearway))
     assert found.keys() >= COMMANDS | {"scenes"}
@@ -75,7 +77,7 @@ def test_every_command_has_help_with_an_example_that_can_be_read(clearway, monke
         (example,) = re.findall(r"^Example: clearway (.+)$", text.split("╭")[0], re.MULTILINE)
         assert example.startswith(words)
         assert clearway(*shlex.split(example)).code == 0, example
-    assert {type(command) for command in run} >= {Demo, Build, Import, Inspect, Train, Evaluate, Oracle}
+    assert {type(command) for command in run} >= set(KINDS)
 
 
 def raising(error: BaseException):

@@ -122,9 +122,9 @@ def test_files_that_are_too_large(tmp_path: Path, monkeypatch) -> None:
     np.savez_compressed(tmp_path / "zeros.npz", zeros=np.zeros((40_000, 2), np.int64))
     text = write(tmp_path, "map.txt", "." * 2000)
     monkeypatch.setattr(floor_plan_files, "MAX_BYTES", 1000)
-    with pytest.raises(SceneError, match="dataset 'zeros': cannot be read .*unpack to more than"):
+    with pytest.raises(SceneError, match=r"dataset 'zeros': cannot be read .*unpack to more than"):
         read_floor_plan(tmp_path / "zeros.npz")
-    with pytest.raises(SceneError, match="cannot be read .*larger than"):
+    with pytest.raises(SceneError, match=r"cannot be read .*larger than"):
         read_floor_plan(text)
 
 

@@ -15,6 +15,7 @@ import tyro
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
+from clearway.cli.floor_plan import FromFloorPlan
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.scenes import Build, Import, Inspect
@@ -29,7 +30,7 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build rooms, import dumps, inspect.
+    """Scene files: build rooms, import dumps, make them of floor plans, inspect.
 
     Example: clearway scenes inspect bathroom.h5
     """
@@ -37,6 +38,7 @@ class Scenes:
     command: (
         Annotated[Build, tyro.conf.subcommand("build")]
         | Annotated[Import, tyro.conf.subcommand("import")]
+        | Annotated[FromFloorPlan, tyro.conf.subcommand("floor-plan")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     )
 
