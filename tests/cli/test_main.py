@@ -23,7 +23,16 @@ from clearway.cli.train import Train
 from clearway.errors import ClearwayError
 from clearway.perception import EncoderWarning
 
-COMMANDS = {"demo", "scenes build", "scenes import", "scenes floor-plan", "scenes inspect", "train", "evaluate", "oracle"}
+COMMANDS = {
+    "demo",
+    "scenes build",
+    "scenes import",
+    "scenes floor-plan",
+    "scenes inspect",
+    "train",
+    "evaluate",
+    "oracle",
+}
 KINDS = (Demo, Build, Import, FromFloorPlan, Inspect, Train, Evaluate, Oracle)
 HEAVY = ("torch", "mujoco", "transformers", "matplotlib", "scipy", "h5py", "numpy")
 MOST_SECONDS = 0.5
