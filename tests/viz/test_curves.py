@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clearway.viz.curves import PANELS, _running_mean, _series, draw_curves
+from clearway.viz.curves import PANELS, Panel, _running_mean, _series, draw_curves
 
 STEPS = next(panel for panel in PANELS if panel.key == "steps")
 
@@ -43,3 +43,14 @@ def test_the_axis_can_be_time(tmp_path):
         draw_curves({"run": rows(20)}, tmp_path / f"{x}.png", x=x)
     pictures = [np.asarray(Image.open(tmp_path / f"{x}.png")) for x in ("frames", "seconds")]
     assert not np.array_equal(*pictures)
+
+
+def test_other_panels_can_be_drawn_and_goals_marked(tmp_path):
+    def drawn(*panels: Panel) -> np.ndarray:
+        draw_curves({"run": rows(20)}, tmp_path / "curves.png", panels=panels)
+        with Image.open(tmp_path / "curves.png") as picture:
+            return np.asarray(picture)
+
+    plain, marked = drawn(Panel("steps", "steps")), drawn(Panel("steps", "steps", goal=100.0))
+    assert plain.shape == marked.shape and not np.array_equal(plain, marked)
+    assert drawn(Panel("steps", "steps"), Panel("loss", "loss")).shape[1] > plain.shape[1]

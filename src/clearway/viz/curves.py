@@ -30,6 +30,8 @@ class Panel:
     linear_below: float | None = None
     """From here on a logarithmic axis; None: a linear one."""
     from_zero: bool = False
+    goal: float | None = None
+    """A level that a dashed line marks."""
 
 
 PANELS = (
@@ -42,7 +44,9 @@ PANELS = (
 )
 
 
-def draw_curves(runs: Mapping[str, Rows], path: Path, *, x: str = "frames", title: str = "") -> None:
+def draw_curves(
+    runs: Mapping[str, Rows], path: Path, *, x: str = "frames", title: str = "", panels: Sequence[Panel] = PANELS
+) -> None:
     """Draw the learning curves of some runs and save them as PNG. Figures and rows that are missing are left out.
 
     Args:
@@ -50,8 +54,9 @@ def draw_curves(runs: Mapping[str, Rows], path: Path, *, x: str = "frames", titl
         path: of the picture.
         x: the figure along the horizontal axis: "frames" or "seconds".
         title: stands above.
+        panels: the figures to draw, in this order.
     """
-    panels = [panel for panel in PANELS if any(len(_series(rows, x, panel)[0]) for rows in runs.values())]
+    panels = [panel for panel in panels if any(len(_series(rows, x, panel)[0]) for rows in runs.values())]
     columns = min(COLUMNS, max(1, len(panels)))
     lines = max(1, -(-len(panels) // columns))
     height_in = lines * PANEL_HEIGHT_IN + LEGEND_IN * (2 if title else 1)
@@ -110,6 +115,9 @@ def _dress(axes: Axes, panel: Panel, x: str, lowest: float, *, with_x_label: boo
     from matplotlib.ticker import EngFormatter
 
     axes.set_title(panel.title, loc="left", fontsize=9.5)
+    if panel.goal is not None:
+        axes.axhline(panel.goal, color=colours.FAINT_INK, linewidth=1, linestyle="--", zorder=0)
+        lowest = min(lowest, panel.goal)
     axes.grid(axis="y")
     axes.tick_params(length=0)
     axes.xaxis.set_major_formatter(EngFormatter(sep=""))

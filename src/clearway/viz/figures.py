@@ -63,6 +63,7 @@ CURVES = (
     LineStyle("#d55e00", "#ffffff", (5, 1.6)),
     LineStyle("#1b9e77", "#ffffff", (1.2, 1.2)),
     LineStyle("#8e2c9c", "#ffffff", (7, 2, 1.5, 2)),
+    LineStyle("#7a6a00", "#ffffff", (3, 2)),
 )
 """Of the first, second, ... run in a plot on white."""
 
