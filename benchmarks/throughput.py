@@ -30,10 +30,12 @@ from __future__ import annotations
 import argparse
 import json
 import platform
+import re
 import statistics
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -47,7 +49,8 @@ from clearway.learn.losses import Batch, actor_critic_loss
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.trainer import Trainer
-from clearway.model.network import OUTPUTS, FeatureScale
+from clearway.model.feature_map import FeatureMap
+from clearway.model.network import OUTPUTS
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
@@ -124,18 +127,25 @@ def made_up_world(device: str) -> World:
 class PlainNetwork(nn.Module):
     """The siamese actor-critic in `nn.Linear` layers, every scene's head by itself."""
 
-    def __init__(self, scene_count: int, width: int, history_length: int) -> None:
+    def __init__(self, scene_count: int, width: int, history_length: int, feature_count: int = FEATURES) -> None:
         super().__init__()
-        self.siamese = nn.Linear(history_length * FEATURES, width)
+        self.siamese = nn.Linear(history_length * feature_count, width)
         self.fusion = nn.Linear(2 * width, width)
         self.scene_layers = nn.ModuleList(nn.Linear(width, width) for _ in range(scene_count))
         self.outputs = nn.ModuleList(nn.Linear(width, OUTPUTS) for _ in range(scene_count))
 
     def forward(self, seen: Tensor, wanted: Tensor, rows_per_scene: list[int]) -> Tensor:
         """Scores and value, (B, 5), of two (B, K * F) inputs whose rows are ordered by scene."""
+        return self.heads(self.trunk(seen, wanted), rows_per_scene)
+
+    def trunk(self, seen: Tensor, wanted: Tensor) -> Tensor:
+        """What all scenes share: two (B, K * F) inputs -> (B, H)."""
         joint = torch.cat([torch.relu(self.siamese(seen)), torch.relu(self.siamese(wanted))], 1)
-        fused = torch.relu(self.fusion(joint)).split(rows_per_scene)
-        heads = zip(fused, self.scene_layers, self.outputs, strict=True)
+        return torch.relu(self.fusion(joint))
+
+    def heads(self, fused: Tensor, rows_per_scene: list[int]) -> Tensor:
+        """Every scene's own layers: (B, H) ordered by scene -> scores and value, (B, 5)."""
+        heads = zip(fused.split(rows_per_scene), self.scene_layers, self.outputs, strict=True)
         return torch.cat([output(torch.relu(layer(rows))) for rows, layer, output in heads])
 
 
@@ -146,7 +156,7 @@ class NaiveA2C:
         self.world, self.learner = world, learner
         self.per_scene = learner.envs // world.scene_count
         assert world.features is not None
-        self.features = FeatureScale.centred(world.features)(world.features)
+        self.features = FeatureMap.fitted(world.features, centre=True)(world.features)
         torch.manual_seed(seed)
         self.network = PlainNetwork(world.scene_count, learner.width, learner.history_length).to(world.device)
         self.adam = torch.optim.Adam(self.network.parameters(), lr=learner.lr_start, fused=True)
@@ -384,7 +394,9 @@ def device_name(device: str) -> str:
     """The processor that computes."""
     if torch.device(device).type == "cuda":
         return torch.cuda.get_device_name()
-    return platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    models = re.findall(r"^model name\s*: (.+)$", cpuinfo.read_text(), re.MULTILINE) if cpuinfo.exists() else []
+    return models[0] if models else platform.processor() or platform.machine()
 
 
 def main() -> None:

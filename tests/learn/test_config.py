@@ -16,6 +16,7 @@ def test_the_paper_s_settings() -> None:
         "reward_scale": 1.0,
         "clip_rewards": True,
         "centre_features": False,
+        "feature_basis": 0,
         "discount": 0.99,
         "gae_lambda": 1.0,
         "hindsight": False,
@@ -65,6 +66,7 @@ def test_the_default_is_the_recipe() -> None:
         "hindsight": True,
         "balance": 3.0,
         "centre_features": True,
+        "feature_basis": 0,
         "width": 512,
     }
     assert {name: asdict(DEFAULT)[name] for name in recipe} == recipe

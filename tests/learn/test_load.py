@@ -26,8 +26,10 @@ def request_with_files(folder: Path) -> RunRequest:
     return small_request(scenes=scenes, paths=paths, learner=small_learner(frames=160))
 
 
-def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path) -> None:
+@pytest.mark.parametrize("directions", [0, 3])
+def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path, directions: int) -> None:
     request = request_with_files(tmp_path)
+    request = replace(request, learner=replace(request.learner, feature_basis=directions))
     trainer = request.trainer()
     for _ in range(3):
         trainer.update()
@@ -43,7 +45,7 @@ def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path) -> None:
     first = world.scene_offset[world.target_scene[target]]
     history = first[:, None] + torch.randint(20, (9, 4), generator=torch.Generator().manual_seed(0))
     found = agent.policy(world)(history, target)
-    states = trainer.scale(trainer.world.features)
+    states = trainer.feature_map(trainer.world.features)
     with torch.no_grad():
         scores, _ = trainer.network(states[history], states[world.target_state][target], world.target_scene[target])
     torch.testing.assert_close(found, torch.softmax(scores, 1), rtol=1e-4, atol=1e-6)

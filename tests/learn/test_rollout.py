@@ -107,7 +107,7 @@ def test_kept_activations_are_those_of_the_histories_stored() -> None:
     fresh = trainer.lookup.forward(history, target, [len(history) // scenes] * scenes)
     for name in ("seen", "fused", "special", "output"):
         torch.testing.assert_close(getattr(rollout.kept, name), getattr(fresh, name), rtol=1e-5, atol=1e-6)
-    states = trainer.scale(trainer.world.features)
+    states = trainer.feature_map(trainer.world.features)
     scores, value = trainer.network(
         states[history], states[trainer.world.target_state][target], trainer.world.target_scene[target]
     )

@@ -22,7 +22,7 @@ A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, step_limit=5)
 
 def predicted(trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     """Scores (..., A) and values (...) of the naive network for states (..., K) and targets (...)."""
-    world, states = trainer.world, trainer.scale(trainer.world.features)
+    world, states = trainer.world, trainer.feature_map(trainer.world.features)
     rows, wanted = history.reshape(-1, history.shape[-1]), target.reshape(-1)
     scene = world.target_scene[wanted]
     scores, value = network(states[rows], states[world.target_state][wanted], scene)

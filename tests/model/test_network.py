@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.model.network import NetworkShape, SiameseActorCritic
 
 
 def test_the_paper_s_size_has_5_780_500_parameters() -> None:
@@ -53,21 +53,6 @@ def test_forward_by_hand() -> None:
     # scene layer: 2 * 3.5 = 7 in scene 0, relu(-2 * 9.5 + 1) = 0 in scene 1
     assert scores.tolist() == [[0.0, 7.0, 14.0, 21.0], [0.0] * 4]
     assert value.tolist() == [28.0, 0.0]
-
-
-def test_centred_features_have_mean_0_and_rms_1() -> None:
-    features = torch.randn(50, 6, generator=torch.Generator().manual_seed(0)) * 3 + torch.arange(6)
-    prepared = FeatureScale.centred(features)(features)
-    assert prepared.mean(0).abs().max() < 1e-5
-    assert prepared.square().mean().item() == pytest.approx(1, rel=1e-5)
-    ratio = (features - features.mean(0)) / prepared
-    assert torch.allclose(ratio, ratio[0, 0].expand_as(ratio), rtol=1e-4)  # one factor for all features
-
-
-def test_constant_features_and_the_identity() -> None:
-    constant = torch.full((4, 3), 2.5)
-    assert torch.equal(FeatureScale.centred(constant)(constant), torch.zeros(4, 3))
-    assert torch.equal(FeatureScale.identity(constant)(constant), constant)
 
 
 def test_layer_gradients_are_the_published_network_s_tensors() -> None:

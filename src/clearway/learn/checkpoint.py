@@ -2,7 +2,7 @@
 
 A checkpoint is a folder:
 
-    network.safetensors    parameters, and the mean and factor that prepare features
+    network.safetensors    parameters, and the map that prepares features
     training.safetensors   everything else that training needs to go on bit for bit
     checkpoint.json        format version, frames, updates, seconds, SHA-256 of both files
 

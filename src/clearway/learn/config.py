@@ -37,6 +37,9 @@ class Learner:
     """Clip rewards to [-1, 1] (before scaling), as Zhu's training loop does."""
     centre_features: bool = True
     """Centre features and give them a root mean square of 1, by one global factor."""
+    feature_basis: int = 0
+    """Express features in so many leading principal directions; 0 keeps them. S poses span at most S directions, so a
+    basis of that size loses nothing and costs less where poses are few."""
     discount: float = 0.97
     gae_lambda: float = 0.95
     """Lambda of generalised advantage estimation; 1 gives n-step returns."""
@@ -92,7 +95,7 @@ class Learner:
         for name in ("entropy_start", "entropy_end", "lr_start", "clip_norm", "reward_scale"):
             if not getattr(self, name) > 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}")
-        for name in ("lr_end", "balance", "ratio_clip", "value_weight"):
+        for name in ("lr_end", "balance", "ratio_clip", "value_weight", "feature_basis"):
             if not getattr(self, name) >= 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected at least 0. Give a larger {name}")
         if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):

@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from torch import Tensor
+
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
+from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import LookupNetwork
-from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import Policy, network_policy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
@@ -24,18 +27,18 @@ class Agent:
     Attributes:
         record: of its run.
         network: the parameters.
-        scale: prepares features for it.
+        feature_map: prepares features for it.
     """
 
     record: RunRecord
     network: SiameseActorCritic
-    scale: FeatureScale
+    feature_map: FeatureMap
 
     def policy(self, world: World) -> Policy:
         """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
-        lookup = LookupNetwork(self.network, self.scale(world.features), world.target_state)
+        lookup = LookupNetwork(self.network, self.feature_map(world.features), world.target_state)
         return network_policy(lookup, world)
 
 
@@ -50,14 +53,18 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     path = checkpoint or newest_checkpoint(run.checkpoints)
     tensors = read_network(path)
     try:
-        scale = FeatureScale(tensors["scale.mean"], tensors["scale.factor"])
-        shape = NetworkShape(len(record.scenes), len(scale.mean), record.learner.width, record.learner.history_length)
+        feature_map = FeatureMap.from_tensors(_part(tensors, "features."))
+        learner = record.learner
+        shape = NetworkShape(len(record.scenes), feature_map.input_count, learner.width, learner.history_length)
         network = SiameseActorCritic(shape)
-        prefix = "network."
-        network.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
+        network.load_state_dict(_part(tensors, "network."))
     except (KeyError, RuntimeError) as error:
         raise RunError(f"{path}: does not fit its run ({error}). Use another checkpoint") from error
-    return Agent(record, network, scale)
+    return Agent(record, network, feature_map)
+
+
+def _part(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    return {name[len(prefix) :]: tensor for name, tensor in tensors.items() if name.startswith(prefix)}
 
 
 def run_scenes(record: RunRecord, files: Sequence[Path] | None = None) -> list[Scene]:

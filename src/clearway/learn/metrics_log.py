@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import shutil
+import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,6 +14,9 @@ from torch import Tensor
 
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS, EpisodeStatistics
 from clearway.learn.trainer import Update
+
+Row = dict[str, float]
+BOARD = "tensorboard"  # folder of TensorBoard's files, beside the JSON lines
 
 
 class Counting(Protocol):
@@ -21,7 +27,7 @@ class Counting(Protocol):
     statistics: EpisodeStatistics
 
 
-def metrics_row(trainer: Counting, update: Update, seconds: float) -> dict[str, float]:
+def metrics_row(trainer: Counting, update: Update, seconds: float) -> Row:
     """One row of figures: the episodes ended since the last row, and the latest update's.
 
     seconds: training time so far, checkpoints and evaluation left out.
@@ -37,7 +43,7 @@ def metrics_row(trainer: Counting, update: Update, seconds: float) -> dict[str, 
     }
 
 
-def episode_figures(totals: Tensor) -> dict[str, float]:
+def episode_figures(totals: Tensor) -> Row:
     """Means over ended episodes from totals (M, 4); 0 where none ended."""
     sums = totals.sum(0).tolist()
     episodes = max(sums[EPISODES], 1.0)
@@ -58,23 +64,35 @@ class MetricsLog:
 
     Args:
         path: of the JSON lines.
+        before: the rows that the file holds already. TensorBoard's files beside it are written anew from them, so that
+            a resumed run has every figure there once, and none that a killed process had not written out is missing.
+        seconds: training time so far.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, before: Sequence[Row] = (), seconds: float = 0.0) -> None:
         self.file = path.open("a")
         self.board: Any = None
         if importlib.util.find_spec("tensorboard"):
             from torch.utils.tensorboard import SummaryWriter
 
-            self.board = SummaryWriter(str(path.parent / "tensorboard"))
+            folder = path.parent / BOARD
+            shutil.rmtree(folder, ignore_errors=True)
+            self.began = time.time() - seconds
+            self.board = SummaryWriter(str(folder), purge_step=0 if before else None)  # for one that looks on
+            for row in before:
+                self._show(row)
 
-    def write(self, row: dict[str, float]) -> None:
+    def write(self, row: Row) -> None:
         """Append one row."""
         self.file.write(json.dumps(row) + "\n")
         self.file.flush()
         if self.board:
-            for name, value in row.items():
-                self.board.add_scalar(name, value, row["frames"])
+            self._show(row)
+
+    def _show(self, row: Row) -> None:
+        """Hand the row's figures to TensorBoard, at the time when training had come so far without a pause."""
+        for name, value in row.items():
+            self.board.add_scalar(name, value, row["frames"], walltime=self.began + row["seconds"])
 
     def close(self) -> None:
         """Close the files."""

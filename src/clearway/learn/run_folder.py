@@ -182,6 +182,9 @@ class RunFolder:
         except OSError as error:
             raise RunError(f"{self.path}: not a folder to write to ({error}). Choose another with --out") from error
         try:
+            for name in (RUN_FILE, METRICS_FILE):
+                for part in self.path.glob(f".{name}.*.part"):  # by a process that was killed
+                    part.unlink()
             yield
         finally:
             lock.release()
@@ -235,8 +238,10 @@ class RunFolder:
     def forget_metrics_after(self, frames: int) -> None:
         """Drop rows that training will write again when it resumes from a checkpoint at `frames`."""
         rows = [row for row in self.metrics() if row["frames"] <= frames]
-        with written_whole(self.metrics_path) as part:
-            part.write_text("".join(json.dumps(row) + "\n" for row in rows))
+        text = "".join(json.dumps(row) + "\n" for row in rows)
+        if not self.metrics_path.exists() or self.metrics_path.read_text() != text:
+            with written_whole(self.metrics_path) as part:
+                part.write_text(text)
 
 
 def _record_from(content: Mapping[str, Any]) -> RunRecord:

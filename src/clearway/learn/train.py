@@ -32,7 +32,7 @@ from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.trainer import Trainer, Update
-from clearway.model.network import FeatureScale
+from clearway.model.feature_map import FeatureMap
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 
@@ -46,7 +46,7 @@ class Learning(Protocol):
     world: World
     learner: Learner
     statistics: EpisodeStatistics
-    scale: FeatureScale
+    feature_map: FeatureMap
     frames: int
     updates: int
 
@@ -163,10 +163,15 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bo
 def _run(
     trainer: Learning, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float
 ) -> None:
-    """Update until the frames are used or the user interrupts; ends with a checkpoint either way."""
+    """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
+
+    A run that is finished already is left as it is.
+    """
+    if trainer.finished:
+        return
     rows = _rows_due(trainer)
-    log = MetricsLog(folder.metrics_path)
-    saved_at = time.monotonic()
+    log = MetricsLog(folder.metrics_path, folder.metrics(), seconds)
+    saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
     try:
         while not trainer.finished and not interrupted.is_set():
             started = time.monotonic()
@@ -178,8 +183,9 @@ def _run(
             view.show(trainer.frames, trainer.statistics.solved, trainer.world.target_count)
             if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
                 save(trainer, folder, seconds)
-                saved_at = time.monotonic()
-        save(trainer, folder, seconds)
+                saved_at, saved_frames = time.monotonic(), trainer.frames
+        if saved_frames != trainer.frames:
+            save(trainer, folder, seconds)
     finally:
         log.close()
     if not trainer.finished:
@@ -195,7 +201,7 @@ def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
     """Write a checkpoint of the trainer as it stands."""
     tensors = trainer.tensors()
     network = {key: value for key, value in tensors.items() if key.startswith("network.")}
-    network |= {"scale.mean": trainer.scale.mean, "scale.factor": trainer.scale.factor}
+    network |= {f"features.{name}": tensor for name, tensor in trainer.feature_map.tensors().items()}
     training = {key: value for key, value in tensors.items() if not key.startswith("network.")}
     progress = Progress(trainer.frames, trainer.updates, seconds)
     write_checkpoint(folder.checkpoints, network, training, progress)

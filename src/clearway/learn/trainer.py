@@ -23,8 +23,9 @@ from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp, clip_gradie
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, by_scene, by_step
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import Activations, LookupNetwork
-from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
 SHUFFLE_SALT = 1_000_003
@@ -85,10 +86,10 @@ class Trainer:
             )
         self.env_count = per_scene * world.scene_count
         device = world.device
-        self.scale = FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
-        shape = NetworkShape(world.scene_count, features.shape[1], learner.width, learner.history_length)
+        self.feature_map = FeatureMap.fitted(features, centre=learner.centre_features, directions=learner.feature_basis)
+        shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
-        self.lookup = LookupNetwork(self.network, self.scale(features), world.target_state)
+        self.lookup = LookupNetwork(self.network, self.feature_map(features), world.target_state)
         self.optimiser: Optimiser = Adam(self.network) if learner.optimiser == "adam" else SharedRMSProp(self.network)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         scenes = torch.arange(world.scene_count, device=device).repeat_interleave(per_scene)

@@ -72,7 +72,7 @@ class SiameseActorCritic(nn.Module):
         """Action scores (B, A) before the softmax, and values (B,).
 
         Args:
-            history: (B, K, F) features of the last K poses, newest last, prepared by `FeatureScale`.
+            history: (B, K, F) features of the last K poses, newest last, prepared by `FeatureMap`.
             target: (B, F) features of the target pose, prepared likewise; tiled K times here.
             scene: (B,) int64, whose head to use.
         """
@@ -108,32 +108,3 @@ def grad_of(parameter: Tensor) -> Tensor:
     """The parameter's gradient, which must be there."""
     assert parameter.grad is not None, "no gradient yet"
     return parameter.grad
-
-
-@dataclass(frozen=True, eq=False)
-class FeatureScale:
-    """The fixed affine map from a scene's features to the network's input: (x - mean) * factor.
-
-    Attributes:
-        mean: (F,) float32.
-        factor: scalar float32 tensor.
-    """
-
-    mean: Tensor
-    factor: Tensor
-
-    @classmethod
-    def centred(cls, features: Tensor) -> FeatureScale:
-        """Centre on the mean over all states (S, F), then one global factor to a root mean square of 1."""
-        mean = features.mean(0)
-        spread = (features - mean).square().mean().sqrt()
-        return cls(mean, torch.where(spread > 0, 1 / spread.clamp_min(1e-12), torch.ones_like(spread)))
-
-    @classmethod
-    def identity(cls, features: Tensor) -> FeatureScale:
-        """Leave the features as they are, as the paper does."""
-        return cls(torch.zeros_like(features[0]), features.new_ones(()))
-
-    def __call__(self, features: Tensor) -> Tensor:
-        """Prepared features, of the same shape (..., F)."""
-        return (features - self.mean) * self.factor

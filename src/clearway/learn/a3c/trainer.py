@@ -27,7 +27,8 @@ from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.config import Learner
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.trainer import Update, check_finite, check_seed, checked_features
-from clearway.model.network import FeatureScale, NetworkShape, SiameseActorCritic
+from clearway.model.feature_map import FeatureMap
+from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
 SECONDS_TO_END = 5.0  # a round takes a fraction of a second
@@ -59,7 +60,7 @@ class AsyncTrainer:
             )
         self.world, self.learner, self.reward, self.seed = world, learner, reward, seed
         self.frames, self.updates = 0, 0
-        self.scale = FeatureScale.centred(features) if learner.centre_features else FeatureScale.identity(features)
+        self.feature_map = FeatureMap.fitted(features, centre=learner.centre_features, directions=learner.feature_basis)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
         self.process_count = min(processes, learner.envs)
         self.shared = self._new_shared(features)
@@ -70,8 +71,8 @@ class AsyncTrainer:
 
     def _new_shared(self, features: Tensor) -> SharedTensors:
         """Shared memory with everything at its start."""
-        learner, world = self.learner, replace(self.world, features=self.scale(features))
-        shape = NetworkShape(world.scene_count, features.shape[1], learner.width, learner.history_length)
+        learner, world = self.learner, replace(self.world, features=self.feature_map(features))
+        shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
         parameters = {name: p.data for name, p in SiameseActorCritic(shape, self.seed).named_parameters()}
         squares = {name: torch.full_like(tensor, 1 + EPSILON) for name, tensor in parameters.items()}
         workers = _by_target(learner.envs, world.target_count)

@@ -1,0 +1,90 @@
+"""The fixed affine map from a scene's features to the network's input.
+
+Axis letters: S states, F features, R directions of a basis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+SPANNED = 1e-5  # a direction counts where its singular value is at least this share of the largest
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureMap:
+    """x -> (x - mean) * factor, or ((x - mean) @ basis) * factor.
+
+    Attributes:
+        mean: (F,) float32.
+        factor: scalar float32 tensor.
+        basis: (F, R) float32 with orthonormal columns; None for all features as they are.
+    """
+
+    mean: Tensor
+    factor: Tensor
+    basis: Tensor | None = None
+
+    @classmethod
+    def fitted(cls, features: Tensor, *, centre: bool, directions: int = 0) -> FeatureMap:
+        """The map for the features (S, F) of all states that will be learnt from.
+
+        Args:
+            features: float32.
+            centre: move the mean to 0 and give the network's input a root mean square of 1, by one factor for all.
+            directions: express features in their leading principal directions, at most so many, and drop the rest; 0
+                keeps the features. S states span at most S directions: from there on nothing is lost, since a first
+                layer's weight only ever grows along them.
+        """
+        mean = features.mean(0) if centre else torch.zeros_like(features[0])
+        basis = principal_directions(features - mean, directions) if directions else None
+        plain = cls(mean, features.new_ones(()), basis)
+        if not centre:
+            return plain
+        spread = plain(features).square().mean().sqrt()
+        return cls(mean, torch.where(spread > 0, 1 / spread.clamp_min(1e-12), torch.ones_like(spread)), basis)
+
+    @property
+    def feature_count(self) -> int:
+        """F, features of a picture."""
+        return len(self.mean)
+
+    @property
+    def input_count(self) -> int:
+        """Numbers that the network sees of a picture: F, or R with a basis."""
+        return self.feature_count if self.basis is None else self.basis.shape[1]
+
+    def __call__(self, features: Tensor) -> Tensor:
+        """The network's input (..., F), or (..., R) with a basis, for features (..., F)."""
+        centred = features - self.mean
+        return (centred if self.basis is None else centred @ self.basis) * self.factor
+
+    def tensors(self) -> dict[str, Tensor]:
+        """All that `from_tensors` needs."""
+        found = {"mean": self.mean, "factor": self.factor, "basis": self.basis}
+        return {name: tensor for name, tensor in found.items() if tensor is not None}
+
+    @classmethod
+    def from_tensors(cls, tensors: Mapping[str, Tensor]) -> FeatureMap:
+        """The map that `tensors` was called of."""
+        return cls(tensors["mean"], tensors["factor"], tensors.get("basis"))
+
+
+def principal_directions(features: Tensor, most: int) -> Tensor:
+    """(F, R) float32: the R <= most orthonormal directions in which features (S, F) vary most, the largest first.
+
+    Directions that the features do not span are left out; one stays in any case.
+    """
+    rows = features.double()
+    states, count = rows.shape
+    by_state = states < count  # the smaller of the two symmetric matrices has the same eigenvalues
+    squares, vectors = torch.linalg.eigh(rows @ rows.T if by_state else rows.T @ rows)
+    squares, vectors = squares.flip(0)[:most], vectors.flip(1)[:, :most]
+    spanned = max(int((squares > SPANNED**2 * squares[0]).sum()), 1)
+    vectors = vectors[:, :spanned]
+    if by_state:
+        vectors = rows.T @ vectors / squares[:spanned].clamp_min(1e-30).sqrt()
+    return vectors.float().contiguous()

@@ -1,0 +1,70 @@
+"""The map from features to the network's input."""
+
+import pytest
+import torch
+from torch import Tensor
+
+from clearway.model.feature_map import FeatureMap, principal_directions
+
+
+def drawn(states: int, count: int, seed: int = 0) -> Tensor:
+    """Features whose directions vary differently, off centre."""
+    rows = torch.randn(states, count, generator=torch.Generator().manual_seed(seed))
+    return rows * torch.linspace(3, 0.5, count) + torch.arange(count)
+
+
+def inner_products(rows: Tensor) -> Tensor:
+    return rows @ rows.T
+
+
+def test_centred_features_have_mean_0_and_rms_1() -> None:
+    features = drawn(50, 6)
+    prepared = FeatureMap.fitted(features, centre=True)(features)
+    assert prepared.mean(0).abs().max() < 1e-5
+    assert prepared.square().mean().item() == pytest.approx(1, rel=1e-5)
+    ratio = (features - features.mean(0)) / prepared
+    assert torch.allclose(ratio, ratio[0, 0].expand_as(ratio), rtol=1e-4)  # one factor for all features
+
+
+def test_constant_features_and_features_left_alone() -> None:
+    constant = torch.full((4, 3), 2.5)
+    assert torch.equal(FeatureMap.fitted(constant, centre=True)(constant), torch.zeros(4, 3))
+    assert torch.equal(FeatureMap.fitted(constant, centre=False)(constant), constant)
+    assert FeatureMap.fitted(constant, centre=True, directions=2).input_count == 1
+
+
+@pytest.mark.parametrize("states", [20, 200])
+def test_a_basis_of_all_directions_keeps_every_inner_product(states: int) -> None:
+    features = drawn(states, 60)
+    whole = FeatureMap.fitted(features, centre=True)
+    basis = FeatureMap.fitted(features, centre=True, directions=500)
+    assert basis.input_count == min(states - 1, 60)  # centred rows span one direction fewer
+    prepared = basis(features)
+    assert prepared.square().mean().item() == pytest.approx(1, rel=1e-5)
+    expected = inner_products(whole(features)) * (basis.factor / whole.factor) ** 2
+    assert torch.allclose(inner_products(prepared), expected, atol=1e-4 * expected.abs().max())
+
+
+def test_uncentred_features_keep_their_inner_products_too() -> None:
+    features = drawn(20, 60)
+    prepared = FeatureMap.fitted(features, centre=False, directions=60)(features)
+    assert prepared.shape == (20, 20)
+    assert torch.allclose(inner_products(prepared), inner_products(features), rtol=1e-4)
+
+
+def test_the_leading_directions_are_those_of_most_variance() -> None:
+    features = torch.zeros(8, 5)
+    features[:, 3] = torch.tensor([1.0, -1] * 4) * 10
+    features[:, 1] = torch.tensor([1.0, 1, -1, -1] * 2)
+    directions = principal_directions(features, 1)
+    assert torch.allclose(directions[:, 0].abs(), torch.eye(5)[3])
+    assert torch.allclose(principal_directions(features, 5).abs(), torch.eye(5)[[3, 1]].T)
+
+
+def test_the_map_survives_its_tensors() -> None:
+    features = drawn(12, 9)
+    for directions in (0, 4):
+        fitted = FeatureMap.fitted(features, centre=True, directions=directions)
+        again = FeatureMap.from_tensors(fitted.tensors())
+        assert torch.equal(again(features), fitted(features))
+        assert (again.feature_count, again.input_count) == (9, directions or 9)
