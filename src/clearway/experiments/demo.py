@@ -26,6 +26,7 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 
 ROOM = "bathroom"
 REWARDS = (COLLISION_AWARE, SHORTEST)
+LEARNER = replace(DEFAULT, frames=240_000, envs=200, feature_basis=512)  # 180 poses span fewer than 512 directions
 MARK = "demo.json"  # tells a demo's folder from a user's own
 
 
@@ -73,7 +74,7 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     Raises:
         ClearwayError: the folder holds something else, or a part of the demo cannot run here.
     """
-    learner = replace(DEFAULT, frames=request.frames)
+    learner = replace(LEARNER, frames=request.frames)
     _claim(request.out)
     clock = _Clock()
     room = cached_room_scene(ROOM, progress=show_progress)
