@@ -45,7 +45,7 @@ figcaption { padding: .6rem .9rem .7rem; color: var(--soft); font-size: .88rem; 
   border-top: 1px solid var(--line); }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: .9rem; font-variant-numeric: tabular-nums; }
-th, td { padding: .55rem .8rem; text-align: right; white-space: nowrap; vertical-align: top;
+th, td { padding: .5rem .55rem; text-align: right; white-space: nowrap; vertical-align: top;
   border-bottom: 1px solid var(--line); line-height: 1.35; }
 thead th { color: var(--soft); font-weight: 500; white-space: normal; vertical-align: bottom; font-size: .82rem; }
 th:first-child { text-align: left; position: sticky; left: 0; background: var(--card); }
