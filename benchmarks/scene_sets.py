@@ -1,0 +1,49 @@
+"""The scenes that benchmarks train on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from clearway.envs.world import World, make_world
+from clearway.errors import SceneError
+from clearway.model.feature_map import FeatureMap
+from clearway.perception import encode_scenes
+from clearway.scenes.library import cached_room_scene
+from clearway.scenes.rooms import ROOM_NAMES
+from clearway.scenes.scene import Scene
+from clearway.scenes.targets import default_targets
+from clearway.scenes.thor_v1 import read_scene
+
+ENCODER = "random-resnet50"
+
+
+def chosen_scenes(files: Sequence[Path]) -> list[Scene]:
+    """The scenes in the files; where there are none, the four default rooms, built and encoded once."""
+    if files:
+        scenes = [read_scene(path) for path in files]
+        for scene in scenes:
+            if scene.features is None:
+                raise SceneError(
+                    scene.name, "the scene has no features", "Encode it first, with clearway scenes import"
+                )
+        return scenes
+    return encode_scenes([cached_room_scene(name, progress=True) for name in ROOM_NAMES], ENCODER, progress=True)
+
+
+def prepared(scenes: Sequence[Scene]) -> list[Scene]:
+    """The scenes with features as the network wants them, centred and scaled, and nothing that only takes memory."""
+    features = [torch.from_numpy(scene.features) for scene in scenes]
+    feature_map = FeatureMap.fitted(torch.cat(features), centre=True)
+    return [
+        replace(scene, features=feature_map(own).numpy(), observations=None, top_view=None)
+        for scene, own in zip(scenes, features, strict=True)
+    ]
+
+
+def world_of(scenes: Sequence[Scene]) -> World:
+    """The scenes with their default targets."""
+    return make_world(scenes, {scene.name: default_targets(scene) for scene in scenes})
