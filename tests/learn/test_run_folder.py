@@ -145,6 +145,16 @@ def test_a_second_process_is_refused_until_the_first_lets_go(tmp_path: Path) -> 
         pass
 
 
+def test_half_written_files_of_a_killed_process_are_swept(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    folder.write_record(made_record())
+    for name in (".run.json.x7_a.part", ".metrics.jsonl.q.part"):
+        (tmp_path / name).write_text("half")
+    (tmp_path / "mine.part").write_text("the user's")
+    with folder.held():
+        assert {path.name for path in tmp_path.iterdir()} == {".lock", "run.json", "mine.part"}
+
+
 def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(RunError, match="out"):

@@ -4,7 +4,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,12 +91,63 @@ def test_resuming_from_an_earlier_checkpoint_cuts_the_metrics_back(
     assert equal_bits(*[read_network(newest_checkpoint(f.checkpoints)) for f in (whole, folder)])
 
 
-def test_resuming_a_finished_run_changes_nothing(tmp_path: Path) -> None:
+def test_resuming_a_finished_run_touches_no_file(tmp_path: Path) -> None:
     folder = train.train(small_request(), tmp_path)
-    rows, network = folder.metrics(), read_network(newest_checkpoint(folder.checkpoints))
+
+    def stamps() -> dict[Path, tuple[int, int]]:
+        files = [path for path in tmp_path.rglob("*") if path.is_file() and path.name != ".lock"]
+        return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in files}
+
+    before = stamps()
+    assert folder.metrics_path in before and newest_checkpoint(folder.checkpoints) / "network.safetensors" in before
     train.train(small_request(), tmp_path, resume=True)
-    assert folder.metrics() == rows
-    assert equal_bits(read_network(newest_checkpoint(folder.checkpoints)), network)
+    assert stamps() == before
+
+
+@contextmanager
+def stopped_already() -> Iterator[threading.Event]:
+    event = threading.Event()
+    event.set()
+    yield event
+
+
+def test_a_run_that_is_stopped_before_it_went_on_keeps_its_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        interrupt_at(patch, 480)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(small_request(), tmp_path)
+    saved = newest_checkpoint(RunFolder(tmp_path).checkpoints)
+    number = (saved / "network.safetensors").stat().st_ino
+    with monkeypatch.context() as patch:
+        patch.setattr(train, "_interruption", stopped_already)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(small_request(), tmp_path, resume=True)
+    assert newest_checkpoint(RunFolder(tmp_path).checkpoints) == saved
+    assert (saved / "network.safetensors").stat().st_ino == number
+
+
+def test_no_frame_is_saved_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    saved, save = [], train.save
+
+    def counted(trainer: Trainer, folder: RunFolder, seconds: float) -> None:
+        saved.append(trainer.frames)
+        save(trainer, folder, seconds)
+
+    monkeypatch.setattr(train, "save", counted)
+    train.train(small_request(), tmp_path)
+    assert saved == [80 * k for k in range(1, 11)]
+
+
+def test_a_second_training_in_the_folder_is_refused_and_changes_nothing(tmp_path: Path) -> None:
+    folder = train.train(small_request(learner=small_learner(frames=160)), tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    for resume in (False, True):
+        with folder.held(), pytest.raises(RunError, match="another process trains here"):
+            train.train(small_request(learner=small_learner(frames=160)), tmp_path, resume=resume)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 def test_resume_begins_where_there_is_no_run_or_no_checkpoint_yet(tmp_path: Path) -> None:
