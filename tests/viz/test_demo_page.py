@@ -1,0 +1,115 @@
+"""The demo's page: what it says is what was measured, and it shows nothing that is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from clearway.experiments.demo import DemoRequest, DemoResult, run_demo
+from clearway.viz import demo_page
+from clearway.viz.demo_page import VIEWS, make_demo_page
+from clearway.zones import scene_zones
+from small_demo import shrink_demo
+
+COMMAND = "clearway demo --out 'a <b> & c'"
+
+
+class Shown(HTMLParser):
+    """The text, the links and the pictures of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.text, self.links, self.pictures = "", [], {}
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        kept = dict(attributes)
+        self.links += [kept[name] for name in ("src", "href") if name in kept]
+        if tag == "img":
+            self.pictures[kept["src"]] = kept["alt"]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data + "\n"
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DemoResult]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    with pytest.MonkeyPatch.context() as patch:
+        shrink_demo(patch)
+        yield run_demo(DemoRequest(tmp_path_factory.mktemp("demo") / "demo", seed=2, frames=800, encoder="auto"))
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def shown(result: DemoResult) -> Shown:
+    return Shown(make_demo_page(result, COMMAND).read_text(encoding="utf-8"))
+
+
+def test_every_link_leads_to_a_picture_beside_the_page(result, shown):
+    assert set(shown.links) == set(shown.pictures)
+    for link in shown.links:
+        assert not link.startswith(("/", "http", "..", "file:"))
+        with Image.open(result.out / link) as picture:
+            picture.verify()
+    assert all(shown.pictures.values())  # what those hear who do not see
+
+
+def test_all_pictures_are_shown(shown):
+    views = [f"pictures/view-{number}.png" for number in range(VIEWS)]
+    episodes = [f"pictures/episode-{agent}.png" for agent in ("collision-aware", "shortest")]
+    assert set(shown.pictures) == {"pictures/map.png", "pictures/curves.png", *views, *episodes}
+
+
+def test_key_figures_are_those_of_the_table(result, shown):
+    for evaluation in result.evaluations:
+        if evaluation.agent in ("collision-aware", "shortest") and evaluation.protocol.action_selection == "sampled":
+            values, intervals = evaluation.average.values, evaluation.average.intervals
+            low, high = intervals["collisions"]
+            assert f"{evaluation.agent}: steps\n{values['steps']:.2f}\nshortest path " in shown.text
+            assert f"{values['collisions']:.3f}\n95 %: {low:.3f} to {high:.3f}\n" in shown.text
+    ideal = result.evaluations[-1]
+    assert ideal.agent == "shortest path"
+    assert shown.text.count(f"shortest path {ideal.average.values['steps']:.2f}\n") == 2
+
+
+def test_the_page_says_what_made_it(shown):
+    for fact in (COMMAND, "made-up", "PPO, 800 frames an agent, seed 2", "torch ", "cores ", "5 episodes a target"):
+        assert fact in shown.text
+    for agent in ("collision-aware", "shortest", "random", "shortest path"):
+        assert f"\n{agent}\n" in shown.text
+
+
+def test_both_agents_are_drawn_on_one_map_from_one_start(result, monkeypatch):
+    maps, sheets = [], []
+    monkeypatch.setattr(demo_page, "draw_map", lambda scene, path, **drawn: maps.append(drawn))
+    monkeypatch.setattr(demo_page, "draw_contact_sheet", lambda scene, path, **drawn: sheets.append(drawn))
+    make_demo_page(result, COMMAND)
+    (drawn,) = maps
+    assert [walk.label for walk in drawn["walks"]] == ["collision-aware", "shortest"]
+    assert len({int(walk.states[0]) for walk in drawn["walks"]}) == 1
+    assert drawn["target"] == result.showcase.target
+    assert np.array_equal(drawn["zones"], scene_zones(result.scene))
+    for walk, sheet in zip(drawn["walks"], sheets, strict=True):
+        assert np.array_equal(walk.states, sheet["states"])
+        assert sheet["title"] == f"{walk.label} agent"
+
+
+def test_views_are_pictures_of_the_scene_from_different_cells(result, shown):
+    pictures = result.scene.observations[:]
+    cells = set()
+    for number in range(VIEWS):
+        view = np.asarray(Image.open(result.out / f"pictures/view-{number}.png"))
+        (poses,) = np.nonzero((pictures == view).all(axis=(1, 2, 3)))
+        assert len(poses) == 1
+        cells.add(int(result.scene.cells[poses[0]]))
+        x_m, z_m = result.scene.locations_m[poses[0]]
+        heading_deg = result.scene.headings_deg[poses[0]]
+        assert f"From x {x_m:.2f} m, z {z_m:.2f} m, heading {heading_deg}°" in shown.text
+    assert len(cells) == VIEWS
