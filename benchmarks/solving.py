@@ -8,25 +8,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from clearway.envs.world import World
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, run_episodes
-from clearway.evaluate.metrics import sc
+from clearway.evaluate.metrics import SC_STEPS
+from clearway.evaluate.quality import quality
 from clearway.model.policy import Policy
 
-SOLVED_UNDER_STEPS = 500
-EVALUATION_SEED = 1
+CHECK_SEED = 1
 SCREENING_EPISODES = 5  # a target; the rest is walked only where these show no failure
 SHORTEST_PAUSE_S = 5.0
 PAUSE_SHARE = 0.05  # of the training time so far: the precision of the answer
 
 
-def solved_targets(world: World, policy: Policy, episodes: int = EPISODES_PER_TARGET) -> np.ndarray:
-    """Which targets are solved, (M,) bool."""
-    table = run_episodes(world, policy, episodes_per_target=episodes, step_cap=SOLVED_UNDER_STEPS, seed=EVALUATION_SEED)
-    failed = np.bincount(table.target, weights=1 - sc(table), minlength=world.target_count)
-    return failed == 0
+def solved_count(world: World, policy: Policy, episodes: int = EPISODES_PER_TARGET) -> int:
+    """How many targets are solved."""
+    table = run_episodes(world, policy, episodes_per_target=episodes, step_cap=SC_STEPS, seed=CHECK_SEED)
+    return quality(world, table).solved_targets
 
 
 class SolvingClock:
@@ -65,8 +62,8 @@ class SolvingClock:
 
     def solved_count(self) -> int:
         """Targets that the agent solves as it stands."""
-        return int(solved_targets(self.world, self.policy()).sum())
+        return solved_count(self.world, self.policy())
 
     def _all_solved(self) -> bool:
-        policy = self.policy()
-        return all(bool(solved_targets(self.world, policy, n).all()) for n in (SCREENING_EPISODES, EPISODES_PER_TARGET))
+        policy, targets = self.policy(), self.world.target_count
+        return all(solved_count(self.world, policy, n) == targets for n in (SCREENING_EPISODES, EPISODES_PER_TARGET))

@@ -1,0 +1,139 @@
+"""Train one agent and look at it now and then, with the clock stopped: its learning curve against the criteria."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+
+from clearway.evaluate.episodes import run_episodes
+from clearway.evaluate.metrics import SC_STEPS
+from clearway.evaluate.quality import Criteria, Quality, quality
+from clearway.evaluate.report import Evaluation, Protocol, summarise
+from clearway.learn.train import Learning, RunRequest
+from clearway.model.lookup import LookupNetwork
+from clearway.model.network import NetworkShape, SiameseActorCritic
+from clearway.model.policy import Policy, network_policy
+
+CHECK_SEED, FINAL_SEED = 1, 0  # of starts and chances; other episodes at the end than during training
+CRITERIA = Criteria()
+CRITERION_NAMES = ("solved_targets", "path_ratio", "worst_path_ratio", "collisions", "all")
+
+
+@dataclass(frozen=True)
+class Check:
+    """The agent after some training."""
+
+    frames: int
+    seconds: float
+    quality: Quality
+
+    def to_json(self) -> dict[str, object]:
+        """A row of the curve."""
+        return {"frames": self.frames, "seconds": self.seconds, **self.quality.to_json()}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A training run.
+
+    Attributes:
+        seed: of the run.
+        checks: during training, the last when it has ended.
+        evaluation, quality: at the end, by the whole protocol.
+        seconds, frames: of training.
+    """
+
+    seed: int
+    checks: tuple[Check, ...]
+    evaluation: Evaluation
+    quality: Quality
+    seconds: float
+    frames: int
+
+    def first(self, criterion: str) -> Check | None:
+        """The first check at which a criterion is met (see `Quality.met`); None: at no check."""
+        return next((check for check in self.checks if check.quality.met(CRITERIA)[criterion]), None)
+
+    def to_json(self) -> dict[str, object]:
+        """All of it as JSON values."""
+        first = {name: self.first(name) for name in CRITERION_NAMES}
+        return {
+            "seed": self.seed,
+            "frames": self.frames,
+            "seconds": self.seconds,
+            **self.quality.to_json(),
+            "met": self.quality.met(CRITERIA),
+            "first_met": {
+                name: check and {"frames": check.frames, "seconds": check.seconds} for name, check in first.items()
+            },
+            "checks": [check.to_json() for check in self.checks],
+            "evaluation": self.evaluation.to_json(),
+        }
+
+
+def learning_curve(
+    request: RunRequest,
+    encoder: str,
+    *,
+    every_frames: int,
+    check_episodes: int,
+    final: Protocol,
+    show: Callable[[Check], None],
+) -> Curve:
+    """Train until all frames are used.
+
+    Args:
+        request: what to train; seconds count making the trainer and its updates.
+        encoder: name of what made the features.
+        every_frames: between checks.
+        check_episodes: a target, for a check; they fail after 500 steps.
+        final: protocol of the evaluation at the end.
+        show: called with every check.
+    """
+    checks: list[Check] = []
+    since = time.perf_counter()
+    with closing(request.trainer()) as trainer:
+        seconds, due = time.perf_counter() - since, every_frames
+        while not trainer.finished:
+            since = time.perf_counter()
+            trainer.update()
+            seconds += time.perf_counter() - since
+            if trainer.frames >= due or trainer.finished:
+                checks.append(Check(trainer.frames, seconds, _checked(trainer, check_episodes)))
+                show(checks[-1])
+                due += every_frames * ((trainer.frames - due) // every_frames + 1)
+        table = run_episodes(
+            trainer.world,
+            policy_of(trainer),
+            episodes_per_target=final.episodes_per_target,
+            step_cap=final.step_cap,
+            seed=final.seed,
+            history_length=trainer.learner.history_length,
+        )
+        evaluation = summarise(trainer.world, table, request.reward.name, encoder, final)
+        return Curve(request.seed, tuple(checks), evaluation, quality(trainer.world, table), seconds, trainer.frames)
+
+
+def _checked(trainer: Learning, episodes: int) -> Quality:
+    table = run_episodes(
+        trainer.world,
+        policy_of(trainer),
+        episodes_per_target=episodes,
+        step_cap=SC_STEPS,
+        seed=CHECK_SEED,
+        history_length=trainer.learner.history_length,
+    )
+    return quality(trainer.world, table)
+
+
+def policy_of(trainer: Learning) -> Policy:
+    """The agent as it stands, whichever algorithm trains it; training is none the wiser."""
+    world, learner, prefix = trainer.world, trainer.learner, "network."
+    assert world.features is not None
+    shape = NetworkShape(world.scene_count, trainer.feature_map.input_count, learner.width, learner.history_length)
+    network = SiameseActorCritic(shape).to(world.device)
+    tensors = trainer.tensors().items()
+    network.load_state_dict({name[len(prefix) :]: t for name, t in tensors if name.startswith(prefix)})
+    return network_policy(LookupNetwork(network, trainer.feature_map(world.features), world.target_state), world)
