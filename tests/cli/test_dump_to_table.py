@@ -80,6 +80,7 @@ def test_evaluate_prints_the_agreed_json(evaluated):
     assert (content["agent"], content["action_selection"]) == ("collision-aware", "sampled")
     assert content["encoder"] == "from file (24 features)"
     assert json.loads((run / "evaluation.json").read_text()) == content
+    assert "| shortest path | 5/5 |" in (run / "evaluation.md").read_text()
 
 
 def test_the_other_agents_stand_beside(evaluated):

@@ -72,6 +72,8 @@ def check_demo(out: Path) -> None:
     assert {f"pictures/{path.name}" for path in (out / "pictures").iterdir()} == links
     evaluations = json.loads((out / "evaluation.json").read_text())
     assert {evaluation["agent"] for evaluation in evaluations} >= AGENTS
+    table = (out / "evaluation.md").read_text()
+    assert all(agent in table for agent in AGENTS) and "Encoder: " in table
     ideal = next(evaluation for evaluation in evaluations if evaluation["agent"] == "shortest path")
     assert ideal["average"]["steps"] == ideal["average"]["shortest_path_steps"]
     assert len(ideal["targets"]) == 5

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as jsonlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -40,9 +39,9 @@ class Evaluate:
     """Print JSON: the sampled agent's figures, and the other agents' under "others"."""
 
     def run(self) -> None:
-        """Evaluate, print, and leave evaluation.json in the run folder."""
+        """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder."""
+        from clearway.evaluate.files import write_evaluations
         from clearway.evaluate.run import evaluate_run
-        from clearway.files import written_whole
         from clearway.learn.load import load_agent, run_scenes
 
         check_at_least(1, episodes=self.episodes, step_cap=self.step_cap)
@@ -54,8 +53,7 @@ class Evaluate:
         )
         first, *others = (evaluation.to_json() for evaluation in evaluations)
         content = {**first, "others": others}
-        with written_whole(self.folder / "evaluation.json") as part:
-            part.write_text(jsonlib.dumps(content, indent=2) + "\n")
+        write_evaluations(self.folder, content, evaluations)
         if self.pictures:
             from clearway.viz.run_pictures import draw_run_pictures
 

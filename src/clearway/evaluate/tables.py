@@ -107,9 +107,9 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, n
     return TableText(headings, rows, tuple(_notes(evaluations)))
 
 
-def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average") -> str:
+def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", *, narrow: bool = False) -> str:
     """The table in Markdown, its notes under it."""
-    table = table_text(evaluations, level)
+    table = table_text(evaluations, level, narrow=narrow)
     lines = [_pipes(table.headings), _pipes("---" for _ in table.headings)]
     lines += [_pipes(_one_line(cell) for cell in row) for row in table.rows]
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"

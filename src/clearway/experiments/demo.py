@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from clearway.errors import ClearwayError
+from clearway.evaluate.files import write_evaluations
 from clearway.evaluate.report import Evaluation
 from clearway.evaluate.run import evaluate_runs
 from clearway.evaluate.showcase import Showcase, showcases
-from clearway.files import written_whole
 from clearway.learn.config import DEFAULT
 from clearway.learn.load import Agent, load_agent, run_world
 from clearway.learn.run_folder import RunFolder
@@ -102,8 +101,7 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     clock.lap("training, both agents")
     agents = {name: load_agent(run.path) for name, run in runs.items()}
     evaluations = evaluate_runs(agents, [scene], seed=request.seed)
-    with written_whole(request.out / "evaluation.json") as part:
-        part.write_text(json.dumps([evaluation.to_json() for evaluation in evaluations], indent=2) + "\n")
+    write_evaluations(request.out, [evaluation.to_json() for evaluation in evaluations], evaluations)
     clock.lap("evaluation")
     return DemoResult(
         request.out, scene, runs, evaluations, _showcase(agents, scene, request.seed), dict(clock.seconds)

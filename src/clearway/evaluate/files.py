@@ -1,0 +1,25 @@
+"""Evaluations as files: JSON for programs, Markdown for people."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from clearway.evaluate.report import Evaluation
+from clearway.evaluate.tables import markdown_table
+from clearway.files import written_whole
+
+
+def write_evaluations(folder: Path, content: object, evaluations: Sequence[Evaluation]) -> None:
+    """Leave evaluation.json and evaluation.md in a folder.
+
+    Args:
+        folder: a run's or a demo's.
+        content: what the command prints with --json.
+        evaluations: rows of the table, the main figures.
+    """
+    with written_whole(folder / "evaluation.json") as part:
+        part.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    with written_whole(folder / "evaluation.md") as part:
+        part.write_text(markdown_table(evaluations, "scenes", narrow=True), encoding="utf-8")
