@@ -16,8 +16,13 @@ K history, H width, M targets, O = 5 outputs, one update of `rows` rows needs
     backward    2 x forward + 2 S F K H + 4 M H H     dX and dW of those; dW of the siamese layer; targets
 
 A2C: tables once, forward for the rollout's rows and the values after its last step, backward once (the rollout's
-activations are used again). PPO: the same forward, then tables, forward and backward for every minibatch (the first
-finds the tables ready), with the rows that hindsight adds.
+activations are used again). PPO: the same forward, then forward and backward for every minibatch, with the rows that
+hindsight adds; states are projected, and dW of the siamese layer is computed, once a pass (the first finds the tables
+ready), or once a minibatch with `siamese_step` so.
+
+The share of the peak. The machine's speed may change from minute to minute, so each timing of a case stands between two
+of a matrix product, of the size that was fastest at the start, and is divided by the faster of them; the share is the
+median of these.
 
 The naive version is the same network in `nn.Linear` layers with autograd: every row's four feature vectors are copied
 side by side (8192 numbers), and the target's branch is computed for every row, as published code does. Its update
@@ -239,6 +244,7 @@ class Case:
         update: does one update.
         gflop: what the algorithm needs for an update so far as known, see the file's docstring; None for the naive one.
         seconds: of every update measured.
+        shares: of the matrix-product peak at that time, likewise.
     """
 
     name: str
@@ -247,6 +253,7 @@ class Case:
     update: Callable[[], object]
     gflop: Callable[[], float] | None = None
     seconds: list[float] = field(default_factory=list)
+    shares: list[float] = field(default_factory=list)
 
     def frames_per_s(self) -> tuple[float, float, float]:
         """Median, smallest and largest."""
@@ -266,8 +273,10 @@ def needed_gflop(world: World, learner: Learner, hindsight_rows: float) -> float
     if learner.algorithm == "a2c":
         return (gathered + rows * 2 * forward_row + projection + extra_targets) / 1e9
     passes, parts = learner.epochs, learner.epochs * learner.minibatches
-    learnt = passes * (rows + hindsight_rows) * 3 * forward_row + parts * (projection + extra_targets)
-    return (gathered + hindsight_rows * forward_row + (parts - 1) * tables + learnt) / 1e9
+    siamese_steps = passes if learner.siamese_step == "pass" else parts
+    learnt = passes * (rows + hindsight_rows) * 3 * forward_row + parts * extra_targets + siamese_steps * projection
+    renewed = (siamese_steps - 1) * projection + (parts - 1) * (tables - projection)
+    return (gathered + hindsight_rows * forward_row + renewed + learnt) / 1e9
 
 
 def fast_case(world: World, learner: Learner) -> Case:
@@ -318,6 +327,15 @@ def matrix_peak(device: str, sizes: tuple[int, ...], repeats: int) -> dict[int, 
     return best
 
 
+def measure(case: Case, device: str, size: int, peak_repeats: int) -> None:
+    """Time one update of a case between two measurements of the peak."""
+    before = matrix_peak(device, (size,), peak_repeats)[size]
+    case.seconds.append(timed(case.update, device))
+    if case.gflop:
+        after = matrix_peak(device, (size,), peak_repeats)[size]
+        case.shares.append(case.gflop() / case.seconds[-1] / max(before, after))
+
+
 def run(device: str, quick: bool, progress: Callable[[str], None]) -> tuple[dict[int, float], list[Case]]:
     """Measure everything; returns the peak by matrix size, and the cases."""
     world = made_up_world(device)
@@ -326,19 +344,18 @@ def run(device: str, quick: bool, progress: Callable[[str], None]) -> tuple[dict
     cases = [fast_case(world, learner) for learner in learners]
     cases += [fast_case(world, PPO)]
     cases += [naive_case(world, learner) for learner in learners]
-    repeats, peak_repeats = (2, 3) if quick else (9, 5)
+    repeats, peak_repeats = (2, 2) if quick else (9, 3)
     product_sizes = (1024, 2048) if quick else (1024, 2048, 4096)
     for case in cases:  # memory and caches
         progress(f"warming up: {case.name} {case.envs}x{case.steps}")
         case.update()
-    peak = dict.fromkeys(product_sizes, 0.0)
+    peak = matrix_peak(device, product_sizes, peak_repeats)
+    best_size = max(peak, key=lambda size: peak[size])
     for repeat in range(repeats):
         progress(f"repeat {repeat + 1} of {repeats}")
-        measured = matrix_peak(device, product_sizes, peak_repeats)
-        peak = {size: max(peak[size], measured[size]) for size in product_sizes}
         for case in cases:
             if case.gflop or repeat < 3:  # the naive version is slow and steady
-                case.seconds.append(timed(case.update, device))
+                measure(case, device, best_size, peak_repeats)
     return peak, cases
 
 
@@ -361,14 +378,14 @@ class Figures:
     times_naive: float | None
 
 
-def figures(peak_gflops: float, cases: list[Case]) -> list[Figures]:
+def figures(cases: list[Case]) -> list[Figures]:
     """The table's lines."""
     naive = {(c.envs, c.steps): c.frames_per_s()[0] for c in cases if c.gflop is None}
     lines = []
     for case in cases:
         rate, low, high = case.frames_per_s()
         needed = case.gflop() if case.gflop else None
-        share = needed * rate / (case.envs * case.steps) / peak_gflops if needed else None
+        share = statistics.median(case.shares) if case.shares else None
         ratio = rate / naive[case.envs, case.steps] if case.name == "a2c" else None
         count = len(case.seconds)
         lines.append(Figures(case.name, case.envs, case.steps, count, rate, low, high, needed, share, ratio))
@@ -414,14 +431,14 @@ def main() -> None:
             print(text, flush=True)
 
     peak, cases = run(options.device, options.quick, progress)
-    best, lines = max(peak.values()), figures(max(peak.values()), cases)
+    lines = figures(cases)
     machine = {"device": device_name(options.device), "threads": torch.get_num_threads(), "torch": torch.__version__}
     if options.json:
         print(json.dumps({**machine, "peak_gflop_per_s": peak, "cases": [asdict(line) for line in lines]}, indent=2))
         return
     by_size = ", ".join(f"{size}: {rate:,.0f}" for size, rate in peak.items())
     print(f"\n{machine['device']}, {machine['threads']} threads, torch {machine['torch']}")
-    print(f"float32 matrix-product peak {best:,.0f} GFLOP/s (best by size: {by_size})\n")
+    print(f"float32 matrix products at the start, GFLOP/s by size: {by_size}\n")
     print(table(lines))
 
 

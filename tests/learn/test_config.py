@@ -16,6 +16,7 @@ def test_the_paper_s_settings() -> None:
         "reward_scale": 1.0,
         "clip_rewards": True,
         "centre_features": False,
+        "whiten_features": False,
         "feature_basis": 0,
         "discount": 0.99,
         "gae_lambda": 1.0,
@@ -24,6 +25,7 @@ def test_the_paper_s_settings() -> None:
         "algorithm": "a2c",
         "epochs": 1,
         "minibatches": 1,
+        "siamese_lr": 1.0,
         "value_weight": 0.5,
         "entropy_start": 0.01,
         "entropy_end": 0.01,
@@ -37,8 +39,9 @@ def test_the_paper_s_settings() -> None:
         "history_length": 4,
         "frames": 10_000_000,
         "envs": 100,
+        "envs_by": "scenes",
     }
-    without_meaning = {"ratio_clip"}  # one pass over each rollout has no ratio to clip
+    without_meaning = {"ratio_clip", "siamese_step"}  # there is one pass, of one minibatch
     assert {name: value for name, value in asdict(PAPER_A2C).items() if name not in without_meaning} == published
 
 
@@ -56,13 +59,17 @@ def test_the_default_is_the_recipe() -> None:
         "value_weight": 0.5,
         "reward_scale": 0.1,
         "clip_rewards": False,
-        "entropy_start": 0.01,
-        "entropy_end": 0.001,
+        "entropy_start": 0.02,
+        "entropy_end": 0.003,
         "optimiser": "adam",
         "clip_norm": 0.5,
         "clip_each_tensor": False,
-        "lr_start": 1e-3,
+        "lr_start": 5e-4,
         "lr_end": 5e-5,
+        "siamese_step": "pass",
+        "siamese_lr": 2.0,
+        "envs_by": "states",
+        "whiten_features": True,
         "hindsight": True,
         "balance": 3.0,
         "centre_features": True,

@@ -137,7 +137,7 @@ def test_the_telling_earns_what_the_target_would_have_paid() -> None:
     unlikely = torch.full((4, 2), -100.0)  # the actor's, so that every ratio is cut to 1
     batch = told_by(world, rollout, unlikely, COLLISION_AWARE, trace_lambda=1.0)
     assert batch.target.tolist() == [1, 1, 1]
-    assert batch.action.tolist() == [FORWARD, LEFT, FORWARD]  # step 0 of both environments, then step 1
+    assert batch.action.tolist() == [FORWARD, FORWARD, LEFT]  # both steps of the first environment, then the other's
     arrives = 10 * SCALE
     # the step into state 4: from there backward leads to the wall's pose 0, so it is a precollision pose
     before = -0.011 * SCALE + GAMMA * arrives

@@ -26,7 +26,7 @@ def give_gradients(network: nn.Module, seed: int) -> None:
 
 def test_rmsprop_starts_at_1_and_has_epsilon_inside_the_root() -> None:
     network = Two()
-    optimiser = SharedRMSProp(network)
+    optimiser = SharedRMSProp(dict(network.named_parameters()))
     network.weight.grad, network.bias.grad = torch.zeros(2, 2), torch.tensor([2.0])
     optimiser.step(0.01)
     mean_square = 0.99 * 1 + 0.01 * 4  # 1.03
@@ -42,7 +42,7 @@ def test_rmsprop_starts_at_1_and_has_epsilon_inside_the_root() -> None:
 def test_adam_is_pytorch_s() -> None:
     network = Two()
     other = copy.deepcopy(network)
-    optimiser = Adam(network)
+    optimiser = Adam(dict(network.named_parameters()))
     reference = torch.optim.Adam(other.parameters(), lr=1e-3, eps=1e-8)
     for step in range(5):
         give_gradients(network, step)
@@ -58,12 +58,12 @@ def test_adam_is_pytorch_s() -> None:
 @pytest.mark.parametrize("kind", [Adam, SharedRMSProp])
 def test_tensors_bring_an_optimiser_back_bit_for_bit(kind: type[Adam] | type[SharedRMSProp]) -> None:
     network = Two()
-    optimiser: Optimiser = kind(network)
+    optimiser: Optimiser = kind(dict(network.named_parameters()))
     for step in range(3):
         give_gradients(network, step)
         optimiser.step(0.01)
     resumed_network = copy.deepcopy(network)
-    resumed: Optimiser = kind(resumed_network)
+    resumed: Optimiser = kind(dict(resumed_network.named_parameters()))
     resumed.load_tensors({name: tensor.clone() for name, tensor in optimiser.tensors().items()})
     for step in range(3, 6):
         for each, its_optimiser in ((network, optimiser), (resumed_network, resumed)):

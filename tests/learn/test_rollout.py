@@ -6,7 +6,7 @@ from torch import Tensor
 
 from clearway.envs.world import World
 from clearway.learn.config import PAPER_A2C
-from clearway.learn.rollout import Rollout, by_scene, by_step, sample_actions
+from clearway.learn.rollout import Rollout, as_rows, by_step, sample_actions
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from small_runs import corridor_world, small_learner, small_trainer
@@ -38,12 +38,11 @@ def test_actions_of_no_probability_are_never_drawn(likely: int, uniform: float) 
     assert sample_actions(scores, torch.tensor([uniform], dtype=torch.float64)).item() == likely
 
 
-def test_by_scene_orders_rows_by_scene_and_by_step_undoes_it() -> None:
-    values = torch.arange(3 * 4).view(3, 4)  # T = 3, N = 4: environments 0 and 1 in the first scene
-    assert by_scene(values, 2).tolist() == [0, 1, 4, 5, 8, 9, 2, 3, 6, 7, 10, 11]
+def test_as_rows_keeps_each_environment_s_steps_together_and_by_step_undoes_it() -> None:
+    values = torch.arange(3 * 4).view(3, 4)  # T = 3, N = 4
+    assert as_rows(values).tolist() == [0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11]
     deep = torch.randn(5, 6, 4)
-    for scenes in (1, 2, 3, 6):
-        assert torch.equal(by_step(by_scene(deep, scenes), 5, scenes), deep)
+    assert torch.equal(by_step(as_rows(deep), 5), deep)
 
 
 def check_steps(rollout: Rollout, world: World, history_before: Tensor) -> None:
@@ -102,9 +101,8 @@ def test_episodes_are_cut_at_the_step_limit() -> None:
 def test_kept_activations_are_those_of_the_histories_stored() -> None:
     trainer = small_trainer(small_learner(PAPER_A2C))
     rollout = collected(trainer)
-    scenes = trainer.world.scene_count
-    history, target = by_scene(rollout.history, scenes), by_scene(rollout.target, scenes)
-    fresh = trainer.lookup.forward(history, target, [len(history) // scenes] * scenes)
+    history, target = as_rows(rollout.history), as_rows(rollout.target)
+    fresh = trainer.lookup.forward(history, target, [8 * count for count in trainer.collector.rows_per_scene])
     for name in ("seen", "fused", "special", "output"):
         torch.testing.assert_close(getattr(rollout.kept, name), getattr(fresh, name), rtol=1e-5, atol=1e-6)
     states = trainer.feature_map(trainer.world.features)
@@ -123,7 +121,7 @@ def test_actions_are_drawn_from_the_policy() -> None:
     rollout = collected(trainer)
     log_pi = torch.log_softmax(rollout.kept.scores, 1)
     entropy = -(log_pi.exp() * log_pi).sum(1)
-    taken = log_pi.gather(1, by_scene(rollout.action, 2)[:, None])
+    taken = log_pi.gather(1, as_rows(rollout.action)[:, None])
     assert entropy.mean() < 0.9 * math.log(4)
     assert -taken.mean().item() == pytest.approx(entropy.mean().item(), abs=0.04)
 
@@ -144,10 +142,8 @@ def test_an_environment_walks_the_same_way_in_any_batch() -> None:
         assert torch.equal(getattr(few, name), getattr(many, name)[:, :4])
 
 
-def test_environments_are_divided_evenly_and_begin_with_every_target() -> None:
-    trainer = small_trainer(small_learner(envs=13))
-    assert trainer.env_count == 12
-    scene = trainer.world.target_scene[trainer.navigation.target]
-    assert scene.tolist() == [0] * 6 + [1] * 6
-    assert trainer.navigation.target.tolist() == [0, 1, 2] * 2 + [3, 4] * 3
-    assert trainer.frames_per_update == 12 * 8
+def test_environments_begin_with_every_target_in_turn() -> None:
+    trainer = small_trainer(small_learner(envs=13))  # 20 and 40 states
+    assert trainer.env_count == 13
+    assert trainer.navigation.target.tolist() == [0, 1, 2, 0] + [3, 4] * 4 + [3]
+    assert trainer.frames_per_update == 13 * 8

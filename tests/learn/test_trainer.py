@@ -64,7 +64,8 @@ def naive_update(trainer: Trainer, lr: float) -> SiameseActorCritic:
     (loss.sum() if learner.sum_loss else loss.mean()).backward()
     if learner.optimiser == "adam":
         nn.utils.clip_grad_norm_(network.parameters(), learner.clip_norm)
-        torch.optim.Adam(network.parameters(), lr).step()
+        first, *others = network.parameters()
+        torch.optim.Adam([{"params": [first], "lr": lr * learner.siamese_lr}, {"params": others}], lr).step()
     else:
         published_step(network, learner.clip_norm, lr)
     return network
@@ -215,6 +216,14 @@ def test_seeds_out_of_range_are_refused(seed: int) -> None:
     with pytest.raises(RunError, match="seed is"):
         small_trainer(small_learner(), seed=seed)
     small_trainer(small_learner(), seed=2**31 - 1).update()
+
+
+@pytest.mark.parametrize(("envs_by", "counts"), [("states", [20, 40]), ("scenes", [30, 30])])
+def test_environments_are_divided_by_states_or_evenly(envs_by: str, counts: list[int]) -> None:
+    trainer = small_trainer(small_learner(envs=60, envs_by=envs_by))
+    assert torch.diff(trainer.world.scene_offset).tolist() == [20, 40]
+    scene = trainer.world.target_scene[trainer.navigation.target]
+    assert torch.bincount(scene).tolist() == counts == list(trainer.collector.rows_per_scene)
 
 
 def test_fewer_environments_than_scenes_are_refused() -> None:

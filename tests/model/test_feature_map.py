@@ -56,15 +56,46 @@ def test_the_leading_directions_are_those_of_most_variance() -> None:
     features = torch.zeros(8, 5)
     features[:, 3] = torch.tensor([1.0, -1] * 4) * 10
     features[:, 1] = torch.tensor([1.0, 1, -1, -1] * 2)
-    directions = principal_directions(features, 1)
-    assert torch.allclose(directions[:, 0].abs(), torch.eye(5)[3])
-    assert torch.allclose(principal_directions(features, 5).abs(), torch.eye(5)[[3, 1]].T)
+    directions, squares = principal_directions(features, 1)
+    assert squares.tolist() == pytest.approx([800])
+    assert torch.allclose(directions[:, 0].abs().float(), torch.eye(5)[3])
+    assert torch.allclose(principal_directions(features, 5)[0].abs().float(), torch.eye(5)[[3, 1]].T)
+
+
+@pytest.mark.parametrize(("states", "count"), [(200, 12), (8, 12)])
+def test_whitening_scales_each_direction_by_its_own_variance(states: int, count: int) -> None:
+    features = drawn(states, count)
+    centred = (features - features.mean(0)).double()
+    variances, directions = torch.linalg.eigh(centred.T @ centred)
+    gains = 1 / (variances.clamp_min(0) / (variances.sum() / count) + 1).sqrt()
+    expected = centred @ directions @ torch.diag(gains) @ directions.T
+    fitted = FeatureMap.fitted(features, centre=True, whiten=True)
+    assert torch.allclose(fitted(features) / fitted.factor, expected.float(), atol=1e-3)
+    assert fitted(features).square().mean().item() == pytest.approx(1, rel=1e-4)
+    spread = torch.linalg.svdvals(fitted(features).double())
+    before = torch.linalg.svdvals(centred)
+    rank = min(states - 1, count)
+    assert spread[0] / spread[rank - 1] < before[0] / before[rank - 1]
+
+
+@pytest.mark.parametrize("states", [20, 200])
+def test_a_whitened_basis_of_all_directions_keeps_every_whitened_inner_product(states: int) -> None:
+    features = drawn(states, 60)
+    whole = FeatureMap.fitted(features, centre=True, whiten=True)
+    basis = FeatureMap.fitted(features, centre=True, directions=60, whiten=True)
+    expected = inner_products(whole(features)) * (basis.factor / whole.factor) ** 2
+    assert torch.allclose(inner_products(basis(features)), expected, atol=1e-4 * expected.abs().max())
+
+
+def test_whitening_leaves_constant_features_alone() -> None:
+    constant = torch.full((4, 3), 2.5)
+    assert torch.equal(FeatureMap.fitted(constant, centre=True, whiten=True)(constant), torch.zeros(4, 3))
 
 
 def test_the_map_survives_its_tensors() -> None:
     features = drawn(12, 9)
-    for directions in (0, 4):
-        fitted = FeatureMap.fitted(features, centre=True, directions=directions)
+    for directions, whiten in ((0, False), (4, False), (0, True), (4, True)):
+        fitted = FeatureMap.fitted(features, centre=True, directions=directions, whiten=whiten)
         again = FeatureMap.from_tensors(fitted.tensors())
         assert torch.equal(again(features), fitted(features))
         assert (again.feature_count, again.input_count) == (9, directions or 9)

@@ -58,6 +58,7 @@ def check_against_autograd(rows_per_scene: tuple[int, ...], any_target: bool, to
     for parameter in network.parameters():
         parameter.grad.fill_(torch.nan)  # whatever was there before must not stay
     lookup.backward(history, target, rows_per_scene, kept, grad_output)
+    lookup.siamese_gradient()
     found = {name: parameter.grad.clone() for name, parameter in network.named_parameters()}
 
     features = lookup.features
@@ -107,8 +108,41 @@ def test_backward_does_not_depend_on_what_was_computed_before() -> None:
             history, target, _ = made_rows(rows_per_scene, False)
             kept = lookup.forward(history, target, rows_per_scene)
             lookup.backward(history, target, rows_per_scene, kept, torch.ones(len(history), 5))
+            lookup.siamese_gradient()
         gradients.append([parameter.grad.clone() for parameter in network.parameters()])
     assert all(torch.equal(a, b) for a, b in zip(*gradients, strict=True))
+
+
+def test_the_siamese_gradient_is_the_mean_over_the_batches_since_the_last_one() -> None:
+    network, lookup = made_network()
+    batches = [(3, 2, 4), (7, 0, 9), (5, 5, 5)]
+
+    def gradient(of: list[tuple[int, ...]]) -> Tensor:
+        for rows_per_scene in of:
+            history, target, _ = made_rows(rows_per_scene, False, seed=sum(rows_per_scene))
+            kept = lookup.forward(history, target, rows_per_scene)
+            lookup.backward(history, target, rows_per_scene, kept, torch.ones(len(history), 5))
+        lookup.siamese_gradient()
+        return network.siamese_weight.grad.clone()
+
+    alone = [gradient([batch]) for batch in batches]
+    torch.testing.assert_close(gradient(batches), torch.stack(alone).mean(0), rtol=1e-4, atol=1e-5)
+    assert torch.equal(gradient(batches[:1]), alone[0])
+
+
+def test_without_the_siamese_weight_refresh_follows_all_other_parameters() -> None:
+    network, lookup = made_network()
+    before = lookup.projected.clone()
+    with torch.no_grad():
+        for name, parameter in network.named_parameters():
+            parameter.mul_(1 if name == "siamese_weight" else 0.5)
+    wanted, term = lookup.wanted, lookup.target_term
+    lookup.refresh(siamese_weight=False)
+    partly = lookup.wanted, lookup.target_term
+    lookup.refresh()
+    assert torch.equal(before, lookup.projected)
+    assert all(torch.equal(a, b) for a, b in zip(partly, (lookup.wanted, lookup.target_term), strict=True))
+    assert not torch.equal(wanted, lookup.wanted) and not torch.equal(term, lookup.target_term)
 
 
 def test_features_of_another_size_are_refused() -> None:

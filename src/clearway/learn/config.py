@@ -19,10 +19,12 @@ class Learner:
     """Everything that shapes learning apart from scenes, targets, reward and seed."""
 
     # How much experience, and how it is gathered
-    frames: int = 1_600_000
+    frames: int = 2_400_000
     """Training frames over all environments; schedules end here."""
     envs: int = 400
-    """Environments side by side, divided evenly among the scenes. Of a3c: workers, divided evenly among the targets."""
+    """Environments side by side. Of a3c: workers, divided evenly among the targets."""
+    envs_by: Literal["states", "scenes"] = "states"
+    """How environments are divided: in proportion to the scenes' states, or as many for each scene."""
     rollout_steps: int = 20
     """Steps of every environment between updates. Of a3c: the most steps of a segment."""
     step_limit: int = 200
@@ -37,6 +39,8 @@ class Learner:
     """Clip rewards to [-1, 1] (before scaling), as Zhu's training loop does."""
     centre_features: bool = True
     """Centre features and give them a root mean square of 1, by one global factor."""
+    whiten_features: bool = True
+    """Scale directions down in which features vary more than on average; see `FeatureMap.fitted`."""
     feature_basis: int = 0
     """Express features in so many leading principal directions; 0 keeps them. S poses span at most S directions, so a
     basis of that size loses nothing and costs less where poses are few."""
@@ -54,12 +58,17 @@ class Learner:
     """Passes over each rollout (1 with one minibatch is plain A2C)."""
     minibatches: int = 4
     """Parts that each pass is divided into."""
+    siamese_step: Literal["minibatch", "pass"] = "pass"
+    """When the first layer's weight moves, which costs most: with every minibatch, or once a pass with the mean of its
+    minibatches' gradients."""
+    siamese_lr: float = 2.0
+    """Learning rate of the first layer's weight as a multiple of the others'."""
     ratio_clip: float = 0.2
     """PPO's clip of the probability ratio."""
     value_weight: float = 0.5
     """Factor of the mean squared value error, halved: weight * 0.5 * (R - V)^2."""
-    entropy_start: float = 0.01
-    entropy_end: float = 0.001
+    entropy_start: float = 0.02
+    entropy_end: float = 0.003
     """The entropy bonus falls geometrically from start to end."""
     sum_loss: bool = False
     """Sum the loss over a batch, as A3C does, rather than average it."""
@@ -67,7 +76,7 @@ class Learner:
     # The step
     optimiser: Literal["adam", "rmsprop"] = "adam"
     """rmsprop is the paper's: epsilon inside the root, mean square starting at 1."""
-    lr_start: float = 1e-3
+    lr_start: float = 5e-4
     lr_end: float = 5e-5
     """The learning rate falls linearly from start to end."""
     clip_norm: float = 0.5
@@ -92,7 +101,7 @@ class Learner:
         for name in ("discount", "gae_lambda"):
             if not 0 <= getattr(self, name) <= 1:
                 raise RunError(f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range")
-        for name in ("entropy_start", "entropy_end", "lr_start", "clip_norm", "reward_scale"):
+        for name in ("entropy_start", "entropy_end", "lr_start", "siamese_lr", "clip_norm", "reward_scale"):
             if not getattr(self, name) > 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}")
         for name in ("lr_end", "balance", "ratio_clip", "value_weight", "feature_basis"):
@@ -127,12 +136,14 @@ DEFAULT = Learner()
 PAPER_A2C = Learner(
     frames=10_000_000,
     envs=100,
+    envs_by="scenes",
     rollout_steps=5,
     step_limit=5000,
     bootstrap_cut=False,
     reward_scale=1.0,
     clip_rewards=True,
     centre_features=False,
+    whiten_features=False,
     discount=0.99,
     gae_lambda=1.0,
     hindsight=False,
@@ -140,6 +151,7 @@ PAPER_A2C = Learner(
     algorithm="a2c",
     epochs=1,
     minibatches=1,
+    siamese_lr=1.0,
     value_weight=0.5,
     entropy_start=0.01,
     entropy_end=0.01,

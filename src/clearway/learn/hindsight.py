@@ -55,11 +55,8 @@ def find_segments(rollout: Rollout, navigation: Navigation) -> Segments:
     for t in range(len(hit) - 1, -1, -1):
         alive = ((alive & open_t[t]) | hit[t]) & elsewhere[t]
         used[t] = alive
-    steps, envs, slots = used.shape
-    scenes = world.scene_count
-    scene, step, place, slot = used.view(steps, scenes, -1, slots).transpose(0, 1).nonzero(as_tuple=True)
-    env = scene * (envs // scenes) + place
-    rows_per_scene = tuple(torch.bincount(scene, minlength=scenes).tolist())
+    env, step, slot = used.transpose(0, 1).nonzero(as_tuple=True)  # ordered by scene, as environments are
+    rows_per_scene = tuple(torch.bincount(choice.groups[env], minlength=world.scene_count).tolist())
     return Segments(step, env, slot, members[env, slot], hit[step, env, slot], rows_per_scene)
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
+from torch.nn import Parameter
 
 
 class Optimiser(Protocol):
@@ -25,8 +26,8 @@ class Optimiser(Protocol):
 class Adam:
     """PyTorch's fused Adam (Kingma & Ba, 2015)."""
 
-    def __init__(self, network: nn.Module, epsilon: float = 1e-8) -> None:
-        self.named = dict(network.named_parameters())
+    def __init__(self, named: Mapping[str, Parameter], epsilon: float = 1e-8) -> None:
+        self.named = named
         self.adam = torch.optim.Adam(list(self.named.values()), lr=0.0, eps=epsilon, fused=True)
         for parameter in self.named.values():
             self.adam.state[parameter] = {
@@ -61,8 +62,8 @@ class SharedRMSProp:
     ms <- alpha ms + (1 - alpha) g^2;   parameter <- parameter - lr g / sqrt(ms + epsilon)
     """
 
-    def __init__(self, network: nn.Module, alpha: float = 0.99, epsilon: float = 0.1) -> None:
-        self.named = dict(network.named_parameters())
+    def __init__(self, named: Mapping[str, Parameter], alpha: float = 0.99, epsilon: float = 0.1) -> None:
+        self.named = named
         self.alpha, self.epsilon = alpha, epsilon
         self.mean_square = {name: torch.ones_like(parameter) for name, parameter in self.named.items()}
 

@@ -1,12 +1,13 @@
 """Rollouts: all environments walk some steps under the current policy.
 
-Axis letters: T steps, N environments, C scenes, E environments a scene (N = C * E), K history, A actions.
-Environments are ordered by scene. What the network reads is kept as (C, T, E, ...), so that flattened rows are ordered
-by scene too; what returns are computed from is (T, N).
+Axis letters: T steps, N environments, K history, A actions.
+Environments are ordered by scene. What the network reads is kept as rows (N * T, ...), an environment's steps together,
+so that rows are ordered by scene too; what returns are computed from is (T, N).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -28,17 +29,14 @@ def sample_actions(scores: Tensor, uniform: Tensor) -> Tensor:
     return (threshold >= bounds).sum(1).clamp_(max=ACTION_COUNT - 1)
 
 
-def by_scene(values: Tensor, scene_count: int) -> Tensor:
-    """(T, N, ...) rearranged to (C * T * E, ...), rows ordered by scene."""
-    steps, envs = values.shape[:2]
-    split = values.view(steps, scene_count, envs // scene_count, *values.shape[2:])
-    return split.transpose(0, 1).reshape(steps * envs, *values.shape[2:])
+def as_rows(values: Tensor) -> Tensor:
+    """(T, N, ...) rearranged to (N * T, ...), each environment's steps together."""
+    return values.transpose(0, 1).flatten(0, 1)
 
 
-def by_step(rows: Tensor, steps: int, scene_count: int) -> Tensor:
-    """(C * T * E, ...) rearranged to (T, N, ...); the inverse of `by_scene`."""
-    split = rows.view(scene_count, steps, -1, *rows.shape[1:])
-    return split.transpose(0, 1).reshape(steps, -1, *rows.shape[1:])
+def by_step(rows: Tensor, steps: int) -> Tensor:
+    """(N * T, ...) rearranged to (T, N, ...); the inverse of `as_rows`."""
+    return rows.unflatten(0, (-1, steps)).transpose(0, 1)
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class Rollout:
         reward: (T, N) float32 as the reward table has it.
         reached, truncated: (T, N) bool.
         last_history: (T, N, K) int64, the history after each step, before any new episode began.
-        kept: activations of all rows, ordered by scene; only the output where they are not to be used again.
+        kept: activations of all rows, as `as_rows` orders them; only the output where they are not to be used again.
         history_after, target_after: (N, K), (N,) int64, where the environments stand now.
     """
 
@@ -74,9 +72,10 @@ class Collector:
     """Gathers rollouts, one after the other.
 
     Args:
-        navigation: the environments, ordered by scene, as many in each.
+        navigation: the environments, ordered by scene.
         network: the policy.
         action_stream: one random stream an environment.
+        envs_per_scene: number of environments of each scene.
         steps: T.
         keep_hidden: keep the hidden activations too, for an update that follows at once.
     """
@@ -86,14 +85,14 @@ class Collector:
         navigation: Navigation,
         network: LookupNetwork,
         action_stream: Streams,
+        envs_per_scene: Sequence[int],
         steps: int,
         keep_hidden: bool,
     ) -> None:
         self.navigation, self.network, self.action_stream = navigation, network, action_stream
         self.steps, self.keep_hidden = steps, keep_hidden
-        self.scene_count = navigation.world.scene_count
-        device, count = navigation.world.device, len(navigation.target)
-        self.rows_per_scene = (count // self.scene_count,) * self.scene_count
+        device, count = navigation.world.device, sum(envs_per_scene)
+        self.rows_per_scene = tuple(envs_per_scene)
         self.one_step = Activations.empty(count, network.width, device)
         self.kept = Activations.empty(count * steps, network.width if keep_hidden else 0, device)
 
@@ -128,15 +127,6 @@ class Collector:
         )
 
     def _keep(self, t: int) -> None:
-        """Copy the activations of step t to their rows, which are ordered by scene first."""
-        self._step_rows(self.kept.output, t).copy_(self._scene_rows(self.one_step.output))
-        if self.keep_hidden:
-            for name in ("seen", "fused", "special"):
-                rows = self._step_rows(getattr(self.kept, name), t)
-                rows.copy_(self._scene_rows(getattr(self.one_step, name)))
-
-    def _step_rows(self, rows: Tensor, t: int) -> Tensor:
-        return rows.view(self.scene_count, self.steps, -1, rows.shape[1])[:, t]
-
-    def _scene_rows(self, rows: Tensor) -> Tensor:
-        return rows.view(self.scene_count, -1, rows.shape[1])
+        """Copy the activations of step t to their rows."""
+        for name in ("seen", "fused", "special", "output") if self.keep_hidden else ("output",):
+            by_step(getattr(self.kept, name), self.steps)[t].copy_(getattr(self.one_step, name))

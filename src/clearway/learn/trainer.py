@@ -21,7 +21,7 @@ from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.losses import Batch, LossTerms, loss_gradient
 from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp, clip_gradients
 from clearway.learn.returns import generalised_advantages
-from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, by_scene, by_step
+from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import Activations, LookupNetwork
@@ -67,8 +67,8 @@ class Trainer:
         seed: of parameters, environments, actions and shuffling.
 
     Raises:
-        RunError: the seed is out of range, features are missing or not finite, there are fewer environments than
-            scenes, or fewer rows of a scene than minibatches.
+        RunError: the seed is out of range, features are missing or not finite, a scene has no environment or fewer
+            rows than there are minibatches.
     """
 
     def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
@@ -76,23 +76,17 @@ class Trainer:
         features = checked_features(world)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
-        per_scene = learner.envs // world.scene_count
-        if per_scene < 1:
-            raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give at least one a scene")
-        if per_scene * learner.rollout_steps < learner.minibatches:
-            raise RunError(
-                f"{learner.minibatches} minibatches of {per_scene * learner.rollout_steps} rows a scene. "
-                "Give fewer minibatches, or more environments"
-            )
-        self.env_count = per_scene * world.scene_count
+        envs_per_scene = divided_envs(world, learner)
+        self.env_count = sum(envs_per_scene)
         device = world.device
-        self.feature_map = FeatureMap.fitted(features, centre=learner.centre_features, directions=learner.feature_basis)
+        self.feature_map = fitted_features(features, learner)
         shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
         self.lookup = LookupNetwork(self.network, self.feature_map(features), world.target_state)
-        self.optimiser: Optimiser = Adam(self.network) if learner.optimiser == "adam" else SharedRMSProp(self.network)
+        self.siamese_optimiser, self.optimiser = optimisers(self.network, learner)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
-        scenes = torch.arange(world.scene_count, device=device).repeat_interleave(per_scene)
+        counts = torch.tensor(envs_per_scene, device=device)
+        scenes = torch.arange(world.scene_count, device=device).repeat_interleave(counts)
         self.navigation = Navigation(
             world,
             replace(reward, clip=reward.clip or learner.clip_rewards),
@@ -105,7 +99,7 @@ class Trainer:
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.one_pass = learner.epochs * learner.minibatches == 1
         self.collector = Collector(
-            self.navigation, self.lookup, self.action_stream, learner.rollout_steps, self.one_pass
+            self.navigation, self.lookup, self.action_stream, envs_per_scene, learner.rollout_steps, self.one_pass
         )
         self._begin_staggered()
 
@@ -156,21 +150,21 @@ class Trainer:
     def _begin_staggered(self) -> None:
         """Begin all episodes, targets in turn, with clocks spread so that cuts do not fall together."""
         nav, world = self.navigation, self.world
-        order = torch.arange(self.env_count, device=world.device)
-        place = order % (self.env_count // world.scene_count)
-        counts = torch.bincount(world.target_scene, minlength=world.scene_count)
         group = nav.choice.groups
+        envs = torch.bincount(group, minlength=world.scene_count)
+        place = torch.arange(self.env_count, device=world.device) - (envs.cumsum(0) - envs)[group]
+        counts = torch.bincount(world.target_scene, minlength=world.scene_count)
         nav.reset(target=nav.choice.members[group, place % counts[group]])
         nav.elapsed = (nav.start_stream.uniform() * self.learner.step_limit).long()
 
     @torch.no_grad()
     def _batch(self, rollout: Rollout) -> tuple[Batch, float]:
         """The rollout's rows with their advantages, and the explained variance of the values."""
-        learner, scenes = self.learner, self.world.scene_count
+        learner = self.learner
         log_pi = torch.log_softmax(rollout.kept.scores, 1)
-        action = by_scene(rollout.action, scenes)
+        action = as_rows(rollout.action)
         log_prob = log_pi.gather(1, action[:, None])[:, 0]
-        value = by_step(rollout.kept.value, learner.rollout_steps, scenes)
+        value = by_step(rollout.kept.value, learner.rollout_steps)
         rows_per_scene = self.collector.rows_per_scene
         after = self.lookup.forward(rollout.history_after, rollout.target_after, rows_per_scene).value
         ended = rollout.reached | rollout.truncated
@@ -184,12 +178,12 @@ class Trainer:
         value_target = advantage + value
         explained = 1 - advantage.var(correction=0) / value_target.var(correction=0).clamp_min(1e-12)
         batch = Batch(
-            by_scene(rollout.history, scenes),
-            by_scene(rollout.target, scenes),
+            as_rows(rollout.history),
+            as_rows(rollout.target),
             action,
             log_prob,
-            by_scene(advantage, scenes),
-            by_scene(value_target, scenes),
+            as_rows(advantage),
+            as_rows(value_target),
             tuple(count * learner.rollout_steps for count in rows_per_scene),
         )
         return batch, float(explained)
@@ -199,16 +193,13 @@ class Trainer:
         bonus = torch.zeros_like(rollout.reward)
         if not self.learner.bootstrap_cut:
             return bonus
-        scenes = self.world.scene_count
-        cut = by_scene(rollout.truncated, scenes).nonzero()[:, 0]  # rows ordered by scene
-        if len(cut):
-            rows_of_scene = len(rollout.truncated) * self.env_count // scenes
-            rows_per_scene = torch.bincount(cut // rows_of_scene, minlength=scenes).tolist()
-            history = by_scene(rollout.last_history, scenes)[cut]
-            target = by_scene(rollout.target, scenes)[cut]
-            rows = by_scene(bonus, scenes)
-            rows[cut] = self.learner.discount * self.lookup.forward(history, target, rows_per_scene).value
-            bonus = by_step(rows, len(rollout.truncated), scenes)
+        env, step = rollout.truncated.T.nonzero(as_tuple=True)  # ordered by scene, as environments are
+        if len(env):
+            target = rollout.target[step, env]
+            scene = self.world.target_scene[target]
+            rows_per_scene = torch.bincount(scene, minlength=self.world.scene_count).tolist()
+            values = self.lookup.forward(rollout.last_history[step, env], target, rows_per_scene).value
+            bonus[step, env] = self.learner.discount * values
         return bonus
 
     def _with_hindsight(self, rollout: Rollout, batch: Batch) -> Batch:
@@ -216,7 +207,7 @@ class Trainer:
         learner = self.learner
         told = hindsight_batch(
             rollout,
-            by_step(batch.log_prob, learner.rollout_steps, self.world.scene_count),
+            by_step(batch.log_prob, learner.rollout_steps),
             self.navigation,
             self.lookup,
             discount=learner.discount,
@@ -230,10 +221,11 @@ class Trainer:
     ) -> tuple[list[LossTerms], list[Tensor]]:
         """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
         learner = self.learner
+        together = learner.minibatches if learner.siamese_step == "pass" else 1
         terms, norms = [], []
         for number, part in enumerate(self._minibatches(batch)):
             if number:
-                self.lookup.refresh()
+                self.lookup.refresh(siamese_weight=number % together == 0)
             rows = part.history, part.target, part.rows_per_scene
             activations = kept or self.lookup.forward(*rows)
             loss, gradient = loss_gradient(
@@ -245,8 +237,14 @@ class Trainer:
                 sum_loss=learner.sum_loss,
             )
             self.lookup.backward(*rows, activations, gradient)
-            norms.append(clip_gradients(self.network.layer_gradients(), learner.clip_norm, learner.clip_each_tensor))
+            siamese_moves = (number + 1) % together == 0
+            if siamese_moves:
+                self.lookup.siamese_gradient()
+            gradients = self.network.layer_gradients()[0 if siamese_moves else 1 :]
+            norms.append(clip_gradients(gradients, learner.clip_norm, learner.clip_each_tensor))
             self.optimiser.step(lr)
+            if siamese_moves:
+                self.siamese_optimiser.step(lr * learner.siamese_lr)
             terms.append(loss)
         return terms, norms
 
@@ -281,7 +279,7 @@ class Trainer:
         """All that `load_tensors` needs to go on bit for bit, besides `frames` and `updates`."""
         parts: dict[str, dict[str, Tensor]] = {
             "network": {name: p.data for name, p in self.network.named_parameters()},
-            "optimiser": self.optimiser.tensors(),
+            "optimiser": {**self.siamese_optimiser.tensors(), **self.optimiser.tensors()},
             "navigation": self.navigation.tensors(),
             "statistics": self.statistics.tensors(),
             "actions": {"drawn": self.action_stream.drawn},
@@ -299,7 +297,8 @@ class Trainer:
 
         for name, parameter in self.network.named_parameters():
             parameter.copy_(tensors[f"network.{name}"])
-        self.optimiser.load_tensors(part("optimiser"))
+        for optimiser in (self.siamese_optimiser, self.optimiser):
+            optimiser.load_tensors(part("optimiser"))
         self.navigation.load_tensors(part("navigation"))
         self.statistics.load_tensors(part("statistics"))
         self.action_stream.drawn = tensors["actions.drawn"].to(self.world.device).clone()
@@ -328,6 +327,41 @@ def merged(first: Batch, second: Batch) -> Batch:
         value_target=joined("value_target"),
         rows_per_scene=tuple(a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)),
     )
+
+
+def divided_envs(world: World, learner: Learner) -> tuple[int, ...]:
+    """Environments of each scene.
+
+    Raises:
+        RunError: too few for the number of scenes or minibatches.
+    """
+    states = torch.diff(world.scene_offset).double()
+    share = states / states.sum() if learner.envs_by == "states" else torch.full_like(states, 1 / len(states))
+    upto = (share.cumsum(0) * learner.envs).round().long()
+    counts = tuple(torch.diff(upto, prepend=upto.new_zeros(1)).tolist())
+    if min(counts) < 1:
+        raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments")
+    if min(counts) * learner.rollout_steps < learner.minibatches:
+        raise RunError(
+            f"{learner.minibatches} minibatches of {min(counts) * learner.rollout_steps} rows of a scene. "
+            "Give fewer minibatches, or more environments"
+        )
+    return counts
+
+
+def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
+    """The network's input for the features (S, F), as the settings have it."""
+    return FeatureMap.fitted(
+        features, centre=learner.centre_features, directions=learner.feature_basis, whiten=learner.whiten_features
+    )
+
+
+def optimisers(network: SiameseActorCritic, learner: Learner) -> tuple[Optimiser, Optimiser]:
+    """Of the first layer's weight, and of all other parameters."""
+    kind = Adam if learner.optimiser == "adam" else SharedRMSProp
+    named = dict(network.named_parameters())
+    siamese = {"siamese_weight": named.pop("siamese_weight")}
+    return kind(siamese), kind(named)
 
 
 def _mean(scalars: list[Tensor]) -> float:

@@ -21,7 +21,7 @@ class FeatureMap:
     Attributes:
         mean: (F,) float32.
         factor: scalar float32 tensor.
-        basis: (F, R) float32 with orthonormal columns; None for all features as they are.
+        basis: (F, R) float32; None for all features as they are.
     """
 
     mean: Tensor
@@ -29,7 +29,7 @@ class FeatureMap:
     basis: Tensor | None = None
 
     @classmethod
-    def fitted(cls, features: Tensor, *, centre: bool, directions: int = 0) -> FeatureMap:
+    def fitted(cls, features: Tensor, *, centre: bool, directions: int = 0, whiten: bool = False) -> FeatureMap:
         """The map for the features (S, F) of all states that will be learnt from.
 
         Args:
@@ -38,9 +38,12 @@ class FeatureMap:
             directions: express features in their leading principal directions, at most so many, and drop the rest; 0
                 keeps the features. S states span at most S directions: from there on nothing is lost, since a first
                 layer's weight only ever grows along them.
+            whiten: scale every principal direction down by the square root of 1 + its variance as a multiple of the
+                features' average variance (damped zero-phase whitening; Bell & Sejnowski, 1997). What all pictures
+                share no longer drowns what tells them apart, and nothing is blown up.
         """
         mean = features.mean(0) if centre else torch.zeros_like(features[0])
-        basis = principal_directions(features - mean, directions) if directions else None
+        basis = _basis(features - mean, directions, whiten)
         plain = cls(mean, features.new_ones(()), basis)
         if not centre:
             return plain
@@ -73,10 +76,30 @@ class FeatureMap:
         return cls(tensors["mean"], tensors["factor"], tensors.get("basis"))
 
 
-def principal_directions(features: Tensor, most: int) -> Tensor:
-    """(F, R) float32: the R <= most orthonormal directions in which features (S, F) vary most, the largest first.
+def _basis(features: Tensor, directions: int, whiten: bool) -> Tensor | None:
+    """The matrix (F, R) that centred features (S, F) are multiplied with; None for the identity."""
+    if not whiten:
+        return principal_directions(features, directions)[0].float() if directions else None
+    found, squares = principal_directions(features, directions or features.shape[1])
+    average = features.double().square().sum() / features.shape[1]
+    gain = (squares / average.clamp_min(1e-300) + 1).rsqrt()
+    if directions:
+        return (found * gain).float()
+    unscaled = torch.eye(features.shape[1], dtype=found.dtype, device=found.device)
+    return (unscaled + (found * (gain - 1)) @ found.T).float()
+
+
+def principal_directions(features: Tensor, most: int) -> tuple[Tensor, Tensor]:
+    """The orthonormal directions in which features vary most, the largest first, and how much they vary.
 
     Directions that the features do not span are left out; one stays in any case.
+
+    Args:
+        features: (S, F) float32.
+        most: how many are wanted.
+
+    Returns:
+        (F, R) float64, R <= most, and the features' squares added up along each, (R,) float64.
     """
     rows = features.double()
     states, count = rows.shape
@@ -87,4 +110,4 @@ def principal_directions(features: Tensor, most: int) -> Tensor:
     vectors = vectors[:, :spanned]
     if by_state:
         vectors = rows.T @ vectors / squares[:spanned].clamp_min(1e-30).sqrt()
-    return vectors.float().contiguous()
+    return vectors.contiguous(), squares[:spanned].clamp_min(0)

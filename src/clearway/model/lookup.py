@@ -4,7 +4,8 @@ Features are frozen and states finite, so the first layer needs no picture twice
 
     W_k f(s)             one matrix product of all S states' features an update, then K rows are summed per sample;
     target branch        one row a target (M of them), not one a sample;
-    dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once.
+    dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once; several
+                         batches may be added up before that, as long as W_k stays what it is.
 
 Nothing is approximated. Gradients are written by hand into `.grad`; the tests hold them against autograd on `network`.
 
@@ -78,6 +79,9 @@ class LookupNetwork:
         network: the parameters; shared, not copied. Call `refresh` after every change of them.
         features: (S, F) float32, prepared features of all states.
         target_state: (M,) int64.
+
+    Attributes:
+        batches: backward passes since `siamese_gradient` was last called.
     """
 
     def __init__(self, network: SiameseActorCritic, features: Tensor, target_state: Tensor) -> None:
@@ -89,15 +93,17 @@ class LookupNetwork:
         columns = shape.history_length * shape.width
         self.projected = torch.empty(len(features), columns, device=features.device)
         self.workspace = torch.empty(0, self.width, device=features.device)
+        self.by_state, self.batches = torch.empty(0, columns, device=features.device), 0
         for parameter in network.parameters():
             parameter.grad = torch.zeros_like(parameter)
         self.refresh()
 
     @torch.no_grad()
-    def refresh(self) -> None:
-        """Project all states and targets with the parameters as they are now."""
+    def refresh(self, siamese_weight: bool = True) -> None:
+        """Compute the tables with the parameters as they are now; siamese_weight: it has changed too."""
         net = self.network
-        torch.mm(self.features, net.siamese_weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
+        if siamese_weight:
+            torch.mm(self.features, net.siamese_weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
         slots = self.projected[self.target_state].view(-1, self.history_length, self.width)
         self.wanted = slots.sum(1).add_(net.siamese_bias).relu_()  # (M, H)
         self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
@@ -137,7 +143,10 @@ class LookupNetwork:
         kept: Activations,
         grad_output: Tensor,
     ) -> None:
-        """Set every parameter's `.grad` from the loss's gradient with respect to the output, (B, A + 1)."""
+        """Set `.grad` from the loss's gradient with respect to the output, (B, A + 1).
+
+        Of siamese_weight what is needed is added up, for `siamese_gradient`.
+        """
         net = self.network
         grad_fused, grad_seen = self._work(2, len(history))
         self._backward_scenes(rows_per_scene, kept, grad_output, grad_seen, grad_fused)
@@ -150,7 +159,17 @@ class LookupNetwork:
         torch.mm(grad_fused, net.fusion_weight[0], out=grad_seen)
         _relu_backward_(grad_seen, kept.seen)
         torch.sum(grad_seen, 0, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
-        self._backward_siamese(history, grad_seen, grad_wanted)
+        self._add_by_state(history, grad_seen, grad_wanted)
+        self.batches += 1
+
+    @torch.no_grad()
+    def siamese_gradient(self) -> None:
+        """Set siamese_weight's `.grad` to the mean over the backward passes since the last call."""
+        gradient = grad_of(self.network.siamese_weight)
+        torch.mm(self.by_state.T, self.features, out=gradient.flatten(0, 1))
+        if self.batches > 1:
+            gradient.div_(self.batches)
+        self.batches = 0
 
     def _work(self, blocks: int, rows: int) -> list[Tensor]:
         """Memory for some (rows, H) blocks, kept between calls: fresh pages cost more than the arithmetic."""
@@ -186,15 +205,15 @@ class LookupNetwork:
         count = torch.bincount(target, minlength=len(self.target_state))
         return embedding_bag(torch.argsort(target), rows, count.cumsum(0) - count, mode="sum")
 
-    def _backward_siamese(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor) -> None:
-        """dL/dW_k: gradients added up by state and slot, then one product with the features."""
+    def _add_by_state(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor) -> None:
+        """Add gradients up by state and slot, (S, K * H)."""
         bag = self._table_row(history).flatten()
         count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
         sample = torch.argsort(bag) // self.history_length
         by_state = embedding_bag(sample, grad_seen, count.cumsum(0) - count, mode="sum")  # (S * K, H)
-        columns = by_state.view(len(self.features), -1)  # (S, K * H)
-        columns.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
-        torch.mm(columns.T, self.features, out=grad_of(self.network.siamese_weight).flatten(0, 1))
+        columns = by_state.view(len(self.features), -1)
+        self.by_state = self.by_state.add_(columns) if self.batches else columns
+        self.by_state.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
 
     def _table_row(self, states: Tensor) -> Tensor:
         """Row of `projected`, seen as (S * K, H), for states (B, K) in their slots."""

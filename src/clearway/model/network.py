@@ -87,7 +87,7 @@ class SiameseActorCritic(nn.Module):
         return output[:, :ACTION_COUNT], output[:, ACTION_COUNT]
 
     def layer_gradients(self) -> list[Tensor]:
-        """Gradients of the published network's tensors, as views.
+        """Gradients of the published network's tensors, as views; the siamese weight's comes first.
 
         What is stacked here is separate there: every scene's layer and outputs, and the policy's and the value's part.
         """

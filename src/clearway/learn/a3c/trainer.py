@@ -26,8 +26,7 @@ from clearway.learn.a3c.rmsprop import EPSILON
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.config import Learner
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.learn.trainer import Update, check_finite, check_seed, checked_features
-from clearway.model.feature_map import FeatureMap
+from clearway.learn.trainer import Update, check_finite, check_seed, checked_features, fitted_features
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
@@ -60,7 +59,7 @@ class AsyncTrainer:
             )
         self.world, self.learner, self.reward, self.seed = world, learner, reward, seed
         self.frames, self.updates = 0, 0
-        self.feature_map = FeatureMap.fitted(features, centre=learner.centre_features, directions=learner.feature_basis)
+        self.feature_map = fitted_features(features, learner)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
         self.process_count = min(processes, learner.envs)
         self.shared = self._new_shared(features)
