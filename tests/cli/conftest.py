@@ -12,7 +12,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import torch
 
 from clearway.cli.main import main
 
@@ -70,14 +69,11 @@ def clearway() -> Callable[..., Answer]:
 
 @pytest.fixture(autouse=True, scope="session")
 def _alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """One thread, a cache of our own, and tables wide enough not to break words."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
+    """A cache of our own, and tables wide enough not to break words."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CLEARWAY_CACHE", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("COLUMNS", "200")
         yield
-    torch.set_num_threads(before)
 
 
 def dump_graph(cells: list[tuple[int, int]]) -> np.ndarray:

@@ -125,6 +125,9 @@ def test_a_newer_format_is_refused_with_the_remedy(tmp_path: Path) -> None:
     (path / "training.safetensors").rename(path / "state.safetensors")  # a newer one may hold other files
     with pytest.raises(RunError, match="Upgrade clearway"):
         read_network(path)
+    written(tmp_path, 50)
+    with pytest.raises(RunError, match="Upgrade clearway"):  # not damaged, so no older one in its place
+        newest_checkpoint(tmp_path)
 
 
 @pytest.mark.parametrize("full_at", [1, 2])

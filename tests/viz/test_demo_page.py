@@ -7,7 +7,6 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-import torch
 from PIL import Image
 
 from clearway.experiments.demo import DemoRequest, DemoResult, run_demo
@@ -39,12 +38,9 @@ class Shown(HTMLParser):
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DemoResult]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
     with pytest.MonkeyPatch.context() as patch:
         shrink_demo(patch)
         yield run_demo(DemoRequest(tmp_path_factory.mktemp("demo") / "demo", seed=2, frames=800, encoder="auto"))
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from PIL import Image
 
 from clearway.learn.load import load_agent
@@ -20,7 +19,6 @@ from small_runs import small_learner, small_request, small_scenes, small_targets
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """A run folder and its agent, trained on zones of whole cells."""
-    torch.set_num_threads(1)
     request = small_request(learner=small_learner(frames=160), zone_level="cell")
     path = train(request, tmp_path_factory.mktemp("run") / "run").path
     return path, load_agent(path)

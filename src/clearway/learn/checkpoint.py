@@ -33,6 +33,10 @@ KEPT = 2  # newest checkpoints that stay
 _NAME = re.compile(r"frames-(\d{12})")
 
 
+class _Damaged(RunError):
+    """A checkpoint's files are not as they were written."""
+
+
 @dataclass(frozen=True)
 class Progress:
     """How far training had come."""
@@ -81,13 +85,13 @@ def newest_checkpoint(folder: Path) -> Path:
         UserWarning: a newer checkpoint is damaged.
 
     Raises:
-        RunError: there is none, or all are damaged.
+        RunError: there is none, all are damaged, or the newest was written by a newer clearway.
     """
     for path in reversed(_found(folder)):
         try:
             _checked_manifest(path)
             return path
-        except RunError as error:
+        except _Damaged as error:
             warnings.warn(f"{error}; an earlier checkpoint is used", stacklevel=2)
     if _found(folder):
         raise RunError(f"{folder}: every checkpoint is damaged. Restore one from a copy, or train again")
@@ -126,10 +130,10 @@ def _checked_manifest(path: Path) -> dict:
         sums = dict(manifest["sha256"])
         actual = {name: _sha256(path / name) for name in (NETWORK_FILE, TRAINING_FILE)}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path}: the checkpoint is incomplete ({error}). Use another one") from error
+        raise _Damaged(f"{path}: the checkpoint is incomplete ({error}). Use another one") from error
     for name, digest in actual.items():
         if sums.get(name) != digest:
-            raise RunError(f"{path / name}: its SHA-256 differs from the manifest's. Use another checkpoint")
+            raise _Damaged(f"{path / name}: its SHA-256 differs from the manifest's. Use another checkpoint")
     return manifest
 
 
