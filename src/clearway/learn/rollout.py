@@ -103,9 +103,10 @@ class Collector:
         seen: list[tuple[Tensor, Tensor, Tensor, Transition, Tensor]] = []
         for t in range(self.steps):
             history, target = nav.history, nav.target.clone()
-            self.network.forward(history, target, self.rows_per_scene, self.one_step)
-            self._keep(t)
-            action = sample_actions(self.one_step.scores, self.action_stream.uniform())
+            now = self.network.forward(history, target, self.rows_per_scene, self._memory(t))
+            if not self.keep_hidden:
+                by_step(self.kept.output, self.steps)[t] = now.output
+            action = sample_actions(now.scores, self.action_stream.uniform())
             step = nav.step(action)
             statistics.add(target, step)
             seen.append((history, target, action, step, nav.history))
@@ -126,7 +127,8 @@ class Collector:
             target_after=nav.target.clone(),
         )
 
-    def _keep(self, t: int) -> None:
-        """Copy the activations of step t to their rows."""
-        for name in ("seen", "fused", "special", "output") if self.keep_hidden else ("output",):
-            by_step(getattr(self.kept, name), self.steps)[t].copy_(getattr(self.one_step, name))
+    def _memory(self, t: int) -> Activations:
+        """Where the activations of step t are written: to their rows, where all of them are kept."""
+        if not self.keep_hidden:
+            return self.one_step
+        return Activations(**{name: by_step(rows, self.steps)[t] for name, rows in vars(self.kept).items()})
