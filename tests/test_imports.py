@@ -8,7 +8,7 @@ import pytest
 import clearway
 
 ORDER = (
-    {"version", "errors", "choices", "files", "colours"},
+    {"version", "errors", "choices", "files", "colours", "progress"},
     {"scenes"},
     {"perception"},
     {"zones"},

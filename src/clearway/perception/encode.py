@@ -16,6 +16,7 @@ from clearway.perception.cache import Entry, cached, content_key, joint_key
 from clearway.perception.encoder import Encoder, EncoderWarning
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
+from clearway.progress import picture_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
 
 AUTO, TRAINED, RANDOM = "auto", "resnet50", "random-resnet50"
@@ -107,7 +108,10 @@ def encode_scenes(
         EncoderError: see `find_record`; or a scene has no pictures.
         SceneError: the pictures of a scene's file are damaged.
     """
-    with _threads(threads), _progress_bar(sum(scene.state_count for scene in scenes), progress) as show_done:
+    with (
+        _threads(threads),
+        picture_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
+    ):
         record = find_record(encoder, scenes, seed=seed) if isinstance(encoder, str) else encoder
         load = lru_cache(partial(encoder_from_record, record))  # at most once, and only where features are not cached
         encoded, done = [], 0
@@ -181,17 +185,3 @@ def _threads(count: int | None) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
-
-
-@contextmanager
-def _progress_bar(total: int, wanted: bool) -> Iterator[Callable[[int], None]]:
-    """A progress bar on standard error; yields what to call with the pictures done so far."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("pictures,"))
-    shown = wanted and console.is_terminal
-    with Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, disable=not shown) as bar:
-        task = bar.add_task("encoding", total=total)
-        yield lambda done: bar.update(task, completed=done)

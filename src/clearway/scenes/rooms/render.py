@@ -7,6 +7,7 @@ backend, so that the caller's own stays as it is, and a script needs no `if __na
 
 from __future__ import annotations
 
+import itertools
 import os
 import pickle
 import signal
@@ -22,6 +23,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from clearway.errors import RenderError
+from clearway.progress import picture_progress
 from clearway.scenes.rooms.render_worker import CANNOT_DRAW, CANNOT_DRAW_MARK
 
 if TYPE_CHECKING:
@@ -67,10 +69,15 @@ def render(
     pictures = np.empty((len(view.shots), view.height_px, view.width_px, 3), np.uint8)
     room = pickle.dumps(model, protocol=pickle.HIGHEST_PROTOCOL)
     with (
-        _progress_bar(label, len(pictures), progress) as advance,
+        picture_progress(label, len(pictures), progress) as show_done,
         _started_workers(count) as started,
         ThreadPoolExecutor(max(count, 1)) as threads,
     ):
+        numbers = itertools.count(1)
+
+        def advance() -> None:
+            show_done(next(numbers))
+
         try:
             jobs = []
             for first, worker in enumerate(started):
@@ -97,28 +104,6 @@ def _worker_environment(workers: int) -> dict[str, str]:
     if sys.platform == "linux":
         environment.setdefault(BACKEND_VARIABLE, "egl")
     return environment
-
-
-@contextmanager
-def _progress_bar(label: str, total: int, wanted: bool) -> Iterator[Callable[[], None]]:
-    """A progress bar on standard error; yields what to call after each picture. Silent if not a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("pictures,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-        console=console,
-        disable=not (wanted and console.is_terminal),
-    )
-    with bar:
-        task = bar.add_task(label, total=total)
-        yield lambda: bar.advance(task)
 
 
 @dataclass(frozen=True)

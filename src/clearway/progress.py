@@ -1,0 +1,23 @@
+"""The progress bar of work on pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def picture_progress(label: str, total: int, wanted: bool) -> Iterator[Callable[[int], None]]:
+    """A progress bar on standard error; yields what to call with the number of pictures done so far.
+
+    Silent if standard error is not a terminal.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("pictures,"))
+    shown = wanted and console.is_terminal
+    with Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, disable=not shown) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.update(task, completed=done)
