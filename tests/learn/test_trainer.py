@@ -10,9 +10,9 @@ from torch import Tensor, nn
 
 from clearway.errors import RunError
 from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
-from clearway.learn.losses import Batch
+from clearway.learn.losses import Batch, merged
 from clearway.learn.rollout import Rollout
-from clearway.learn.trainer import Trainer, merged
+from clearway.learn.trainer import Trainer
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world

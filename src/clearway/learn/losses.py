@@ -54,6 +54,28 @@ class Batch:
         )
 
 
+def merged(first: Batch, second: Batch) -> Batch:
+    """The rows of two batches, each ordered by scene, as one batch ordered by scene."""
+    scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
+    scene = torch.cat(
+        [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
+    )
+    order = torch.argsort(scene, stable=True)
+
+    def joined(name: str) -> Tensor:
+        return torch.cat([getattr(first, name), getattr(second, name)])[order]
+
+    return Batch(
+        history=joined("history"),
+        target=joined("target"),
+        action=joined("action"),
+        log_prob=joined("log_prob"),
+        advantage=joined("advantage"),
+        value_target=joined("value_target"),
+        rows_per_scene=tuple(a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)),
+    )
+
+
 @dataclass(frozen=True)
 class LossTerms:
     """The loss and its parts, scalars."""

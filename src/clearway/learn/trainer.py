@@ -18,18 +18,17 @@ from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.config import Learner
 from clearway.learn.hindsight import hindsight_batch
-from clearway.learn.losses import Batch, LossTerms, loss_gradient
-from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp, clip_gradients
+from clearway.learn.losses import Batch, LossTerms, loss_gradient, merged
+from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
+from clearway.learn.setup import check_seed, checked_features, divided_envs, fitted_features, optimisers
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
 SHUFFLE_SALT = 1_000_003
-SEED_LIMIT = 1 << 31  # seeds of environments are seed * 2**32 + number, in 64 bits
 
 
 @dataclass(frozen=True)
@@ -307,75 +306,8 @@ class Trainer:
         self.lookup.refresh()
 
 
-def merged(first: Batch, second: Batch) -> Batch:
-    """The rows of two batches, each ordered by scene, as one batch ordered by scene."""
-    scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
-    scene = torch.cat(
-        [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
-    )
-    order = torch.argsort(scene, stable=True)
-
-    def joined(name: str) -> Tensor:
-        return torch.cat([getattr(first, name), getattr(second, name)])[order]
-
-    return Batch(
-        history=joined("history"),
-        target=joined("target"),
-        action=joined("action"),
-        log_prob=joined("log_prob"),
-        advantage=joined("advantage"),
-        value_target=joined("value_target"),
-        rows_per_scene=tuple(a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)),
-    )
-
-
-def divided_envs(world: World, learner: Learner) -> tuple[int, ...]:
-    """Environments of each scene.
-
-    Raises:
-        RunError: too few for the number of scenes or minibatches.
-    """
-    states = torch.diff(world.scene_offset).double()
-    share = states / states.sum() if learner.envs_by == "states" else torch.full_like(states, 1 / len(states))
-    upto = (share.cumsum(0) * learner.envs).round().long()
-    counts = tuple(torch.diff(upto, prepend=upto.new_zeros(1)).tolist())
-    if min(counts) < 1:
-        raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments")
-    if min(counts) * learner.rollout_steps < learner.minibatches:
-        raise RunError(
-            f"{learner.minibatches} minibatches of {min(counts) * learner.rollout_steps} rows of a scene. "
-            "Give fewer minibatches, or more environments"
-        )
-    return counts
-
-
-def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
-    """The network's input for the features (S, F), as the settings have it."""
-    return FeatureMap.fitted(
-        features, centre=learner.centre_features, directions=learner.feature_basis, whiten=learner.whiten_features
-    )
-
-
-def optimisers(network: SiameseActorCritic, learner: Learner) -> tuple[Optimiser, Optimiser]:
-    """Of the first layer's weight, and of all other parameters."""
-    kind = Adam if learner.optimiser == "adam" else SharedRMSProp
-    named = dict(network.named_parameters())
-    siamese = {"siamese_weight": named.pop("siamese_weight")}
-    return kind(siamese), kind(named)
-
-
 def _mean(scalars: list[Tensor]) -> float:
     return float(torch.stack(scalars).mean())
-
-
-def check_seed(seed: int) -> None:
-    """Refuse seeds that the streams of random numbers cannot be made from.
-
-    Raises:
-        RunError: the seed is out of range.
-    """
-    if not 0 <= seed < SEED_LIMIT:
-        raise RunError(f"seed is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
 
 
 def check_finite(update: Update, frames: int) -> None:
@@ -390,16 +322,3 @@ def check_finite(update: Update, frames: int) -> None:
                 f"the {name} is {value} after {frames} frames. Training stopped; "
                 "lower the learning rate or check the features"
             )
-
-
-def checked_features(world: World) -> Tensor:
-    """The world's features (S, F).
-
-    Raises:
-        RunError: there are none, or some are not finite.
-    """
-    if world.features is None:
-        raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
-    if not torch.isfinite(world.features).all():
-        raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
-    return world.features

@@ -25,8 +25,9 @@ from clearway.learn.a3c.process import Assignment, Message, Report, work, world_
 from clearway.learn.a3c.rmsprop import EPSILON
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.config import Learner
+from clearway.learn.setup import check_seed, checked_features, fitted_features
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.learn.trainer import Update, check_finite, check_seed, checked_features, fitted_features
+from clearway.learn.trainer import Update, check_finite
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 

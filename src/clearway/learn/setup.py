@@ -1,0 +1,73 @@
+"""What a trainer is made from, checked and made ready."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from clearway.envs.world import World
+from clearway.errors import RunError
+from clearway.learn.config import Learner
+from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp
+from clearway.model.feature_map import FeatureMap
+from clearway.model.network import SiameseActorCritic
+
+SEED_LIMIT = 1 << 31  # seeds of environments are seed * 2**32 + number, in 64 bits
+
+
+def check_seed(seed: int) -> None:
+    """Refuse seeds that the streams of random numbers cannot be made from.
+
+    Raises:
+        RunError: the seed is out of range.
+    """
+    if not 0 <= seed < SEED_LIMIT:
+        raise RunError(f"seed is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
+
+
+def checked_features(world: World) -> Tensor:
+    """The world's features (S, F).
+
+    Raises:
+        RunError: there are none, or some are not finite.
+    """
+    if world.features is None:
+        raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
+    if not torch.isfinite(world.features).all():
+        raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
+    return world.features
+
+
+def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
+    """The network's input for the features (S, F), as the settings have it."""
+    return FeatureMap.fitted(
+        features, centre=learner.centre_features, directions=learner.feature_basis, whiten=learner.whiten_features
+    )
+
+
+def divided_envs(world: World, learner: Learner) -> tuple[int, ...]:
+    """Environments of each scene.
+
+    Raises:
+        RunError: too few for the number of scenes or minibatches.
+    """
+    states = torch.diff(world.scene_offset).double()
+    share = states / states.sum() if learner.envs_by == "states" else torch.full_like(states, 1 / len(states))
+    upto = (share.cumsum(0) * learner.envs).round().long()
+    counts = tuple(torch.diff(upto, prepend=upto.new_zeros(1)).tolist())
+    if min(counts) < 1:
+        raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments")
+    if min(counts) * learner.rollout_steps < learner.minibatches:
+        raise RunError(
+            f"{learner.minibatches} minibatches of {min(counts) * learner.rollout_steps} rows of a scene. "
+            "Give fewer minibatches, or more environments"
+        )
+    return counts
+
+
+def optimisers(network: SiameseActorCritic, learner: Learner) -> tuple[Optimiser, Optimiser]:
+    """Of the first layer's weight, and of all other parameters."""
+    kind = Adam if learner.optimiser == "adam" else SharedRMSProp
+    named = dict(network.named_parameters())
+    siamese = {"siamese_weight": named.pop("siamese_weight")}
+    return kind(siamese), kind(named)
