@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from sb3 import SiamesePolicy, network_settings, policy_of, vec_env
-from scene_sets import prepared, world_of
+from scene_sets import ON_PREPARED, prepared, world_of
 from solving import SolvingClock
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -54,7 +54,7 @@ def outcome(agent: str, seed: int, frames: int, clock: SolvingClock) -> Outcome:
 
 def our_outcome(world: World, seed: int, cap_s: float) -> Outcome:
     """Our default learner."""
-    trainer = Trainer(world, DEFAULT, COLLISION_AWARE, seed)
+    trainer = Trainer(world, ON_PREPARED, COLLISION_AWARE, seed)
 
     def policy() -> Policy:
         trainer.lookup.refresh()

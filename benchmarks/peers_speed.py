@@ -9,17 +9,16 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 
 from sb3 import SiamesePolicy, network_settings, policy_of, vec_env
-from scene_sets import world_of
+from scene_sets import ON_PREPARED, world_of
 from stable_baselines3 import A2C
 from throughput import ENDLESS
 
 from clearway.envs.world import World
-from clearway.learn.config import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
 
-OURS = replace(DEFAULT.as_a2c(), frames=ENDLESS, hindsight=False, feature_basis=0)
+OURS = replace(ON_PREPARED.as_a2c(), frames=ENDLESS, hindsight=False, feature_basis=0)
 OWN_KINDS = (("dummy", 16, 5), ("dummy", 100, 5), ("dummy", 100, 20), ("subproc", 8, 5), ("subproc", 16, 20))
 BATCHED = (("batched", 16, 5), ("batched", 100, 20), ("batched", 400, 20), ("batched", 800, 20))
 

@@ -10,7 +10,8 @@ import torch
 
 from clearway.envs.world import World, make_world
 from clearway.errors import SceneError
-from clearway.model.feature_map import FeatureMap
+from clearway.learn.config import DEFAULT
+from clearway.learn.setup import fitted_features
 from clearway.perception import encode_scenes
 from clearway.scenes.library import cached_room_scene
 from clearway.scenes.rooms import ROOM_NAMES
@@ -19,6 +20,7 @@ from clearway.scenes.targets import default_targets
 from clearway.scenes.thor_v1 import read_scene
 
 ENCODER = "random-resnet50"
+ON_PREPARED = replace(DEFAULT, centre_features=False, whiten_features=False)  # the default learner on `prepared` scenes
 
 
 def chosen_scenes(files: Sequence[Path]) -> list[Scene]:
@@ -35,9 +37,9 @@ def chosen_scenes(files: Sequence[Path]) -> list[Scene]:
 
 
 def prepared(scenes: Sequence[Scene]) -> list[Scene]:
-    """The scenes with features as the network wants them, centred and scaled, and nothing that only takes memory."""
+    """The scenes with features as the default learner's network wants them, and nothing that only takes memory."""
     features = [torch.from_numpy(scene.features) for scene in scenes]
-    feature_map = FeatureMap.fitted(torch.cat(features), centre=True)
+    feature_map = fitted_features(torch.cat(features), DEFAULT)
     return [
         replace(scene, features=feature_map(own).numpy(), observations=None, top_view=None)
         for scene, own in zip(scenes, features, strict=True)

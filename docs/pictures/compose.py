@@ -29,4 +29,4 @@ def compose(demo: Path) -> Image.Image:
 
 
 if __name__ == "__main__":
-    compose(Path(sys.argv[1])).save(sys.argv[2], quality=88)
+    compose(Path(sys.argv[1])).save(sys.argv[2], quality=80)

@@ -11,7 +11,14 @@ Algorithm = Literal["ppo", "a2c", "a3c"]
 PresetName = Literal["default", "paper", "paper-a3c"]
 
 
-_A3C_NEEDS = {"epochs": 1, "minibatches": 1, "hindsight": False, "balance": 0, "optimiser": "rmsprop"}
+_A3C_NEEDS = {
+    "epochs": 1,
+    "minibatches": 1,
+    "siamese_lr": 1,
+    "hindsight": False,
+    "balance": 0,
+    "optimiser": "rmsprop",
+}
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,9 @@ def test_figures_are_means_over_the_updates() -> None:
     assert (together.lr, together.entropy_weight) == (learner.lr_start, learner.entropy_start)
 
 
-@pytest.mark.parametrize("change", [{"hindsight": True}, {"balance": 1.0}, {"epochs": 2}, {"optimiser": "adam"}])
+@pytest.mark.parametrize(
+    "change", [{"hindsight": True}, {"balance": 1.0}, {"epochs": 2}, {"siamese_lr": 2.0}, {"optimiser": "adam"}]
+)
 def test_what_a3c_does_not_have_is_refused(change: dict) -> None:
     with pytest.raises(RunError, match=f"a3c with {next(iter(change))}"):
         replace(PAPER_A3C, **change)
