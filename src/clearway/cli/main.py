@@ -18,6 +18,7 @@ from clearway.cli.evaluate import Evaluate
 from clearway.cli.floor_plan import FromFloorPlan
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
+from clearway.cli.reproduce import Reproduce
 from clearway.cli.scenes import Build, Import, Inspect
 from clearway.cli.train import Train
 from clearway.errors import ClearwayError
@@ -53,6 +54,7 @@ Command = (
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Oracle, tyro.conf.subcommand("oracle")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
 )
 
 

@@ -17,6 +17,7 @@ from clearway.evaluate.episodes import EpisodeTable
 from clearway.zones import Zone
 
 SC_STEPS = 500
+SC_DETOUR = 4
 Column = Callable[[EpisodeTable], np.ndarray]
 
 
@@ -43,6 +44,11 @@ def success(table: EpisodeTable) -> np.ndarray:
 def sc(table: EpisodeTable) -> np.ndarray:
     """1 where the target was reached in under 500 steps (the paper's success score), (N,)."""
     return (table.reached & (table.steps < SC_STEPS)).astype(np.float64)
+
+
+def sc_4x(table: EpisodeTable) -> np.ndarray:
+    """1 where the target was reached in at most 4 times the shortest path's steps, (N,)."""
+    return (table.reached & (table.steps <= SC_DETOUR * table.shortest_path_steps)).astype(np.float64)
 
 
 def spl(table: EpisodeTable) -> np.ndarray:
@@ -94,6 +100,7 @@ METRICS: dict[str, Metric] = {
     "collision_free": Metric(collision_free),
     "success": Metric(success),
     "sc": Metric(sc),
+    "sc_4x": Metric(sc_4x),
     "spl": Metric(spl),
     "collision_free_spl": Metric(collision_free_spl),
     "collision_visits": Metric(_steps_in(Zone.COLLISION)),

@@ -3,6 +3,7 @@
 run.json         learner, reward, seed, zone level, scenes with their targets and digests, versions, hardware, command
 metrics.jsonl    one row of figures a line (docs/metrics.md)
 checkpoints/     see `checkpoint`
+milestones/N/    the agent after N frames, where it was asked for: a checkpoint to act from, not to train on from
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from clearway.scenes.scene import Scene
 from clearway.version import __version__
 
 FORMAT_VERSION = 1
-RUN_FILE, METRICS_FILE, CHECKPOINTS = "run.json", "metrics.jsonl", "checkpoints"
+RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
 _PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
 Settings = TypeVar("Settings", Learner, Reward)
 
@@ -158,6 +159,10 @@ class RunFolder:
         self.path = path
         self.checkpoints = path / CHECKPOINTS
         self.metrics_path = path / METRICS_FILE
+
+    def milestone(self, frames: int) -> Path:
+        """Where the checkpoint of the agent after so many frames is kept."""
+        return self.path / MILESTONES / str(frames)
 
     @property
     def exists(self) -> bool:

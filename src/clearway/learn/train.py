@@ -38,6 +38,7 @@ from clearway.scenes.scene import Scene
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
+NETWORK = "network."  # tensors of the network among a trainer's
 
 
 class Learning(Protocol):
@@ -102,7 +103,14 @@ class RunRequest:
         return Trainer(world, self.learner, self.reward, self.seed)
 
 
-def train(request: RunRequest, out: Path, *, resume: bool = False, show_progress: bool = False) -> RunFolder:
+def train(
+    request: RunRequest,
+    out: Path,
+    *,
+    resume: bool = False,
+    show_progress: bool = False,
+    milestones: Sequence[int] = (),
+) -> RunFolder:
     """Train until all frames are used and leave a run folder behind.
 
     Args:
@@ -110,6 +118,7 @@ def train(request: RunRequest, out: Path, *, resume: bool = False, show_progress
         out: the run folder.
         resume: go on from the newest checkpoint in `out`; without one, or without a run, begin.
         show_progress: draw a progress bar.
+        milestones: keep the agent as it is after so many frames too, see `RunFolder.milestone`.
 
     Raises:
         RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
@@ -124,7 +133,7 @@ def train(request: RunRequest, out: Path, *, resume: bool = False, show_progress
             progress_view(trainer.learner.frames, show_progress) as view,
             _interruption() as interrupted,
         ):
-            _run(trainer, folder, view, interrupted, seconds)
+            _run(trainer, folder, view, interrupted, seconds, milestones)
     return folder
 
 
@@ -161,7 +170,12 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bo
 
 
 def _run(
-    trainer: Learning, folder: RunFolder, view: ProgressView, interrupted: threading.Event, seconds: float
+    trainer: Learning,
+    folder: RunFolder,
+    view: ProgressView,
+    interrupted: threading.Event,
+    seconds: float,
+    milestones: Sequence[int],
 ) -> None:
     """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
 
@@ -174,9 +188,12 @@ def _run(
     saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
     try:
         while not trainer.finished and not interrupted.is_set():
-            started = time.monotonic()
+            before, started = trainer.frames, time.monotonic()
             update = trainer.update()
             seconds += time.monotonic() - started
+            for milestone in milestones:
+                if before < milestone <= trainer.frames:
+                    _save_agent(trainer, folder.milestone(milestone), seconds)
             if _rows_due(trainer) > rows:
                 log.write(metrics_row(trainer, update, seconds))
                 rows = _rows_due(trainer)
@@ -200,11 +217,21 @@ def _rows_due(trainer: Learning) -> int:
 def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
     """Write a checkpoint of the trainer as it stands."""
     tensors = trainer.tensors()
-    network = {key: value for key, value in tensors.items() if key.startswith("network.")}
-    network |= {f"features.{name}": tensor for name, tensor in trainer.feature_map.tensors().items()}
-    training = {key: value for key, value in tensors.items() if not key.startswith("network.")}
+    training = {key: value for key, value in tensors.items() if not key.startswith(NETWORK)}
     progress = Progress(trainer.frames, trainer.updates, seconds)
-    write_checkpoint(folder.checkpoints, network, training, progress)
+    write_checkpoint(folder.checkpoints, _agent(trainer, tensors), training, progress)
+
+
+def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
+    """Write what is needed to act, not to train on."""
+    progress = Progress(trainer.frames, trainer.updates, seconds)
+    write_checkpoint(folder, _agent(trainer, trainer.tensors()), {}, progress)
+
+
+def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The parameters, and the map that prepares features."""
+    network = {key: value for key, value in tensors.items() if key.startswith(NETWORK)}
+    return network | {f"features.{name}": tensor for name, tensor in trainer.feature_map.tensors().items()}
 
 
 @contextmanager

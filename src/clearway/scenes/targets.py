@@ -26,18 +26,27 @@ def seeded_targets(scene: Scene, count: int = TARGETS_PER_SCENE, seed: int = 0) 
     Raises:
         SceneError: the component has fewer than `count` states.
     """
-    states = np.flatnonzero(scene.components == 0)
-    if count < 1 or count > len(states) - 1:
+    order = target_order(scene, seed)
+    if count < 1 or count > len(order) - 1:
         raise SceneError(
             scene.name,
-            f"{count} targets asked for, the largest component has {len(states)} states",
-            f"Ask for 1 to {len(states) - 1} targets",
+            f"{count} targets asked for, the largest component has {len(order)} states",
+            f"Ask for 1 to {len(order) - 1} targets",
         )
+    return tuple(sorted(order[:count]))
+
+
+def target_order(scene: Scene, seed: int = 0) -> tuple[int, ...]:
+    """All states of the scene's largest component in a random order, the same for the same seed.
+
+    One state of every cell comes before the others.
+    """
+    states = np.flatnonzero(scene.components == 0)
     order = np.random.default_rng([seed, scene.state_count]).permutation(states)
     _, first_of_cell = np.unique(scene.cells[order], return_index=True)
     one_a_cell = order[np.sort(first_of_cell)]
     others = np.delete(order, np.sort(first_of_cell))
-    return tuple(sorted(int(state) for state in np.concatenate([one_a_cell, others])[:count]))
+    return tuple(int(state) for state in np.concatenate([one_a_cell, others]))
 
 
 def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:

@@ -1,0 +1,102 @@
+"""`clearway reproduce`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from clearway.cli.arguments import check_at_least, scene_files
+from clearway.cli.console import print_json, stderr_console
+
+if TYPE_CHECKING:
+    from clearway.experiments.reproduce import Reproduction
+
+Name = Literal["all", "table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis"]
+LearnerName = Literal["published", "published-a3c", "default"]
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Redo the paper's tables and figures, with seeds, intervals and exact optima, and judge its claims.
+
+    What is complete in --out is kept, so the same command goes on where it was stopped.
+
+    Example: clearway reproduce all --budget smoke
+    """
+
+    names: Annotated[tuple[Name, ...], tyro.conf.Positional]
+    """Experiments, or all."""
+    out: Path = Path("reproduction")
+    """Folder of scenes, runs and the report."""
+    budget: Literal["smoke", "paper"] = "smoke"
+    """smoke: minutes, to see that it runs. paper: the paper's frames and five seeds, many hours."""
+    scenes: Path | None = None
+    """Folder of scene files with features, such as the published dumps, instead of the default rooms."""
+    encoder: str = "auto"
+    """For the default rooms: auto, random-resnet50, or a model's name or folder."""
+    seeds: int | None = None
+    """Agents of each kind; by default as the budget says."""
+    learners: tuple[LearnerName, ...] = ("published", "default")
+    """published: the paper's settings, synchronous; published-a3c: asynchronous, far slower; default: the recipe."""
+    workers: int | None = None
+    """Runs side by side; by default one a core, as far as memory allows."""
+    threads: int = 1
+    """Threads of each run. Results repeat bit for bit at one number of threads."""
+    json: bool = False
+    """Print the report as JSON."""
+
+    def run(self) -> None:
+        """Run what is missing, write the report, say where it is."""
+        from clearway.experiments.catalogue import EXPERIMENTS
+        from clearway.experiments.reproduce import ReproduceRequest, reproduce
+        from clearway.experiments.setting import PUBLISHED, PUBLISHED_ASYNC, RECIPE
+        from clearway.viz.report import JSON, MARKDOWN
+
+        check_at_least(1, threads=self.threads)
+        if self.seeds is not None:
+            check_at_least(1, seeds=self.seeds)
+        if self.workers is not None:
+            check_at_least(1, workers=self.workers)
+        learners = {"published": PUBLISHED, "published-a3c": PUBLISHED_ASYNC, "default": RECIPE}
+        request = ReproduceRequest(
+            names=tuple(EXPERIMENTS) if "all" in self.names else tuple(dict.fromkeys(self.names)),  # type: ignore[arg-type]
+            out=self.out,
+            budget=self.budget,
+            dumps=scene_files((self.scenes,)) if self.scenes else (),
+            encoder=self.encoder,
+            seeds=self.seeds,
+            learners=[learners[name] for name in dict.fromkeys(self.learners)],
+            workers=self.workers,
+            threads=self.threads,
+        )
+        page = _write(reproduce(request, show_progress=True), self.out)
+        if self.json:
+            import json
+
+            print_json(json.loads((self.out / JSON).read_text(encoding="utf-8")))
+        stderr_console().print(f"report: {page} and {self.out / MARKDOWN}", highlight=False)
+
+
+def _write(found: Reproduction, out: Path) -> Path:
+    from clearway.learn.run_folder import hardware, package_versions
+    from clearway.viz.report import SMOKE_WARNING, write_report
+
+    setting = found.setting
+    budget = setting.budget
+    facts = {
+        "command": shlex.join(["clearway", *sys.argv[1:]]),
+        "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
+        "features": setting.encoder,
+        "seeds": ", ".join(map(str, setting.seeds)),
+        "evaluation": f"{budget.episodes_per_target} episodes a target, at most {budget.step_cap:,} steps",
+        "learners": ", ".join(f"{name}: {learner.frames:,} frames" for name, learner in setting.learners.items()),
+        "versions": ", ".join(f"{name} {version}" for name, version in package_versions().items()),
+        "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
+    }
+    warning = SMOKE_WARNING if budget.name == "smoke" else ""
+    return write_report(out, "The paper's experiments, redone", found.sections, facts, warning)

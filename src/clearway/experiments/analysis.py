@@ -1,0 +1,164 @@
+"""What the reward does, exactly: soft fixed points and optima over a grid of settings, and the agents among them.
+
+No training is needed: everything but the agents' own points follows by dynamic programming.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from clearway.choices import ZoneLevel
+from clearway.envs.world import World, make_world
+from clearway.evaluate.optimum import world_yardsticks
+from clearway.evaluate.oracle import ENTROPY_WEIGHT, Expected
+from clearway.experiments import table1
+from clearway.experiments.groups import compared
+from clearway.experiments.plan import Job
+from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
+from clearway.experiments.setting import Setting
+from clearway.files import written_whole
+from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
+
+FILE = "analysis.json"
+BETAS = (-0.01, -0.02, -0.05, -0.1, -0.2)
+GAMMA_SHARES = (0.0, 0.1, 0.5)  # of the way from alpha to beta; the paper's gamma -0.011 lies at 0.1
+ENTROPIES = (0.003, 0.01, 0.03)
+LEVELS: tuple[ZoneLevel, ...] = ("pose", "cell")
+FIGURES = ("steps", "collisions", "collision_visits", "precollision_visits")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A setting of the reward and the loss."""
+
+    beta: float
+    gamma: float
+    entropy: float
+    clip: bool
+    level: ZoneLevel
+
+    @property
+    def reward(self) -> Reward:
+        """The reward of the setting."""
+        return replace(COLLISION_AWARE, name="grid", beta=self.beta, gamma=self.gamma, clip=self.clip)
+
+
+PAPERS_POINT = Point(COLLISION_AWARE.beta, COLLISION_AWARE.gamma, ENTROPY_WEIGHT, True, "pose")
+
+
+def grid(smoke: bool) -> Iterator[Point]:
+    """The settings: one kind of change at a time around the paper's, and the two penalties together."""
+    betas = BETAS[:2] if smoke else BETAS
+    for beta in betas:
+        for share in GAMMA_SHARES[1:2] if smoke else GAMMA_SHARES:
+            gamma = round(COLLISION_AWARE.alpha + share * (beta - COLLISION_AWARE.alpha), 6)
+            yield replace(PAPERS_POINT, beta=beta, gamma=gamma)
+    for beta, gamma in ((SHORTEST.beta, SHORTEST.gamma), (PAPERS_POINT.beta, PAPERS_POINT.gamma)):
+        for entropy in ENTROPIES:
+            for clip in (True, False):
+                for level in LEVELS:
+                    yield Point(beta, gamma, entropy, clip, level)
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done for the agents' points: nothing that the main experiment does not do."""
+    return table1.jobs(setting)
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    found = _solved(setting, list(dict.fromkeys(grid(setting.budget.name == "smoke"))))
+    rows: list[tuple[Value, ...]] = []
+    for point, policies in found:
+        for policy, figures in policies.items():
+            rows.append((policy, *asdict(point).values(), *(figures[name] for name in FIGURES)))
+    headings = ("policy", "beta", "gamma", "entropy weight", "rewards clipped", "zones of", *FIGURES)
+    return Section(
+        name="analysis",
+        title="What the reward does, exactly",
+        text=(
+            "Expected figures an episode, mean over scenes of the means over targets and all starts. Optimal: the best "
+            "policy, ties taken alike. Soft: where the loss comes to rest with that entropy weight; the paper's: beta "
+            f"{PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, pose level."
+        ),
+        tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows)),),
+        figures=tuple(_pareto(setting, found, metric) for metric in ("collision_visits", "collisions")),
+    )
+
+
+Solved = list[tuple[Point, dict[str, dict[str, float]]]]
+
+
+def _solved(setting: Setting, points: Sequence[Point]) -> Solved:
+    """Figures of every point; those solved before are read from the analysis's file."""
+    path = setting.out / FILE
+    scenes = {file.name: [file.digest, list(own)] for file, own in zip(setting.files, setting.targets, strict=True)}
+    known: dict[str, dict] = {}
+    if path.exists():
+        content = json.loads(path.read_text(encoding="utf-8"))
+        known = content["points"] if content["scenes"] == scenes else {}
+    worlds = {level: _world(setting, level) for level in LEVELS}
+    for point in points:
+        key = json.dumps(asdict(point))
+        if key not in known:
+            known[key] = _figures(worlds, point)
+            with written_whole(path) as part:
+                part.write_text(json.dumps({"scenes": scenes, "points": known}) + "\n", encoding="utf-8")
+    return [(point, known[json.dumps(asdict(point))]) for point in points]
+
+
+def _world(setting: Setting, level: ZoneLevel) -> World:
+    targets = {scene.name: own for scene, own in zip(setting.scenes, setting.targets, strict=True)}
+    return make_world(setting.scenes, targets, level)
+
+
+def _figures(worlds: dict[ZoneLevel, World], point: Point) -> dict[str, dict[str, float]]:
+    """Of the optimal and the soft policy. Visits are counted in the zones of the point's own level."""
+    world = worlds[point.level]
+    exact = [each.yardstick for each in world_yardsticks(world, point.reward, entropy_weight=point.entropy)]
+    scene = world.target_scene.numpy()
+
+    def means(policies: Sequence[Expected]) -> dict[str, float]:
+        columns = {name: np.array([getattr(policy, name) for policy in policies]) for name in FIGURES}
+        return {
+            name: float(np.mean([values[scene == number].mean() for number in range(world.scene_count)]))
+            for name, values in columns.items()
+        }
+
+    return {"optimal": means([each.optimal for each in exact]), "soft": means([each.soft for each in exact])}
+
+
+def _pareto(setting: Setting, found: Solved, metric: str) -> ReportFigure:
+    """Steps against collisions or visits: all soft fixed points, those no other beats in both, the paper's, agents."""
+    points = [(policies["soft"]["steps"], policies["soft"][metric], point) for point, policies in found]
+    pose = [(x, y, point) for x, y, point in points if point.level == "pose"]
+    front = pareto_front([(x, y) for x, y, _ in pose])
+    own = [(x, y) for x, y, point in pose if point == PAPERS_POINT]
+    series = [
+        Series("soft fixed points", [x for x, _, _ in pose], [y for _, y, _ in pose], points=True),
+        Series("Pareto front", [x for x, _ in front], [y for _, y in front]),
+        Series("the paper's setting", [x for x, _ in own], [y for _, y in own], points=True),
+    ]
+    world = setting.world()
+    for group in compared(setting, (SHORTEST, COLLISION_AWARE)):
+        values = group.scores(setting.out, world.target_count)
+        if len(values):
+            x, y = (values.of(name).mean(1).tolist() for name in ("steps", metric))
+            series.append(Series(f"{group.learner}, {group.agent}", x, y, points=True))
+    label = {"collisions": "collisions an episode", "collision_visits": "steps in the collision zone an episode"}[
+        metric
+    ]
+    return ReportFigure(f"analysis_{metric}", "Steps against " + label, "steps an episode", label, tuple(series))
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The points that no other beats in both figures (smaller is better), from left to right."""
+    front: list[tuple[float, float]] = []
+    for x, y in sorted(set(points)):
+        if not front or y < front[-1][1]:
+            front.append((x, y))
+    return front

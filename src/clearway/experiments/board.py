@@ -1,0 +1,112 @@
+"""The state of a plan's runs, read from their folders, as a table that is drawn anew while they run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clearway.experiments.job import is_done, run_folder
+from clearway.experiments.plan import Job
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SECONDS_BETWEEN_LOOKS = 2.0
+MOST_ROWS = 12
+
+
+@dataclass(frozen=True)
+class RunState:
+    """How far a run has come.
+
+    Attributes:
+        name: of the run.
+        state: "waiting", "training", "trying" (its trials) or "done".
+        frames, all_frames: trained, of how many.
+        frames_per_s: of its training so far; None before the first figures.
+        solved, targets: targets that its recent training episodes reached, of how many.
+        seconds_left: of training; None where nobody knows.
+    """
+
+    name: str
+    state: str
+    frames: int
+    all_frames: int
+    frames_per_s: float | None
+    solved: int
+    targets: int
+    seconds_left: float | None
+
+
+def state_of(out: Path, job: Job, under_way: bool) -> RunState:
+    """The state of a job's run, from its files."""
+    rows = run_folder(out, job.run).metrics()
+    last = rows[-1] if rows else {"frames": 0, "seconds": 0.0, "solved_targets": 0}
+    frames, all_frames = int(last["frames"]), job.run.learner.frames
+    speed = frames / last["seconds"] if last["seconds"] else None
+    if is_done(out, job):
+        state = "done"
+    elif not under_way:
+        state = "waiting"
+    else:
+        state = "trying" if frames >= all_frames else "training"
+    left = max(0, all_frames - frames) / speed if speed else None
+    targets = sum(len(own) for own in job.run.targets)
+    return RunState(job.run.name, state, frames, all_frames, speed, int(last["solved_targets"]), targets, left)
+
+
+@contextmanager
+def board(out: Path, jobs: Sequence[Job], visible: bool) -> Iterator[Callable[[Sequence[Job]], None]]:
+    """A live table on standard error; yields what to call with the jobs under way."""
+    if not visible:
+        yield lambda under_way: None
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    console = Console(stderr=True)
+    with Live(console=console, auto_refresh=False, transient=True) as live:
+        looked = -SECONDS_BETWEEN_LOOKS
+
+        def show(under_way: Sequence[Job]) -> None:
+            nonlocal looked
+            if time.monotonic() - looked >= SECONDS_BETWEEN_LOOKS:
+                looked = time.monotonic()
+                names = {job.run.name for job in under_way}
+                states = [state_of(out, job, job.run.name in names) for job in jobs]
+                live.update(state_table(states), refresh=True)
+
+        yield show
+
+
+def state_table(states: Sequence[RunState]) -> Table:
+    """The runs under way and some of those that wait; the rest as counts."""
+    from rich.table import Table
+
+    count = {kind: sum(state.state == kind for state in states) for kind in ("done", "waiting")}
+    seconds = sum(state.seconds_left or 0 for state in states if state.state == "training")
+    title = f"{len(states)} runs: {count['done']} done, {count['waiting']} waiting"
+    table = Table(title=title, caption=f"training under way needs another {clock(seconds)} of processor time")
+    for heading in ("run", "state", "frames", "frames/s", "solved", "left"):
+        table.add_column(heading, justify="left" if heading in ("run", "state") else "right", no_wrap=heading != "run")
+    shown = sorted(states, key=lambda state: ("training", "trying", "waiting", "done").index(state.state))
+    for state in shown[:MOST_ROWS]:
+        table.add_row(
+            state.name,
+            state.state,
+            f"{100 * state.frames / state.all_frames:.0f} % of {state.all_frames:,}",
+            "-" if state.frames_per_s is None else f"{state.frames_per_s:,.0f}",
+            f"{state.solved}/{state.targets}",
+            "-" if state.seconds_left is None else clock(state.seconds_left),
+        )
+    return table
+
+
+def clock(seconds: float) -> str:
+    """Seconds as h:mm:ss."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"

@@ -1,0 +1,44 @@
+"""How much of everything an experiment spends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.scenes.rooms import ROOM_NAMES
+
+BudgetName = Literal["smoke", "paper"]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What the experiments may spend.
+
+    Attributes:
+        name: as on the command line.
+        rooms: which of the default rooms.
+        frames: of a run under the published settings in the main experiment (the paper: 10 M).
+        default_frames: of a run of the default recipe there; None: as many as the recipe says.
+        seeds: agents of each kind.
+        episodes_per_target, step_cap: of every evaluation.
+        most_scenes: scenes taken of a folder of dumps; None: all.
+    """
+
+    name: BudgetName
+    rooms: tuple[str, ...]
+    frames: int
+    default_frames: int | None
+    seeds: int
+    episodes_per_target: int
+    step_cap: int
+    most_scenes: int | None = None
+
+
+PAPER = Budget("paper", ROOM_NAMES, 10_000_000, None, 5, EPISODES_PER_TARGET, STEP_CAP)
+"""The paper's frames, with five seeds instead of one."""
+
+SMOKE = Budget("smoke", ("bathroom",), 24_000, 24_000, 2, 10, 1_000, most_scenes=1)
+"""Shows within minutes that everything runs; its figures say nothing about the paper."""
+
+BUDGETS: dict[BudgetName, Budget] = {"paper": PAPER, "smoke": SMOKE}

@@ -1,0 +1,68 @@
+"""Figure 3: steps and collisions added up over the evaluation's episodes, best and worst agent of each reward."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.evaluate.episodes import EpisodeTable
+from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.job import episodes_of
+from clearway.experiments.plan import Job
+from clearway.experiments.section import ReportFigure, Section, Series
+from clearway.experiments.setting import Setting
+from clearway.reward import COLLISION_AWARE, SHORTEST
+
+REWARDS = (SHORTEST, COLLISION_AWARE)
+FIGURES = {"steps": "steps so far", "collisions": "collisions so far"}
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done: nothing that the main experiment does not do."""
+    return all_jobs(compared(setting, REWARDS))
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    groups = compared(setting, REWARDS)
+    figures = [
+        ReportFigure(
+            f"fig3_{learner.split()[0]}_{metric}",
+            f"{learner}: {metric} over the episodes",
+            "episodes of every target",
+            f"{label}, mean over targets",
+            tuple(
+                series
+                for group in groups
+                if group.learner == learner
+                for series in _best_and_worst(setting, group, metric)
+            ),
+        )
+        for learner in dict.fromkeys(group.learner for group in groups)
+        for metric, label in FIGURES.items()
+    ]
+    return Section(
+        name="fig3",
+        title="Accumulated steps and collisions (the paper's figure 3)",
+        text="Best and worst are the seeds whose sum over all episodes is smallest and largest.",
+        figures=tuple(figure for figure in figures if figure.series),
+        missing=all_missing(groups, setting.out),
+    )
+
+
+def _best_and_worst(setting: Setting, group: Group, metric: str) -> list[Series]:
+    found = [(run.seed, episodes_of(setting.out, run, group.trial)) for run in group.runs]
+    sums = [(seed, accumulated(table, metric)) for seed, table in found if table is not None]
+    if not sums:
+        return []
+    ranked = sorted(sums, key=lambda pair: float(pair[1][-1]))
+    chosen = {"best": ranked[0], "worst": ranked[-1]} if len(ranked) > 1 else {"only": ranked[0]}
+    return [
+        Series(f"{group.agent}, {kind} (seed {seed})", list(range(1, len(line) + 1)), line.tolist())
+        for kind, (seed, line) in chosen.items()
+    ]
+
+
+def accumulated(table: EpisodeTable, metric: str) -> np.ndarray:
+    """(E,) sums over the first 1 to E episodes of every target, mean over targets."""
+    values = getattr(table, metric).reshape(int(table.target.max()) + 1, -1)
+    return values.mean(0).cumsum()

@@ -1,0 +1,111 @@
+"""Figure 4: the same agents halfway and in the end, and the whole of their training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from clearway.evaluate.across_seeds import mean_estimate
+from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.job import run_folder
+from clearway.experiments.plan import Job
+from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less
+from clearway.reward import COLLISION_AWARE, SHORTEST
+
+REWARDS = (SHORTEST, COLLISION_AWARE)
+HALFWAY = 0.5
+METRICS = ("steps", "collisions")
+CURVE_POINTS = 50
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done: the main experiment's agents, kept halfway too."""
+    return all_jobs(_groups(setting))
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    groups = _groups(setting)
+    return Section(
+        name="fig4",
+        title="Speed of convergence (the paper's figure 4)",
+        text=(
+            "The main experiment's agents tried halfway and in the end of their training; below, episodes ended during "
+            "training (not every learner draws their targets evenly)."
+        ),
+        tables=(_table(setting, groups),),
+        figures=tuple(_curves(setting, groups)),
+        claims=tuple(_claims(setting, groups)),
+        missing=all_missing(groups, setting.out),
+    )
+
+
+def _groups(setting: Setting) -> list[Group]:
+    return [group for after in (HALFWAY, None) for group in compared(setting, REWARDS, after=after)]
+
+
+def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
+    world = setting.world()
+    rows: list[tuple[Value, ...]] = []
+    for group in groups:
+        values = group.scores(setting.out, world.target_count)
+        frames = group.trial.frames or group.runs[0].learner.frames
+        figures: list[Value] = []
+        for metric in METRICS:
+            if not len(values):
+                figures += [None, None]
+                continue
+            found = mean_estimate(values.of(metric), world.target_scene.numpy())
+            figures += [found.value, None if found.interval is None else "{:.3g} - {:.3g}".format(*found.interval)]
+        rows.append((group.learner, group.agent, frames, len(values), *figures))
+    headings = ("learner", "agent", "frames", "seeds", "steps", "95 %", "collisions", "95 % of collisions")
+    return ReportTable("fig4", "Halfway and in the end", headings, tuple(rows))
+
+
+def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
+    """The collision-aware agent is ahead halfway."""
+    world = setting.world()
+    found = []
+    for learner in setting.learners:
+        halfway = {
+            group.agent: group.scores(setting.out, world.target_count)
+            for group in groups
+            if group.learner == learner and group.trial.frames is not None
+        }
+        ours, baseline = halfway[COLLISION_AWARE.name], halfway[SHORTEST.name]
+        for metric in METRICS:
+            text = f"{learner}: learns faster (fewer {metric} halfway)"
+            scene = world.target_scene.numpy()
+            found.append(judged_less(text, f"{metric} halfway", ours.of(metric), baseline.of(metric), scene))
+    return found
+
+
+def _curves(setting: Setting, groups: Sequence[Group]) -> list[ReportFigure]:
+    figures = []
+    for learner in setting.learners:
+        own = [group for group in groups if group.learner == learner and group.trial.frames is None]
+        for metric in METRICS:
+            for axis in ("frames", "seconds"):
+                series = tuple(line for group in own if (line := _curve(setting, group, axis, metric)) is not None)
+                if series:
+                    name = f"fig4_{learner.split()[0]}_{metric}_{axis}"
+                    title = f"{learner}: {metric} of training episodes"
+                    figures.append(ReportFigure(name, title, f"training {axis}", f"{metric} an episode", series))
+    return figures
+
+
+def _curve(setting: Setting, group: Group, axis: str, metric: str) -> Series | None:
+    """Mean, smallest and largest over seeds on a common axis; as far as all seeds have come."""
+    rows = [[row for row in run_folder(setting.out, run).metrics() if row["episodes"]] for run in group.runs]
+    rows = [own for own in rows if len(own) > 1]
+    if not rows:
+        return None
+    first, last = max(own[0][axis] for own in rows), min(own[-1][axis] for own in rows)
+    if last <= first:
+        return None
+    x = np.linspace(first, last, CURVE_POINTS)
+    y = np.stack([np.interp(x, [row[axis] for row in own], [row[metric] for row in own]) for own in rows])
+    return Series(group.agent, x.tolist(), y.mean(0).tolist(), y.min(0).tolist(), y.max(0).tolist())

@@ -1,0 +1,71 @@
+"""Figure 6: success on 5 held-out targets a scene, against the number of targets trained on."""
+
+from __future__ import annotations
+
+from clearway.experiments import generalisation
+from clearway.experiments.groups import Group, all_jobs, compared
+from clearway.experiments.plan import Job, TargetSets
+from clearway.experiments.section import ReportFigure, ReportTable, Section, Value
+from clearway.experiments.setting import Setting
+from clearway.reward import COLLISION_AWARE
+from clearway.scenes.targets import TARGETS_PER_SCENE, target_order
+
+TRAINED = (5, 15, 25, 35, 45)
+HELD_OUT = TARGETS_PER_SCENE
+ORDER_SEED = 6  # of the order in which states become held-out, then training targets
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done: the collision-aware agent on growing sets of targets."""
+    return [job for count in TRAINED for job in all_jobs(_groups(setting, count))]
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    held_out = held_out_targets(setting)
+    world = setting.world(held_out)
+    walked = generalisation.random_walk(world, setting.trial(held_out))
+    rows: list[tuple[Value, ...]] = []
+    points: dict[str, list] = {generalisation.RANDOM: []}
+    missing: dict[str, None] = {}
+    for count in TRAINED:
+        for group in _groups(setting, count):
+            values = group.scores(setting.out, world.target_count)
+            rows.append((count, group.learner, len(values), *generalisation.cells(values, world)))
+            points.setdefault(group.learner, []).append((count, values, world))
+            missing.update(dict.fromkeys(group.missing(setting.out)))
+        points[generalisation.RANDOM].append((count, walked, world))
+    rows.append((None, generalisation.RANDOM, None, *generalisation.cells(walked, world)))
+    lines = [generalisation.line(label, own) for label, own in points.items()]
+    headings = ("targets a scene", "learner", "seeds", *generalisation.HEADINGS)
+    return Section(
+        name="fig6",
+        title="Held-out targets against the number of trained ones (the paper's figure 6)",
+        text=(
+            "Collision-aware agents trained on growing sets of targets, which never contain the 5 held-out ones of a "
+            "scene; every set contains the smaller ones."
+        ),
+        tables=(ReportTable("fig6", "Held-out targets", headings, tuple(rows), (generalisation.NOTE,)),),
+        figures=(
+            ReportFigure(
+                "fig6",
+                "Held-out targets",
+                "training targets a scene",
+                "success score",
+                tuple(line for line in lines if line is not None),
+            ),
+        ),
+        missing=tuple(missing),
+    )
+
+
+def _groups(setting: Setting, count: int) -> list[Group]:
+    trained: TargetSets = tuple(
+        tuple(sorted(target_order(scene, ORDER_SEED)[HELD_OUT : HELD_OUT + count])) for scene in setting.scenes
+    )
+    return compared(setting, (COLLISION_AWARE,), targets=trained, tried_on=held_out_targets(setting))
+
+
+def held_out_targets(setting: Setting) -> TargetSets:
+    """The targets that no agent of this experiment is trained on."""
+    return tuple(tuple(sorted(target_order(scene, ORDER_SEED)[:HELD_OUT])) for scene in setting.scenes)

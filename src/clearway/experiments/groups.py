@@ -1,0 +1,115 @@
+"""Agents of one kind: the same but for the seed, tried on the same targets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from clearway.evaluate.episodes import EpisodeTable
+from clearway.evaluate.metrics import METRIC_NAMES, by_target
+from clearway.experiments.job import episodes_of
+from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
+from clearway.experiments.setting import Setting
+from clearway.reward import Reward
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs that differ in their seed alone, and a trial of each.
+
+    Attributes:
+        learner: its name.
+        agent: the rest of what tells it from others, for example the reward.
+        runs: one a seed.
+        trial: what they are tried on.
+    """
+
+    learner: str
+    agent: str
+    runs: tuple[PlannedRun, ...]
+    trial: Trial
+
+    def jobs(self) -> list[Job]:
+        """What must be done for the group."""
+        return [Job(run, (self.trial,)) for run in self.runs]
+
+    def scores(self, out: Path, target_count: int) -> Scores:
+        """The figures of the runs that are complete."""
+        found = [(run.seed, episodes_of(out, run, self.trial)) for run in self.runs]
+        return scores({seed: table for seed, table in found if table is not None}, target_count)
+
+    def missing(self, out: Path) -> list[str]:
+        """Names of runs that are not complete."""
+        return [run.name for run in self.runs if episodes_of(out, run, self.trial) is None]
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Figures of some agents.
+
+    Attributes:
+        seeds: R of them.
+        values: (R, M, J) seeds, targets, metrics as in `METRIC_NAMES`.
+    """
+
+    seeds: tuple[int, ...]
+    values: np.ndarray
+
+    def __len__(self) -> int:
+        """R."""
+        return len(self.seeds)
+
+    def of(self, metric: str) -> np.ndarray:
+        """(R, M)."""
+        return self.values[:, :, METRIC_NAMES.index(metric)]
+
+
+def scores(tables: Mapping[int, EpisodeTable], target_count: int) -> Scores:
+    """The figures of tables by seed, all over the same targets."""
+    values = [by_target(table, target_count) for table in tables.values()]
+    return Scores(tuple(tables), np.stack(values) if values else np.empty((0, target_count, len(METRIC_NAMES))))
+
+
+def compared(
+    setting: Setting,
+    rewards: Sequence[Reward],
+    *,
+    learners: Sequence[str] | None = None,
+    targets: TargetSets | None = None,
+    tried_on: TargetSets | None = None,
+    frames_factor: float = 1,
+    after: float | None = None,
+) -> list[Group]:
+    """A group for each learner and reward.
+
+    Args:
+        setting: see there.
+        rewards: to be compared.
+        learners: names; None: all of the setting.
+        targets: to be trained on; None: the paper's.
+        tried_on: to be tried on; None: those trained on.
+        frames_factor: multiplies the learners' frames.
+        after: try the agent after this share of its frames; None: in the end.
+    """
+    found = []
+    for name in setting.learners if learners is None else learners:
+        learner = setting.learners[name]
+        for reward in rewards:
+            runs = setting.runs(learner, reward, targets, frames_factor)
+            frames = None if after is None else round(runs[0].learner.frames * after)
+            trial = setting.trial(targets if tried_on is None else tried_on, frames)
+            found.append(Group(name, reward.name, runs, trial))
+    return found
+
+
+def all_jobs(groups: Iterable[Group]) -> list[Job]:
+    """What must be done for some groups."""
+    return [job for group in groups for job in group.jobs()]
+
+
+def all_missing(groups: Iterable[Group], out: Path) -> tuple[str, ...]:
+    """Names of the groups' runs that are not complete."""
+    return tuple(dict.fromkeys(name for group in groups for name in group.missing(out)))

@@ -1,0 +1,45 @@
+"""Hard targets by a stated rule, since the paper does not publish its own.
+
+A state's hardness is the expected number of steps that a random walk needs to reach it, mean over all starts, times the
+share of collision poses among those that the shortest paths to it arrive at (the optimal policy of the shortest-path
+reward, ties taken alike, mean over all starts). Targets are taken from the hardest down, each at least 4 cells from
+those already taken (Chebyshev distance on the grid); where fewer than 5 fit, the distance is lowered cell by cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.evaluate.oracle import expected, make_task, optimal_policy
+from clearway.reward import SHORTEST
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.scene import Scene
+from clearway.scenes.targets import TARGETS_PER_SCENE
+from clearway.zones import scene_zones
+
+APART_CELLS = 4
+
+
+def hardness(scene: Scene) -> np.ndarray:
+    """Hardness of every state of the scene, (S,) float64; 0 outside the largest component."""
+    zone = scene_zones(scene)
+    found = np.zeros(scene.state_count)
+    for state in np.flatnonzero(scene.components == 0).tolist():
+        task = make_task(scene.graph, zone, state, SHORTEST)
+        walk = np.full((scene.state_count, ACTION_COUNT), 1 / ACTION_COUNT)
+        shortest = expected(task, optimal_policy(task))
+        found[state] = expected(task, walk).steps * shortest.collision_visits / max(shortest.steps, 1e-12)
+    return found
+
+
+def hard_targets(scene: Scene, count: int = TARGETS_PER_SCENE, apart_cells: int = APART_CELLS) -> tuple[int, ...]:
+    """The hardest states of a scene by the rule above, ascending."""
+    order = np.argsort(-hardness(scene), kind="stable")
+    cells = np.rint(scene.locations_m / scene.cell_size_m).astype(np.int64)
+    taken: list[int] = []
+    for apart in range(apart_cells, -1, -1):
+        for state in order.tolist():
+            far = all(np.abs(cells[state] - cells[other]).max() >= apart for other in taken)
+            if len(taken) < count and state not in taken and far:
+                taken.append(state)
+    return tuple(sorted(taken))

@@ -1,0 +1,94 @@
+"""One job done: train what is missing, walk the trials that are missing. The same code on every machine.
+
+A job's folder is a run folder with a folder `trials` beside the checkpoints. Whatever is complete there is left as it
+is, so a job that was interrupted goes on from its last checkpoint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from clearway.envs.world import make_world
+from clearway.errors import RunError
+from clearway.evaluate.episode_files import read_episodes, write_episodes
+from clearway.evaluate.episodes import EpisodeTable, run_episodes
+from clearway.experiments.plan import Job, PlannedRun, Trial
+from clearway.learn.checkpoint import newest_checkpoint
+from clearway.learn.load import load_agent
+from clearway.learn.run_folder import RunFolder, scene_digest
+from clearway.learn.train import RunRequest, set_threads, train
+from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene
+
+RUNS, TRIALS = "runs", "trials"
+
+
+def run_folder(out: Path, run: PlannedRun) -> RunFolder:
+    """Where a run's files are, under the folder of a reproduction."""
+    return RunFolder(out / RUNS / run.name)
+
+
+def trial_path(out: Path, run: PlannedRun, trial: Trial) -> Path:
+    """Where a trial's episodes are."""
+    return run_folder(out, run).path / TRIALS / f"{trial.name}.json"
+
+
+def is_done(out: Path, job: Job) -> bool:
+    """All of the job's trials have been walked."""
+    return all(trial_path(out, job.run, trial).exists() for trial in job.trials)
+
+
+def do(out: Path, job: Job, threads: int) -> None:
+    """Train the run, or what is left of it, and walk its missing trials.
+
+    Raises:
+        ClearwayError: a scene is missing or has changed, or training failed.
+    """
+    set_threads(threads)
+    run = job.run
+    scenes = _scenes(run)
+    request = RunRequest(
+        scenes=scenes,
+        targets={scene.name: targets for scene, targets in zip(run.scenes, run.targets, strict=True)},
+        learner=run.learner,
+        reward=run.reward,
+        seed=run.seed,
+        paths={scene.name: scene.path for scene in run.scenes},
+    )
+    folder = train(request, run_folder(out, run).path, resume=True, milestones=job.milestones)
+    for trial in job.trials:
+        path = trial_path(out, run, trial)
+        if not path.exists():
+            about = {"run": run.name, "frames": trial.frames, "seed": trial.seed, "step_cap": trial.step_cap}
+            write_episodes(path, _walk(folder, scenes, run, trial), about)
+
+
+def episodes_of(out: Path, run: PlannedRun, trial: Trial) -> EpisodeTable | None:
+    """A trial's episodes; None where they have not been walked yet."""
+    path = trial_path(out, run, trial)
+    return read_episodes(path)[0] if path.exists() else None
+
+
+def _scenes(run: PlannedRun) -> list[Scene]:
+    scenes = []
+    for wanted in run.scenes:
+        scene = read_scene(wanted.path, name=wanted.name)
+        if scene_digest(scene) != wanted.digest:
+            raise RunError(f"{wanted.path}: has changed since the plan was made. Start again with another --out")
+        scenes.append(scene)
+    return scenes
+
+
+def _walk(folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Trial) -> EpisodeTable:
+    kept = None if trial.frames is None else newest_checkpoint(folder.milestone(trial.frames))
+    agent = load_agent(folder.path, kept)
+    world = make_world(scenes, {scene.name: own for scene, own in zip(scenes, trial.targets, strict=True)})
+    return run_episodes(
+        world,
+        agent.policy(world),
+        episodes_per_target=trial.episodes_per_target,
+        step_cap=trial.step_cap,
+        seed=trial.seed,
+        history_length=run.learner.history_length,
+    )

@@ -1,0 +1,45 @@
+"""The figures that the paper reports (Gutiérrez-Maestro et al., its tables 1 to 3), to stand beside ours.
+
+One run each, on four AI2-THOR scenes and ImageNet features; scenes are named by their kind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+REMINDER = "The paper's figures are of single runs on other scenes and features; compare rewards, not rooms."
+REMINDER_ORIGINAL = "The paper's figures are of single runs."
+
+
+@dataclass(frozen=True)
+class PaperRow:
+    """One model of one of the paper's tables: steps and collisions by kind of room, and on average."""
+
+    steps: dict[str, float]
+    collisions: dict[str, float]
+
+    def of(self, metric: str, scene: str) -> float | None:
+        """The figure for a scene such as "kitchen_02" or "kitchen", or "average"; None where the paper has none."""
+        values = self.steps if metric == "steps" else self.collisions
+        return next((value for kind, value in values.items() if scene.startswith(kind)), None)
+
+
+def _row(steps: tuple[float, ...], collisions: tuple[float, ...]) -> PaperRow:
+    kinds = ("bathroom", "bedroom", "living_room", "kitchen", "average")
+    return PaperRow(dict(zip(kinds, steps, strict=True)), dict(zip(kinds, collisions, strict=True)))
+
+
+TABLE_1 = {
+    "shortest": _row((7.17, 14.82, 15.2, 21.38, 14.7), (0.04, 0.12, 0.25, 0.2, 0.15)),
+    "collision-aware": _row((7.33, 14.81, 14.9, 20.83, 14.47), (0.03, 0.04, 0.15, 0.12, 0.082)),
+}
+TABLE_2 = {
+    "shortest": _row((7.43, 13.76, 1323.88, 19.17, 341.06), (0.06, 0.15, 247.78, 0.30, 62.07)),
+    "collision-aware": _row((7.29, 14.63, 568.78, 18.89, 152.39), (0.03, 0.08, 61.66, 0.25, 15.5)),
+}
+TABLE_3 = {
+    "shortest": _row((7.46, 13.92, 18.12, 18.03, 14.38), (0.04, 0.12, 0.2, 0.19, 0.14)),
+    "collision-aware": _row((7.16, 14.15, 17.73, 17.86, 14.225), (0.01, 0.03, 0.05, 0.07, 0.04)),
+}
+FIGURE_5_AVERAGE_SC = {"shortest": 0.574, "collision-aware": 0.581}
+"""Mean success score over unseen targets 1, 2, 4 and 8 steps away."""

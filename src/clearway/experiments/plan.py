@@ -1,0 +1,101 @@
+"""What to train and on what to try it: a job an agent, named by everything that determines the agent."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.learn.config import Learner
+from clearway.reward import Reward
+
+TargetSets = tuple[tuple[int, ...], ...]
+"""Targets of each scene, in the scenes' order; states in the scene's own numbering."""
+
+DIGEST_LENGTH = 10
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A scene of an experiment: its name, its file, and the digest of what training sees of it (`scene_digest`)."""
+
+    name: str
+    path: Path
+    digest: str
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """An agent to be trained.
+
+    Attributes:
+        scenes: all of them train one agent.
+        targets: of each scene.
+        reward, learner, seed: see there.
+    """
+
+    scenes: tuple[SceneFile, ...]
+    targets: TargetSets
+    reward: Reward
+    learner: Learner
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
+        scenes = [(scene.name, scene.digest) for scene in self.scenes]
+        content = [scenes, self.targets, asdict(self.reward), asdict(self.learner), self.seed]
+        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+        targets = sum(len(own) for own in self.targets)
+        frames = f"{self.learner.frames / 1e6:g}M"
+        return f"{self.learner.algorithm}-{self.reward.name}-{targets}t-{frames}-s{self.seed}-{digest}"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Episodes to be walked by a trained agent: the paper's protocol on some targets.
+
+    Attributes:
+        targets: of each scene.
+        frames: try the agent as it was after so many frames; None for the trained agent.
+        episodes_per_target, step_cap: of the protocol.
+        seed: of starts and sampled actions.
+    """
+
+    targets: TargetSets
+    frames: int | None = None
+    episodes_per_target: int = EPISODES_PER_TARGET
+    step_cap: int = STEP_CAP
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name of its file in the run's folder."""
+        digest = hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+        return f"{'end' if self.frames is None else self.frames}-{sum(map(len, self.targets))}t-{digest}"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A run with its trials: what one worker does."""
+
+    run: PlannedRun
+    trials: tuple[Trial, ...]
+
+    @property
+    def milestones(self) -> tuple[int, ...]:
+        """Frames after which the agent must be kept."""
+        return tuple(sorted({trial.frames for trial in self.trials if trial.frames is not None}))
+
+
+def merged(jobs: Iterable[Job]) -> list[Job]:
+    """The same jobs, each run once with all its trials, in the order in which runs first occur."""
+    found: dict[str, Job] = {}
+    for job in jobs:
+        known = found.get(job.run.name)
+        trials = dict.fromkeys((*known.trials, *job.trials) if known else job.trials)
+        found[job.run.name] = replace(job, trials=tuple(trials))
+    return list(found.values())

@@ -1,0 +1,87 @@
+"""What an experiment comes to, as data: tables, figures and verdicts, for every form of the report alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Verdict = Literal["holds", "does not hold", "undecided"]
+Value = str | int | float | None
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """A table.
+
+    Attributes:
+        name: of its CSV file.
+        title: above it.
+        headings: of the columns.
+        rows: as many values each; None where there is none yet.
+        notes: below it.
+    """
+
+    name: str
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[Value, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Every row must fit the headings."""
+        assert all(len(row) == len(self.headings) for row in self.rows), f"{self.name}: a row of another length"
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line or a set of points: x and y, and the interval of y where there is one."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+    low: Sequence[float] | None = None
+    high: Sequence[float] | None = None
+    points: bool = False
+    """Points without a line between them."""
+
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """A figure: its series share the axes."""
+
+    name: str
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something that the paper says, and what was found."""
+
+    text: str
+    verdict: Verdict
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """An experiment's part of the report.
+
+    Attributes:
+        name: as on the command line.
+        title: of the section.
+        text: what was done, in a few sentences.
+        tables, figures, claims: what came of it.
+        missing: runs that are not complete, by name.
+    """
+
+    name: str
+    title: str
+    text: str
+    tables: tuple[ReportTable, ...] = ()
+    figures: tuple[ReportFigure, ...] = ()
+    claims: tuple[Claim, ...] = ()
+    missing: tuple[str, ...] = ()

@@ -1,0 +1,132 @@
+"""Where experiments happen: scenes written to files, the paper's targets, learners and seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from clearway.envs.world import World, make_world
+from clearway.errors import SceneError
+from clearway.experiments.budget import Budget
+from clearway.experiments.plan import PlannedRun, SceneFile, TargetSets, Trial
+from clearway.learn.config import DEFAULT, PAPER_A2C, PAPER_A3C, Learner
+from clearway.learn.run_folder import scene_digest
+from clearway.perception import encode_scenes
+from clearway.reward import Reward
+from clearway.scenes.library import cached_room_scene
+from clearway.scenes.scene import Scene
+from clearway.scenes.targets import ZHU_TARGETS, default_targets
+from clearway.scenes.thor_v1 import read_scene, write_scene
+
+SCENES = "scenes"
+PUBLISHED, PUBLISHED_ASYNC, RECIPE = "published (A2C)", "published (A3C)", "default recipe"
+LEARNERS: dict[str, Learner] = {PUBLISHED: PAPER_A2C, PUBLISHED_ASYNC: PAPER_A3C, RECIPE: DEFAULT}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all experiments share.
+
+    Attributes:
+        out: folder of the reproduction.
+        files, scenes: the scenes, in files and read from them.
+        targets: the paper's targets where the scenes are the published ones, else seeded ones.
+        budget: see there.
+        seeds: of the agents.
+        learners: the learners to be compared, by name.
+    """
+
+    out: Path
+    files: tuple[SceneFile, ...]
+    scenes: tuple[Scene, ...]
+    targets: TargetSets
+    budget: Budget
+    seeds: tuple[int, ...]
+    learners: dict[str, Learner]
+
+    @property
+    def original(self) -> bool:
+        """The scenes are the ones that the paper used."""
+        return all(scene.name in ZHU_TARGETS for scene in self.scenes)
+
+    @property
+    def encoder(self) -> str:
+        """Name of what made the features."""
+        return ", ".join(sorted({scene.encoder.name if scene.encoder else "unknown" for scene in self.scenes}))
+
+    def world(self, targets: TargetSets | None = None) -> World:
+        """The scenes with some targets, the paper's by default."""
+        own = self.targets if targets is None else targets
+        return make_world(self.scenes, {scene.name: chosen for scene, chosen in zip(self.scenes, own, strict=True)})
+
+    def runs(
+        self, learner: Learner, reward: Reward, targets: TargetSets | None = None, frames_factor: float = 1
+    ) -> tuple[PlannedRun, ...]:
+        """One run a seed; the learner's frames are multiplied by the factor."""
+        longer = replace(learner, frames=round(learner.frames * frames_factor))
+        own = self.targets if targets is None else targets
+        return tuple(PlannedRun(self.files, own, reward, longer, seed) for seed in self.seeds)
+
+    def trial(self, targets: TargetSets | None = None, frames: int | None = None) -> Trial:
+        """The protocol on some targets, the paper's by default; of the agent after some frames, or in the end."""
+        own = self.targets if targets is None else targets
+        return Trial(own, frames, self.budget.episodes_per_target, self.budget.step_cap)
+
+
+def prepare(
+    out: Path,
+    budget: Budget,
+    *,
+    dumps: Sequence[Path] = (),
+    encoder: str,
+    seeds: int | None = None,
+    learners: Sequence[str] = (PUBLISHED, RECIPE),
+    show_progress: bool = False,
+) -> Setting:
+    """The setting of a reproduction; default rooms are built, encoded and written to `out` the first time.
+
+    Args:
+        out: folder of the reproduction.
+        budget: see there.
+        dumps: scene files with features, such as the published ones; none: the default rooms.
+        encoder: for the default rooms.
+        seeds: how many; None: as the budget says.
+        learners: names among `LEARNERS`.
+        show_progress: draw progress bars.
+
+    Raises:
+        SceneError: a dump cannot be read or has no features.
+    """
+    paths = list(dumps)[: budget.most_scenes] if dumps else _room_files(out, budget, encoder, show_progress)
+    scenes = tuple(read_scene(path) for path in paths)
+    for scene, path in zip(scenes, paths, strict=True):
+        if scene.features is None:
+            raise SceneError(path, "the scene has no features", "Encode it first, with clearway scenes import")
+    return Setting(
+        out=out,
+        files=tuple(
+            SceneFile(scene.name, path.resolve(), scene_digest(scene))
+            for scene, path in zip(scenes, paths, strict=True)
+        ),
+        scenes=scenes,
+        targets=tuple(default_targets(scene) for scene in scenes),
+        budget=budget,
+        seeds=tuple(range(budget.seeds if seeds is None else seeds)),
+        learners={name: _budgeted(LEARNERS[name], budget) for name in learners},
+    )
+
+
+def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) -> list[Path]:
+    """The default rooms with features, in files under `out`."""
+    paths = [out / SCENES / f"{name}.h5" for name in budget.rooms]
+    if not all(path.exists() for path in paths):
+        rooms = [cached_room_scene(name, progress=show_progress) for name in budget.rooms]
+        for scene, path in zip(encode_scenes(rooms, encoder, progress=show_progress), paths, strict=True):
+            write_scene(scene, path)
+    return paths
+
+
+def _budgeted(learner: Learner, budget: Budget) -> Learner:
+    frames = budget.default_frames if learner == DEFAULT else budget.frames
+    return learner if frames is None else replace(learner, frames=frames)

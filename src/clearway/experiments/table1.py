@@ -1,0 +1,57 @@
+"""Table 1: steps and collisions on the paper's targets, with the shortest-path and the collision-aware reward."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.navigation_tables import navigation_tables
+from clearway.experiments.paper_numbers import TABLE_1
+from clearway.experiments.plan import Job
+from clearway.experiments.section import Claim, Section
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less, judged_no_more
+from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
+
+REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done."""
+    return all_jobs(compared(setting, REWARDS))
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    groups = compared(setting, REWARDS)
+    tables = navigation_tables("table1", "Steps and collisions", setting, setting.targets, groups, TABLE_1)
+    return Section(
+        name="table1",
+        title="Navigation (the paper's table 1)",
+        text="Agents trained on the paper's targets, one network for all scenes, walk from random starts.",
+        tables=tables,
+        claims=tuple(claims(setting, groups)),
+        missing=all_missing(groups, setting.out),
+    )
+
+
+def claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
+    """Fewer collisions, and no more steps, for every learner; groups hold both rewards of each."""
+    world = setting.world(groups[0].trial.targets)
+    target_scene = world.target_scene.numpy()
+    found = []
+    for learner in dict.fromkeys(group.learner for group in groups):
+        ours, baseline = (
+            next(
+                group.scores(setting.out, world.target_count)
+                for group in groups
+                if (group.learner, group.agent) == (learner, reward.name)
+            )
+            for reward in (COLLISION_AWARE, SHORTEST)
+        )
+        for text, what, judged in (
+            ("fewer collisions than with the shortest-path reward", "collisions", judged_less),
+            ("no more steps than with the shortest-path reward", "steps", judged_no_more),
+        ):
+            found.append(judged(f"{learner}: {text}", what, ours.of(what), baseline.of(what), target_scene))
+    return found

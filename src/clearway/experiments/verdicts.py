@@ -1,0 +1,62 @@
+"""The paper's claims, judged by statistics over seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.evaluate.across_seeds import Estimate, difference, mean_estimate, probability_of_less
+from clearway.experiments.section import Claim, Verdict
+
+SAME = 0.02  # means within this share of each other count as equal
+
+
+def judged_less(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
+    """The claim that the first kind of agent has less of something than the second.
+
+    It holds where the interval of the difference of means lies below 0, and does not where it lies above.
+
+    Args:
+        text: the claim.
+        what: is compared, for example "collisions".
+        first, second: (R, M) scores.
+        target_scene: (M,) int.
+    """
+    if not len(first) or not len(second):
+        return Claim(text, "undecided", "No complete runs.")
+    found = difference(first, second, target_scene)
+    return Claim(text, _side(found, 0.0), _evidence(what, first, second, target_scene, found))
+
+
+def judged_no_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
+    """The claim that the first kind has no more of something: at most 2 % more than the second."""
+    if not len(first) or not len(second):
+        return Claim(text, "undecided", "No complete runs.")
+    found = difference(first, second, target_scene)
+    allowed = SAME * mean_estimate(second, target_scene).value
+    return Claim(text, _side(found, allowed), _evidence(what, first, second, target_scene, found))
+
+
+def _side(found: Estimate, allowed: float) -> Verdict:
+    if found.interval is None:
+        return "undecided"
+    low, high = found.interval
+    if allowed == 0:
+        return "holds" if high < 0 else "does not hold" if low > 0 else "undecided"
+    return "holds" if high <= allowed else "does not hold" if low > allowed else "undecided"
+
+
+def _evidence(what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, found: Estimate) -> str:
+    means = [mean_estimate(scores, target_scene) for scores in (first, second)]
+    less = probability_of_less(first, second, target_scene)
+    return (
+        f"{what}: {text_of(means[0])} against {text_of(means[1])}, difference {text_of(found)}; probability that a run "
+        f"has fewer: {text_of(less)}; {len(first)} and {len(second)} seeds."
+    )
+
+
+def text_of(estimate: Estimate, digits: int = 3) -> str:
+    """A figure with its interval, to so many significant digits."""
+    if estimate.interval is None:
+        return f"{estimate.value:.{digits}g}"
+    low, high = estimate.interval
+    return f"{estimate.value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"

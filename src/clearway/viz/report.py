@@ -1,0 +1,164 @@
+"""A report of sections: one page that holds everything, Markdown, a CSV for each table, and JSON.
+
+report.html    self-contained: style and pictures are inside
+report.md      the same in Markdown, pictures beside it
+report.json    everything as data
+tables/        a CSV for each table
+figures/       a PNG for each figure
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from html import escape
+from pathlib import Path
+
+from clearway.experiments.section import Claim, ReportTable, Section, Value
+from clearway.files import written_whole
+from clearway.viz.page_style import CSS
+from clearway.viz.report_figures import draw_report_figure
+
+HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
+SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
+SMOKE_WARNING = "Smoke budget: shows that everything runs. Its figures say nothing about the paper."
+
+
+def write_report(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> Path:
+    """Write all forms of the report into a folder and give back the page's path.
+
+    Args:
+        folder: receives the files.
+        title: of the report.
+        sections: in order.
+        facts: command, seeds, versions, hardware and the like, by name.
+        warning: stands at the top; empty for none.
+    """
+    for section in sections:
+        for table in section.tables:
+            _write_csv(folder / TABLES / f"{table.name}.csv", table)
+        for figure in section.figures:
+            draw_report_figure(figure, folder / FIGURES / f"{figure.name}.png")
+    content = {"title": title, "warning": warning, "facts": dict(facts), "sections": [asdict(s) for s in sections]}
+    texts = {
+        JSON: json.dumps(content, indent=2) + "\n",
+        MARKDOWN: _markdown(title, sections, facts, warning),
+        HTML: _page(folder, title, sections, facts, warning),
+    }
+    for name, text in texts.items():
+        with written_whole(folder / name) as part:
+            part.write_text(text, encoding="utf-8")
+    return folder / HTML
+
+
+def _write_csv(path: Path, table: ReportTable) -> None:
+    with written_whole(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(table.headings)
+        writer.writerows(table.rows)
+
+
+def value_text(value: Value) -> str:
+    """A value for people: figures to four significant digits, nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+    return f"{value:,}" if isinstance(value, int) else value
+
+
+def _verdict_rows(claims: Sequence[Claim]) -> ReportTable:
+    rows = tuple((claim.text, claim.verdict, claim.evidence) for claim in claims)
+    return ReportTable("claims", "Verdicts", ("claim", "verdict", "evidence"), rows)
+
+
+def _missing_text(section: Section) -> str:
+    count = len(section.missing)
+    return f"{count} run{'s are' if count > 1 else ' is'} not complete yet; the tables hold what is." if count else ""
+
+
+def _folded(table: ReportTable) -> str:
+    more = len(table.rows) - SHOWN_ROWS
+    return f"{more:,} more rows in {TABLES}/{table.name}.csv" if more > 0 else ""
+
+
+# ------------------------------------------------------------------------------------------------------------ Markdown
+
+
+def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
+    lines = [f"# {title}", ""]
+    lines += [f"**{warning}**", ""] if warning else []
+    for section in sections:
+        lines += [f"## {section.title}", "", section.text, ""]
+        missing = _missing_text(section)
+        lines += [f"*{missing}*", ""] if missing else []
+        if section.claims:
+            lines += _markdown_table(_verdict_rows(section.claims))
+        for table in section.tables:
+            lines += [f"### {table.title}", "", *_markdown_table(table)]
+        for figure in section.figures:
+            lines += [f"![{figure.title}]({FIGURES}/{figure.name}.png)", ""]
+    lines += ["## How it was made", "", *(f"- {name}: {value}" for name, value in facts.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _markdown_table(table: ReportTable) -> list[str]:
+    def pipes(cells: Sequence[str]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    rows = [pipes([value_text(value) for value in row]) for row in table.rows[:SHOWN_ROWS]]
+    notes = [note for note in (_folded(table), *table.notes) if note]
+    return [pipes(table.headings), pipes(["---"] * len(table.headings)), *rows, "", *(f"{n}  " for n in notes), ""]
+
+
+# ---------------------------------------------------------------------------------------------------------------- HTML
+
+
+def _page(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
+    parts = [f"<p class=lead>{escape(warning)}</p>"] if warning else []
+    body = "".join(_section(folder, section) for section in sections)
+    made = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts.items())
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{CSS}</style></head><body>"
+        f'<header class="top"><p class="mark">clearway</p><h1>{escape(title)}</h1>{"".join(parts)}</header>'
+        f"<main>{body}<section><h2>How it was made</h2><dl class=facts>{made}</dl></section></main></body></html>\n"
+    )
+
+
+def _section(folder: Path, section: Section) -> str:
+    parts = [f"<h2>{escape(section.title)}</h2><p>{escape(section.text)}</p>"]
+    missing = _missing_text(section)
+    parts += [f"<p><strong>{escape(missing)}</strong></p>"] if missing else []
+    parts += [_table(_verdict_rows(section.claims))] if section.claims else []
+    parts += [_table(table) for table in section.tables]
+    pictures = "".join(
+        f'<figure><img alt="{escape(figure.title)}" src="data:image/png;base64,{_encoded(folder, figure.name)}">'
+        f"<figcaption>{escape(figure.title)}</figcaption></figure>"
+        for figure in section.figures
+    )
+    parts += [f'<div class="gallery large">{pictures}</div>'] if pictures else []
+    return f'<section id="{escape(section.name)}">{"".join(parts)}</section>'
+
+
+def _encoded(folder: Path, name: str) -> str:
+    return base64.b64encode((folder / FIGURES / f"{name}.png").read_bytes()).decode()
+
+
+def _table(table: ReportTable) -> str:
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in table.headings)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{escape(value_text(value))}</td>" for value in row) + "</tr>"
+        for row in table.rows[:SHOWN_ROWS]
+    )
+    notes = "".join(f"<p>{escape(note)}</p>" for note in (_folded(table), *table.notes) if note)
+    heading = f"<h3>{escape(table.title)}</h3>"
+    return (
+        f'{heading}<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
+    )

@@ -1,0 +1,39 @@
+"""The figures of a report, drawn from their data: lines with intervals, and points; readable in grey."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from clearway import colours
+from clearway.experiments.section import ReportFigure
+from clearway.viz.figures import CURVES, new_figure
+
+WIDTH_IN, HEIGHT_IN = 6.4, 3.9
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+
+def draw_report_figure(figure: ReportFigure, path: Path) -> None:
+    """Draw a figure and save it as PNG. Series differ in colour, in lightness, and in dashes or markers."""
+    with new_figure(WIDTH_IN, HEIGHT_IN, path) as canvas:
+        canvas.suptitle(figure.title, x=0.01, ha="left", fontsize=12, fontweight="bold")
+        axes = canvas.add_subplot()
+        for index, series in enumerate(figure.series):
+            style, marker = CURVES[index % len(CURVES)], MARKERS[index % len(MARKERS)]
+            if series.points:
+                axes.scatter(
+                    series.x, series.y, s=26, color=style.colour, edgecolor=colours.INK, linewidth=0.5, marker=marker,
+                    label=series.label, zorder=3,
+                )  # fmt: skip
+                continue
+            few = len(series.x) <= len(MARKERS)
+            axes.plot(
+                series.x, series.y, color=style.colour, linestyle=style.pattern, marker=marker if few else None,
+                markersize=4, label=series.label,
+            )  # fmt: skip
+            if series.low is not None and series.high is not None:
+                axes.fill_between(series.x, series.low, series.high, color=style.colour, alpha=0.15, linewidth=0)
+        axes.set_xlabel(figure.x_label)
+        axes.set_ylabel(figure.y_label)
+        axes.grid(visible=True)
+        axes.set_axisbelow(True)
+        canvas.legend(loc="outside lower center", ncols=2, fontsize=8, handlelength=3)

@@ -1,0 +1,63 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from clearway.experiments import setting
+from clearway.experiments.budget import BUDGETS
+from clearway.learn.config import DEFAULT, PAPER_A2C
+from clearway.scenes.thor_v1 import write_scene
+from small_runs import small_learner
+from small_setting import BUDGET, small_rooms
+
+
+@pytest.fixture
+def dumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of two small scenes; budget and learners are small too."""
+    monkeypatch.setitem(BUDGETS, "smoke", BUDGET)
+    monkeypatch.setattr(setting, "_budgeted", lambda learner, budget: small_learner(learner))
+    folder = tmp_path / "dumps"
+    folder.mkdir()
+    for scene in small_rooms():
+        write_scene(scene, folder / f"{scene.name}.h5")
+    return folder
+
+
+def test_an_experiment_from_dumps_to_report(clearway, dumps: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("reproduce", "fig5", "--scenes", dumps, "--out", out, "--seeds", 1, "--learners", "default", "--json")
+    answer = clearway(*words)
+    assert answer.code == 0, answer
+    content = answer.json
+    assert content == json.loads((out / "report.json").read_text())
+    (section,) = content["sections"]
+    assert section["name"] == "fig5" and not section["missing"]
+    assert "Smoke" in content["warning"]
+    assert content["facts"]["scenes"].startswith("bathroom (")
+    assert "kitchen" not in content["facts"]["scenes"]  # smoke takes one scene
+    assert (out / "report.html").exists()
+    runs = sorted(path.name for path in (out / "runs").iterdir())
+    assert len(runs) == 2  # two rewards, one seed
+    assert clearway(*words).json["sections"] == content["sections"]
+    assert sorted(path.name for path in (out / "runs").iterdir()) == runs
+
+
+def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:
+    (scene, _) = small_rooms()
+    write_scene(replace(scene, features=None, encoder=None), dumps / "bathroom.h5")
+    answer = clearway("reproduce", "table1", "--scenes", dumps, "--out", tmp_path / "out")
+    answer.refusal("bathroom.h5", "no features", "clearway scenes import")
+
+
+@pytest.mark.parametrize(
+    ("words", "part"), [(("--seeds", 0), "seeds"), (("--workers", 0), "workers"), (("--threads", 0), "threads")]
+)
+def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_path: Path) -> None:
+    clearway("reproduce", "table1", "--out", tmp_path / "out", *words).refusal(part)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
+    assert setting.LEARNERS[setting.PUBLISHED] == PAPER_A2C
+    assert setting.LEARNERS[setting.RECIPE] == DEFAULT

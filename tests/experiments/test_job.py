@@ -1,0 +1,81 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.errors import RunError
+from clearway.experiments.job import do, episodes_of, is_done, run_folder
+from clearway.experiments.plan import Job
+from clearway.experiments.setting import RECIPE
+from clearway.learn import train
+from clearway.learn.trainer import Trainer, Update
+from clearway.reward import COLLISION_AWARE
+from small_setting import small_setting
+
+
+def made_job(out: Path) -> Job:
+    setting = small_setting(out, seeds=1)
+    learner = replace(setting.learners[RECIPE], lr_start=1e-2, lr_end=1e-2)  # every update shows
+    (run,) = setting.runs(learner, COLLISION_AWARE)
+    return Job(run, (setting.trial(), setting.trial(frames=400), setting.trial(((1,), (2, 3)))))
+
+
+def test_a_job_trains_and_walks_its_trials(tmp_path: Path) -> None:
+    job = made_job(tmp_path)
+    assert not is_done(tmp_path, job)
+    assert episodes_of(tmp_path, job.run, job.trials[0]) is None
+    do(tmp_path, job, threads=1)
+    assert is_done(tmp_path, job)
+    end, halfway, elsewhere = (episodes_of(tmp_path, job.run, trial) for trial in job.trials)
+    assert len(end) == len(halfway) == 3 * 5
+    assert len(elsewhere) == 3 * 3
+    np.testing.assert_array_equal(end.start, halfway.start)  # the same starts
+    assert (end.steps != halfway.steps).any()  # another agent
+
+
+def test_a_job_that_is_done_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = made_job(tmp_path)
+    do(tmp_path, job, threads=1)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json*")}
+    monkeypatch.setattr(Trainer, "update", lambda self: pytest.fail("trains again"))
+    do(tmp_path, job, threads=1)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json*")} == before
+
+
+def test_an_interrupted_job_ends_with_the_same_episodes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = made_job(tmp_path / "whole")
+    do(tmp_path / "whole", job, threads=1)
+    monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    update, left = Trainer.update, 7
+
+    def stop_after_some(self: Trainer) -> Update:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return update(self)
+
+    monkeypatch.setattr(Trainer, "update", stop_after_some)
+    with pytest.raises(KeyboardInterrupt):
+        do(tmp_path / "torn", job, threads=1)
+    monkeypatch.setattr(Trainer, "update", update)
+    do(tmp_path / "torn", job, threads=1)
+    for trial in job.trials:
+        first, second = (episodes_of(tmp_path / name, job.run, trial) for name in ("whole", "torn"))
+        np.testing.assert_array_equal(first.steps, second.steps)
+        np.testing.assert_array_equal(first.collisions, second.collisions)
+
+
+def test_a_scene_that_has_changed_is_refused(tmp_path: Path) -> None:
+    job = made_job(tmp_path)
+    changed = tuple(replace(scene, digest="0" * 16) for scene in job.run.scenes)
+    with pytest.raises(RunError, match=r"has changed.*--out"):
+        do(tmp_path, Job(replace(job.run, scenes=changed), job.trials), threads=1)
+
+
+def test_milestones_are_kept_beside_the_checkpoints(tmp_path: Path) -> None:
+    job = made_job(tmp_path)
+    do(tmp_path, job, threads=1)
+    folder = run_folder(tmp_path, job.run)
+    assert [path.name for path in folder.milestone(400).iterdir()] == ["frames-000000000400"]

@@ -1,0 +1,97 @@
+import os
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import RunError
+from clearway.experiments import local
+from clearway.experiments.job import do, episodes_of, is_done, run_folder
+from clearway.experiments.local import affordable_workers, run_jobs
+from clearway.experiments.plan import Job
+from clearway.experiments.setting import RECIPE, Setting
+from clearway.reward import COLLISION_AWARE
+from small_setting import small_setting
+
+
+def jobs_of(setting: Setting) -> list[Job]:
+    runs = setting.runs(setting.learners[RECIPE], COLLISION_AWARE)
+    return [Job(run, (setting.trial(),)) for run in runs]
+
+
+def nothing(under_way: Sequence[Job]) -> None:
+    """Show nothing."""
+
+
+def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
+    """One worker is killed on the way and begins again."""
+    here, there = small_setting(tmp_path / "here"), small_setting(tmp_path / "there")
+    for job in jobs_of(here):
+        do(here.out, job, threads=1)
+    killed: list[int] = []
+
+    def kill_once(under_way: Sequence[Job]) -> None:
+        children = [process.pid for process in local.multiprocessing.active_children()]
+        if children and not killed:
+            killed.append(children[0])
+            os.kill(children[0], signal.SIGKILL)
+
+    run_jobs(there.out, jobs_of(there), workers=2, threads=1, show=kill_once)
+    assert killed
+    for first, second in zip(jobs_of(here), jobs_of(there), strict=True):
+        assert first.run.name == second.run.name
+        tables = [episodes_of(s.out, j.run, j.trials[0]) for s, j in ((here, first), (there, second))]
+        assert (tables[0].steps == tables[1].steps).all()
+        assert (tables[0].collisions == tables[1].collisions).all()
+
+
+def test_what_the_user_did_wrong_is_said_in_one_line(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    jobs = jobs_of(setting)
+    setting.files[0].path.write_bytes(b"not a scene")
+    with pytest.raises(RunError, match=r"bathroom\.h5"):
+        run_jobs(setting.out, jobs, workers=1, threads=1, show=nothing)
+    assert not any(is_done(setting.out, job) for job in jobs)
+
+
+def test_a_run_that_is_killed_every_time_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    monkeypatch.setattr(local, "ATTEMPTS", 2)
+    killed: set[int] = set()
+
+    def kill(under_way: Sequence[Job]) -> None:
+        for process in local.multiprocessing.active_children():
+            if process.pid not in killed:
+                killed.add(process.pid)
+                os.kill(process.pid, signal.SIGKILL)
+
+    (job,) = jobs_of(setting)
+    with pytest.raises(RunError, match=r"SIGKILL, attempt 2.*run the command again"):
+        run_jobs(setting.out, [job], workers=1, threads=1, show=kill)
+    assert len(killed) == 2
+
+
+def test_an_interruption_stops_all_workers_and_leaves_what_can_be_resumed(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    jobs = jobs_of(setting)
+
+    def interrupt(under_way: Sequence[Job]) -> None:
+        if any(run_folder(setting.out, job.run).exists for job in jobs):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_jobs(setting.out, jobs, workers=2, threads=1, show=interrupt)
+    assert not local.multiprocessing.active_children()
+    run_jobs(setting.out, jobs, workers=2, threads=1, show=nothing)
+    assert all(is_done(setting.out, job) for job in jobs)
+
+
+def test_memory_limits_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local, "_free_bytes", lambda: 3 * local.JOB_BYTES)
+    assert affordable_workers(8, threads=1) == 3
+    assert affordable_workers(2, threads=1) == 2
+    monkeypatch.setattr(local, "_free_bytes", lambda: 0)
+    assert affordable_workers(8, threads=1) == 1
+    monkeypatch.setattr(local, "_free_bytes", lambda: None)
+    assert affordable_workers(8, threads=1) == 8

@@ -1,0 +1,53 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from clearway.experiments.plan import Job, PlannedRun, SceneFile, Trial, merged
+from clearway.reward import COLLISION_AWARE, SHORTEST
+from small_runs import small_learner
+
+RUN = PlannedRun((SceneFile("room", Path("a/room.h5"), "digest"),), ((1, 2),), SHORTEST, small_learner(), 0)
+
+
+def test_a_name_says_what_a_person_wants_to_know() -> None:
+    assert RUN.name.startswith("ppo-shortest-2t-0.0008M-s0-")
+
+
+def test_a_scene_s_path_does_not_matter_its_content_does() -> None:
+    moved = replace(RUN, scenes=(SceneFile("room", Path("elsewhere/room.h5"), "digest"),))
+    other = replace(RUN, scenes=(SceneFile("room", Path("a/room.h5"), "another"),))
+    assert moved.name == RUN.name != other.name
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seed": 1},
+        {"targets": ((1, 3),)},
+        {"reward": COLLISION_AWARE},
+        {"reward": replace(SHORTEST, alpha=-0.02)},
+        {"learner": small_learner(lr_end=1e-6)},
+    ],
+)
+def test_whatever_changes_the_agent_changes_the_name(change: dict) -> None:
+    assert replace(RUN, **change).name != RUN.name
+
+
+def test_a_trial_s_name_tells_it_from_others() -> None:
+    trials = [
+        Trial(((1,),)),
+        Trial(((2,),)),
+        Trial(((1,),), frames=400),
+        Trial(((1,),), step_cap=9),
+        Trial(((1,),), seed=2),
+    ]
+    assert len({trial.name for trial in trials}) == len(trials)
+
+
+def test_a_run_is_planned_once_with_all_its_trials() -> None:
+    other = replace(RUN, seed=1)
+    first, second = Trial(((1,),)), Trial(((1,),), frames=400)
+    jobs = merged([Job(RUN, (first,)), Job(other, (first,)), Job(RUN, (second, first))])
+    assert jobs == [Job(RUN, (first, second)), Job(other, (first,))]
+    assert jobs[0].milestones == (400,)

@@ -1,0 +1,155 @@
+"""Every experiment on small scenes: what is planned, and what the report says before and after."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from clearway.experiments import analysis, fig3
+from clearway.experiments.analysis import pareto_front
+from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.job import do, episodes_of, is_done
+from clearway.experiments.reproduce import planned
+from clearway.experiments.section import ReportTable, Section
+from clearway.experiments.setting import Setting
+from clearway.viz.report import HTML, JSON, MARKDOWN, write_report
+from small_setting import small_setting
+
+
+@pytest.fixture(scope="module")
+def setting(tmp_path_factory: pytest.TempPathFactory) -> Setting:
+    """The small setting, all its jobs done."""
+    setting = small_setting(tmp_path_factory.mktemp("reproduction"))
+    for job in planned(setting, list(EXPERIMENTS)):
+        do(setting.out, job, threads=1)
+    return setting
+
+
+@pytest.fixture(scope="module")
+def sections(setting: Setting) -> dict[str, Section]:
+    """All sections by name."""
+    return {name: experiment.section(setting) for name, experiment in EXPERIMENTS.items()}
+
+
+def column(table: ReportTable, heading: str) -> list:
+    """The values under a heading."""
+    return [row[table.headings.index(heading)] for row in table.rows]
+
+
+def test_runs_are_shared_between_experiments(setting: Setting) -> None:
+    jobs = planned(setting, list(EXPERIMENTS))
+    assert len({job.run.name for job in jobs}) == len(jobs)
+    table1 = {job.run.name for job in planned(setting, ["table1"])}
+    assert {job.run.name for job in planned(setting, ["fig3", "fig4", "fig5"])} < table1
+    assert all(is_done(setting.out, job) for job in jobs)
+
+
+def test_before_any_run_every_section_says_what_is_missing(tmp_path: Path) -> None:
+    empty = small_setting(tmp_path, seeds=1)
+    for name, experiment in EXPERIMENTS.items():
+        section = experiment.section(empty)
+        assert section.missing or name == "analysis"
+        assert all(claim.verdict == "undecided" for claim in section.claims)
+
+
+def test_nothing_is_missing_in_the_end(sections: dict[str, Section]) -> None:
+    assert not any(section.missing for section in sections.values())
+    assert list(sections) == [section.name for section in sections.values()]
+
+
+def test_table1_holds_what_the_episodes_say(setting: Setting, sections: dict[str, Section]) -> None:
+    table, by_target = sections["table1"].tables
+    (row,) = [r for r in table.rows if r[:3] == ("steps", "default recipe", "bump")]
+    runs = [job for job in planned(setting, ["table1"]) if job.run.reward.name == "bump" and job.run.learner.hindsight]
+    tables = [episodes_of(setting.out, job.run, job.trials[0]) for job in runs]
+    per_target = [[t.steps[t.target == m].mean() for m in range(5)] for t in tables]
+    scene = [[sum(own[:3]) / 3, sum(own[3:]) / 2] for own in per_target]
+    expected = [(scene[0][k] + scene[1][k]) / 2 for k in range(2)]
+    named = dict(zip(table.headings, row, strict=True))
+    assert [named["bathroom"], named["kitchen"]] == pytest.approx(expected)
+    assert named["average"] == pytest.approx(sum(expected) / 2)
+    assert named["seeds"] == 2
+    assert len(by_target.rows) == 5 * 2 * 3 * 2  # targets, learners, rewards, seeds
+    assert set(column(by_target, "seed")) == {0, 1}
+
+
+def test_table1_has_the_exact_references_and_the_paper_s_figures(sections: dict[str, Section]) -> None:
+    table = sections["table1"].tables[0]
+    agents = column(table, "agent")
+    assert {"shortest path", "optimum (collision-aware)", "soft fixed point (shortest)", "random walk"} <= set(agents)
+    paper = [row[-1] for row in table.rows if row[:3] == ("collisions", "default recipe", "collision-aware")]
+    assert paper == [0.082]
+
+
+def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
+    claims = [claim for section in sections.values() for claim in section.claims]
+    assert len(claims) == 4 * 4  # tables 1 to 3 and figure 4, two learners, two claims
+    assert all(claim.text.startswith(("published (A2C): ", "default recipe: ")) for claim in claims)
+
+
+def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
+    for name, places in (("fig5", 4), ("fig6", 1)):
+        (table,) = sections[name].tables
+        assert column(table, "agent" if name == "fig5" else "learner").count("random walk") == places
+        assert all(0 <= value <= 1 for value in column(table, "sc"))
+        assert all(
+            strict <= loose
+            for strict, loose in zip(column(table, "sc within 4 x shortest"), column(table, "sc"), strict=True)
+        )
+
+
+def test_accumulated_steps_end_at_the_mean_over_targets_of_the_sums(setting: Setting) -> None:
+    job = planned(setting, ["fig3"])[0]
+    table = episodes_of(setting.out, job.run, job.trials[0])
+    line = fig3.accumulated(table, "steps")
+    assert len(line) == 3  # episodes of a target
+    assert line[-1] == pytest.approx(table.steps.sum() / 5)
+
+
+def test_the_analysis_knows_that_clipping_matters(setting: Setting, sections: dict[str, Section]) -> None:
+    (table,) = sections["analysis"].tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+
+    def collisions(beta: float, clipped: bool) -> float:
+        (found,) = [
+            row["collisions"]
+            for row in rows
+            if (row["policy"], row["beta"], row["entropy weight"], row["rewards clipped"], row["zones of"])
+            == ("soft", beta, 0.01, clipped, "pose")
+        ]
+        return found
+
+    assert collisions(-0.01, True) > collisions(-0.02, True) > 0
+    assert collisions(-0.01, False) < collisions(-0.01, True)
+
+
+def test_the_analysis_is_solved_once(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = analysis.section(setting).tables
+    monkeypatch.setattr(analysis, "world_yardsticks", lambda *a, **k: pytest.fail("solved again"))
+    assert analysis.section(setting).tables == before
+
+
+def test_pareto_front_by_hand() -> None:
+    assert pareto_front([(3, 1), (1, 3), (2, 2), (2, 3), (4, 1), (1, 4)]) == [(1, 3), (2, 2), (3, 1)]
+
+
+def test_the_report_is_complete_and_stands_alone(tmp_path: Path, sections: dict[str, Section]) -> None:
+    page = write_report(tmp_path, "Title", list(sections.values()), {"command": "clearway <reproduce>"}, "Only smoke.")
+    html = page.read_text(encoding="utf-8")
+    assert page.name == HTML
+    assert "clearway &lt;reproduce&gt;" in html and "Only smoke." in html
+    assert "http" not in html.replace("http-equiv", "")  # nothing is loaded from elsewhere
+    markdown = (tmp_path / MARKDOWN).read_text(encoding="utf-8")
+    content = json.loads((tmp_path / JSON).read_text(encoding="utf-8"))
+    assert [section["name"] for section in content["sections"]] == list(sections)
+    for section in sections.values():
+        assert section.title in markdown
+        for table in section.tables:
+            with (tmp_path / "tables" / f"{table.name}.csv").open(newline="", encoding="utf-8") as file:
+                rows = list(csv.reader(file))
+            assert rows[0] == list(table.headings)
+            assert len(rows) == 1 + len(table.rows)
+        for figure in section.figures:
+            assert (tmp_path / "figures" / f"{figure.name}.png").stat().st_size > 1000
+            assert f"figures/{figure.name}.png" in markdown
