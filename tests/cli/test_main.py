@@ -30,6 +30,7 @@ COMMANDS = {
     "evaluate",
     "oracle",
     "reproduce",
+    "report",
 }
 
 

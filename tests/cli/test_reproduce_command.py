@@ -1,4 +1,5 @@
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,6 +42,26 @@ def test_an_experiment_from_dumps_to_report(clearway, dumps: Path, tmp_path: Pat
     assert len(runs) == 2  # two rewards, one seed
     assert clearway(*words).json["sections"] == content["sections"]
     assert sorted(path.name for path in (out / "runs").iterdir()) == runs
+
+
+def test_a_report_from_what_is_complete(clearway, dumps: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert clearway("reproduce", "fig5", "--scenes", dumps, "--out", out, "--learners", "default").code == 0
+    whole = json.loads((out / "report.json").read_text())["sections"]
+    first, *_ = sorted((out / "runs").iterdir())
+    shutil.rmtree(first)
+    (section,) = clearway("report", out, "--json").json["sections"]
+    assert section["missing"] == [first.name]
+    assert not first.exists()  # nothing was trained
+    assert clearway("reproduce", "fig5", "--scenes", dumps, "--out", out, "--learners", "default").code == 0
+    assert json.loads((out / "report.json").read_text())["sections"] == whole
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", '{"names": ["fig5"]}', '{"dumps": [], "unknown": 1}'])
+def test_a_folder_without_a_reproduction_is_refused(clearway, tmp_path: Path, content: str | None) -> None:
+    if content is not None:
+        (tmp_path / "reproduction.json").write_text(content)
+    clearway("report", tmp_path).refusal(str(tmp_path), "clearway reproduce")
 
 
 def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from clearway.cli.evaluate import Evaluate
 from clearway.cli.floor_plan import FromFloorPlan
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
-from clearway.cli.reproduce import Reproduce
+from clearway.cli.reproduce import Report, Reproduce
 from clearway.cli.scenes import Build, Import, Inspect
 from clearway.cli.train import Train
 from clearway.errors import ClearwayError
@@ -55,6 +55,7 @@ Command = (
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Oracle, tyro.conf.subcommand("oracle")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
 )
 
 

@@ -1,4 +1,4 @@
-"""`clearway reproduce`."""
+"""`clearway reproduce` and `clearway report`."""
 
 from __future__ import annotations
 
@@ -55,7 +55,6 @@ class Reproduce:
         from clearway.experiments.catalogue import EXPERIMENTS
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
         from clearway.experiments.setting import PUBLISHED, PUBLISHED_ASYNC, RECIPE
-        from clearway.viz.report import JSON, MARKDOWN
 
         check_at_least(1, threads=self.threads)
         if self.seeds is not None:
@@ -74,17 +73,34 @@ class Reproduce:
             workers=self.workers,
             threads=self.threads,
         )
-        page = _write(reproduce(request, show_progress=True), self.out)
-        if self.json:
-            import json
-
-            print_json(json.loads((self.out / JSON).read_text(encoding="utf-8")))
-        stderr_console().print(f"report: {page} and {self.out / MARKDOWN}", highlight=False)
+        _write(reproduce(request, show_progress=True), self.out, self.json)
 
 
-def _write(found: Reproduction, out: Path) -> Path:
+@dataclass(frozen=True)
+class Report:
+    """Write the report of a reproduction anew, from what is complete by now.
+
+    Example: clearway report reproduction
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional] = Path("reproduction")
+    """The folder that clearway reproduce writes to; it may be at work."""
+    json: bool = False
+    """Print the report as JSON."""
+
+    def run(self) -> None:
+        """Write the report, say where it is."""
+        from clearway.experiments.reproduce import gather
+
+        _write(gather(self.folder), self.folder, self.json)
+
+
+def _write(found: Reproduction, out: Path, as_json: bool) -> None:
+    """Write the report into a folder and say where it is, or print it."""
+    import json
+
     from clearway.learn.run_folder import hardware, package_versions
-    from clearway.viz.report import SMOKE_WARNING, write_report
+    from clearway.viz.report import JSON, MARKDOWN, SMOKE_WARNING, write_report
 
     setting = found.setting
     budget = setting.budget
@@ -99,4 +115,7 @@ def _write(found: Reproduction, out: Path) -> Path:
         "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
     }
     warning = SMOKE_WARNING if budget.name == "smoke" else ""
-    return write_report(out, "The paper's experiments, redone", found.sections, facts, warning)
+    page = write_report(out, "The paper's experiments, redone", found.sections, facts, warning)
+    if as_json:
+        print_json(json.loads((out / JSON).read_text(encoding="utf-8")))
+    stderr_console().print(f"report: {page} and {out / MARKDOWN}", highlight=False)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from clearway.errors import RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS, BudgetName
 from clearway.experiments.catalogue import EXPERIMENTS, ExperimentName
@@ -14,6 +16,7 @@ from clearway.experiments.local import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
 from clearway.experiments.setting import PUBLISHED, RECIPE, Setting, prepare
+from clearway.files import written_whole
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,9 @@ class Reproduction:
     sections: list[Section]
 
 
+REQUEST_FILE = "reproduction.json"
+
+
 def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reproduction:
     """Do what is missing of the experiments and gather their sections.
 
@@ -58,7 +64,41 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
         ClearwayError: a scene cannot be had, or a run failed; what is complete stays.
         KeyboardInterrupt: the user interrupted; the same command goes on.
     """
-    setting = prepare(
+    setting = _setting(request, show_progress)
+    with written_whole(request.out / REQUEST_FILE) as part:
+        part.write_text(json.dumps(_request_json(request), indent=2) + "\n", encoding="utf-8")
+    jobs = planned(setting, request.names)
+    left = [job for job in jobs if not is_done(request.out, job)]
+    workers = affordable_workers(request.workers, request.threads)
+    with board(request.out, jobs, show_progress) as show:
+        run_jobs(request.out, left, workers=workers, threads=request.threads, show=show)
+    return _gathered(request, setting)
+
+
+def gather(out: Path) -> Reproduction:
+    """The sections of a reproduction from what is complete by now; trains nothing.
+
+    Raises:
+        ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
+    """
+    path = out / REQUEST_FILE
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        dumps = [Path(dump) for dump in content.pop("dumps")]
+        request = ReproduceRequest(out=out, dumps=dumps, **content)
+    except FileNotFoundError as error:
+        raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
+    return _gathered(request, _setting(request, show_progress=False))
+
+
+def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
+    return Reproduction(setting, [EXPERIMENTS[name].section(setting) for name in request.names])
+
+
+def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
+    return prepare(
         request.out,
         BUDGETS[request.budget],
         dumps=request.dumps,
@@ -67,12 +107,11 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
         learners=request.learners,
         show_progress=show_progress,
     )
-    jobs = planned(setting, request.names)
-    left = [job for job in jobs if not is_done(request.out, job)]
-    workers = affordable_workers(request.workers, request.threads)
-    with board(request.out, jobs, show_progress) as show:
-        run_jobs(request.out, left, workers=workers, threads=request.threads, show=show)
-    return Reproduction(setting, [EXPERIMENTS[name].section(setting) for name in request.names])
+
+
+def _request_json(request: ReproduceRequest) -> dict[str, object]:
+    content = {name: value for name, value in asdict(request).items() if name not in ("out", "workers", "threads")}
+    return {**content, "dumps": [str(dump.resolve()) for dump in request.dumps]}
 
 
 def planned(setting: Setting, names: Sequence[ExperimentName]) -> list[Job]:
