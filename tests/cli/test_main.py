@@ -31,6 +31,7 @@ COMMANDS = {
     "oracle",
     "reproduce",
     "report",
+    "video",
 }
 
 

@@ -21,6 +21,7 @@ from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.reproduce import Report, Reproduce
 from clearway.cli.scenes import Build, Import, Inspect
 from clearway.cli.train import Train
+from clearway.cli.video import Video
 from clearway.errors import ClearwayError
 
 DESCRIPTION = (
@@ -56,6 +57,7 @@ Command = (
     | Annotated[Oracle, tyro.conf.subcommand("oracle")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Report, tyro.conf.subcommand("report")]
+    | Annotated[Video, tyro.conf.subcommand("video")]
 )
 
 

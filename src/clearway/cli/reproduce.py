@@ -47,6 +47,8 @@ class Reproduce:
     """Runs side by side; by default one a core, as far as memory allows."""
     threads: int = 1
     """Threads of each run. Results repeat bit for bit at one number of threads."""
+    ray: str | None = None
+    """Run on Ray: local, auto (a cluster found here) or a cluster's address; --out must be shared by its nodes."""
     json: bool = False
     """Print the report as JSON."""
 
@@ -72,6 +74,7 @@ class Reproduce:
             learners=[learners[name] for name in dict.fromkeys(self.learners)],
             workers=self.workers,
             threads=self.threads,
+            ray=self.ray,
         )
         _write(reproduce(request, show_progress=True), self.out, self.json)
 

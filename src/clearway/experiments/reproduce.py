@@ -11,6 +11,7 @@ from clearway.errors import RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS, BudgetName
 from clearway.experiments.catalogue import EXPERIMENTS, ExperimentName
+from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import is_done
 from clearway.experiments.local import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
@@ -33,6 +34,7 @@ class ReproduceRequest:
         learners: names among `setting.LEARNERS`.
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
+        ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
     """
 
     names: Sequence[ExperimentName]
@@ -44,6 +46,7 @@ class ReproduceRequest:
     learners: Sequence[str] = (PUBLISHED, RECIPE)
     workers: int | None = None
     threads: int = 1
+    ray: str | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class Reproduction:
 
 
 REQUEST_FILE = "reproduction.json"
+HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a report does not depend on
 
 
 def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reproduction:
@@ -69,9 +73,19 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
         part.write_text(json.dumps(_request_json(request), indent=2) + "\n", encoding="utf-8")
     jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
-    workers = affordable_workers(request.workers, request.threads)
     with board(request.out, jobs, show_progress) as show:
-        run_jobs(request.out, left, workers=workers, threads=request.threads, show=show)
+        if request.ray is None:
+            workers = affordable_workers(request.workers, request.threads)
+            run_jobs(request.out, left, workers=workers, threads=request.threads, show=show)
+        else:
+            run_jobs_on_ray(
+                request.out,
+                left,
+                address=request.ray,
+                workers=request.workers,
+                threads=request.threads,
+                show=show,
+            )
     return _gathered(request, setting)
 
 
@@ -110,7 +124,9 @@ def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
 
 
 def _request_json(request: ReproduceRequest) -> dict[str, object]:
-    content = {name: value for name, value in asdict(request).items() if name not in ("out", "workers", "threads")}
+    content = {
+        name: value for name, value in asdict(request).items() if name not in ("out", "workers", "threads", "ray")
+    }
     return {**content, "dumps": [str(dump.resolve()) for dump in request.dumps]}
 
 

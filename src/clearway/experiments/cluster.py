@@ -1,0 +1,108 @@
+"""Jobs on a Ray cluster: the same jobs, wherever there is room; a worker or a node that dies costs minutes.
+
+All nodes must see `out` under the same path, since a job that begins again goes on from its checkpoint there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from clearway.errors import ClearwayError, RunError
+from clearway.experiments.job import do
+from clearway.experiments.local import ATTEMPTS, JOB_BYTES, POLL_S
+from clearway.experiments.plan import Job
+
+LOCAL, AUTO = "local", "auto"
+
+
+def run_jobs_on_ray(
+    out: Path,
+    jobs: Sequence[Job],
+    *,
+    address: str,
+    workers: int | None,
+    threads: int,
+    show: Callable[[Sequence[Job]], None],
+) -> None:
+    """Do all jobs on a cluster.
+
+    Args:
+        out: folder of the reproduction, on storage that all nodes share.
+        jobs: to be done.
+        address: "local" starts Ray on this machine, "auto" finds a running cluster, or a cluster's address.
+        workers: jobs side by side under "local"; None: as many as Ray finds room for.
+        threads: processors that each job takes.
+        show: called now and then with the jobs that are not done yet.
+
+    Raises:
+        ClearwayError: Ray is not installed, the cluster cannot be reached, or a job failed.
+    """
+    if not jobs:
+        return
+    with _connected(address, workers, threads) as ray:
+        # a fresh process a job, as on one machine; a job whose worker or node dies is begun again by Ray
+        options = {"num_cpus": threads, "max_calls": 1, "max_retries": ATTEMPTS - 1, "memory": JOB_BYTES}
+        remote = ray.remote(**options)(do)
+        waiting = {remote.options(name=job.run.name).remote(out.resolve(), job, threads): job for job in jobs}
+        try:
+            while waiting:
+                done, _ = ray.wait(list(waiting), timeout=POLL_S)
+                for reference in done:
+                    _collected(ray, reference, waiting.pop(reference))
+                show(list(waiting.values()))
+        finally:
+            for reference in waiting:
+                ray.cancel(reference, force=False)  # training saves a checkpoint before it ends
+
+
+def _collected(ray: Any, reference: object, job: Job) -> None:
+    """See how a job ended.
+
+    Raises:
+        ClearwayError: badly.
+    """
+    try:
+        ray.get(reference)
+    except ray.exceptions.RayTaskError as error:
+        if isinstance(error.cause, ClearwayError):
+            raise RunError(str(error.cause)) from error
+        raise
+    except ray.exceptions.RayError as error:
+        reason = str(error).strip().splitlines()[0]
+        raise RunError(
+            f"run {job.run.name}: its worker or node died {ATTEMPTS} times ({reason}). Run the command again to go on"
+        ) from error
+
+
+@contextmanager
+def _connected(address: str, workers: int | None, threads: int) -> Iterator[Any]:
+    """Ray, connected; disconnected in the end, and stopped where it was started here."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    os.environ.setdefault("RAY_AUTH_MODE", "token")
+    try:
+        import ray
+    except ImportError as error:
+        raise RunError("--ray needs Ray. Install it: pip install 'clearway[ray]'") from error
+    started_before = ray.is_initialized()
+    options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
+    if address == LOCAL:
+        options["num_cpus"] = None if workers is None else workers * threads
+    else:
+        del options["include_dashboard"]
+    try:
+        if not started_before:
+            ray.init(address=address, **options)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise RunError(
+            f"--ray {address}: no cluster to be reached ({reason}). Start one, or give --ray local"
+        ) from error
+    try:
+        yield ray
+    finally:
+        if not started_before:
+            ray.shutdown()

@@ -1,0 +1,121 @@
+"""A film of one episode: the agent's view, the target, the map with zones and the path so far, action probabilities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image, ImageDraw, ImageFont
+
+from clearway import colours
+from clearway.envs.record import Episode
+from clearway.envs.render import Renderer
+from clearway.envs.world import World
+from clearway.errors import ClearwayError
+from clearway.evaluate.episodes import Trajectory
+from clearway.files import written_whole
+from clearway.model.policy import Policy
+from clearway.scenes.actions import Action
+from clearway.scenes.scene import Scene
+
+STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
+FRAMES_PER_S = 3
+LAST_FRAME_TIMES = 6  # the last frame stays for so many
+SUFFIXES = (".mp4", ".gif")
+
+
+@dataclass(frozen=True)
+class Walked:
+    """An episode to be shown.
+
+    Attributes:
+        world: where it was walked.
+        target: index of the world's target.
+        trajectory: states and actions.
+        probabilities: (T + 1, A) of the actions, before each step and after the last.
+    """
+
+    world: World
+    target: int
+    trajectory: Trajectory
+    probabilities: np.ndarray
+
+
+def walked(world: World, policy: Policy, target: int, trajectory: Trajectory, history_length: int) -> Walked:
+    """The episode with what the policy thought at each pose."""
+    states = torch.from_numpy(trajectory.states)
+    behind = torch.arange(history_length).flip(0)
+    at = (torch.arange(len(states))[:, None] - behind).clamp_min(0)  # (T + 1, K), newest last
+    with torch.no_grad():
+        probabilities = policy(states[at], torch.full((len(states),), target)).numpy()
+    return Walked(world, target, trajectory, probabilities)
+
+
+def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
+    """The frames, (height, width, 3) uint8 with even sides, one a pose; scenes: of the world, in its order."""
+    renderer = Renderer(scenes, shown.world)
+    states, actions = shown.trajectory.states, shown.trajectory.actions
+    blocked = shown.world.blocked.numpy()[states[:-1], actions]
+    for step in range(len(states)):
+        bumps = np.stack([states[:step], actions[:step]], axis=1)[blocked[:step]]
+        picture = Image.fromarray(renderer.rgb(Episode(states[: step + 1], bumps), shown.target))
+        chosen = int(actions[step]) if step < len(actions) else None
+        yield np.asarray(_with_strip(picture, shown.probabilities[step], chosen))
+
+
+def _with_strip(picture: Image.Image, probabilities: np.ndarray, chosen: int | None) -> Image.Image:
+    """The picture with a bar for each action below it; the action taken is named in full strength."""
+    width, height = picture.width // 2 * 2, (picture.height + STRIP_PX) // 2 * 2
+    frame = Image.new("RGB", (width, height), colours.PAPER)
+    frame.paste(picture, (0, 0))
+    pen, font = ImageDraw.Draw(frame), ImageFont.load_default(TEXT_PX)
+    space = (width - 2 * MARGIN_PX) // len(Action)
+    top = height - STRIP_PX
+    for action in Action:
+        left = MARGIN_PX + action * space
+        share = float(probabilities[action])
+        ink = colours.INK if action == chosen else colours.FAINT_INK
+        pen.text(
+            (left, top + 8), f"{action.name.lower().replace('_', ' ')}  {100 * share:.0f} %", ink, font, anchor="lm"
+        )
+        length = (space - MARGIN_PX) * share
+        pen.rectangle((left, top + 20, left + space - MARGIN_PX, top + 20 + BAR_PX), outline=colours.FAINT_INK)
+        if length >= 1:
+            pen.rectangle((left, top + 20, left + length, top + 20 + BAR_PX), fill=ink)
+    return frame
+
+
+def write_video(path: Path, pictures: Iterator[np.ndarray], frames_per_s: int = FRAMES_PER_S) -> None:
+    """Write an MP4 (H.264) or a GIF, by the path's ending.
+
+    Raises:
+        ClearwayError: the ending is another one.
+    """
+    if path.suffix not in SUFFIXES:
+        raise ClearwayError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}. Give another --out")
+    shown = list(pictures)
+    shown += shown[-1:] * LAST_FRAME_TIMES
+    with written_whole(path) as part:
+        if path.suffix == ".gif":
+            first, *others = [Image.fromarray(frame) for frame in shown]
+            first.save(part, "GIF", save_all=True, append_images=others, duration=1000 // frames_per_s, loop=0)
+        else:
+            _write_mp4(part, shown, frames_per_s)
+
+
+def _write_mp4(path: Path, shown: Sequence[np.ndarray], frames_per_s: int) -> None:
+    import av
+
+    height, width, _ = shown[0].shape
+    with av.open(str(path), "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=Fraction(frames_per_s))
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        for picture in shown:
+            for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)

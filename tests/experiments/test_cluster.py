@@ -1,0 +1,84 @@
+"""Jobs on Ray. Slow: starting a cluster takes some ten seconds."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import RunError
+from clearway.experiments.cluster import run_jobs_on_ray
+from clearway.experiments.job import do, episodes_of, is_done, run_folder
+from clearway.experiments.plan import Job
+from clearway.experiments.setting import RECIPE, Setting
+from clearway.reward import COLLISION_AWARE
+from small_setting import small_setting
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
+# Ray reads these when it is imported; all processes of a cluster must share the token
+os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
+ray = pytest.importorskip("ray")
+
+
+@pytest.fixture(autouse=True)
+def _disconnected() -> Iterator[None]:
+    yield
+    ray.shutdown()
+
+
+def jobs_of(setting: Setting, frames: int = 800) -> list[Job]:
+    learner = replace(setting.learners[RECIPE], frames=frames)
+    return [Job(run, (setting.trial(),)) for run in setting.runs(learner, COLLISION_AWARE)]
+
+
+def nothing(under_way: Sequence[Job]) -> None:
+    """Show nothing."""
+
+
+def same_episodes(first: Setting, second: Setting, frames: int) -> bool:
+    pairs = zip(jobs_of(first, frames), jobs_of(second, frames), strict=True)
+    tables = [
+        [episodes_of(s.out, job.run, job.trials[0]) for s, job in zip((first, second), pair, strict=True)]
+        for pair in pairs
+    ]
+    return all((a.steps == b.steps).all() and (a.collisions == b.collisions).all() for a, b in tables)
+
+
+def test_a_cluster_gives_what_this_process_gives_though_a_node_is_killed(tmp_path: Path) -> None:
+    from ray.cluster_utils import Cluster
+
+    frames = 80 * 600
+    here, there = small_setting(tmp_path / "here"), small_setting(tmp_path / "there")
+    for job in jobs_of(here, frames):
+        do(here.out, job, threads=1)
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    doomed = [cluster.add_node(num_cpus=1)]
+    jobs = jobs_of(there, frames)
+
+    def kill_a_node(under_way: Sequence[Job]) -> None:
+        if doomed and all(run_folder(there.out, job.run).metrics() for job in jobs):
+            cluster.remove_node(doomed.pop(), allow_graceful=False)
+
+    try:
+        run_jobs_on_ray(there.out, jobs, address=cluster.address, workers=None, threads=1, show=kill_a_node)
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+    assert not doomed, "both runs were over before the node was killed"
+    assert same_episodes(here, there, frames)
+
+
+def test_what_the_user_did_wrong_is_said_as_on_one_machine(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    (job,) = jobs_of(setting)
+    setting.files[0].path.write_bytes(b"not a scene")
+    with pytest.raises(RunError, match=r"bathroom\.h5"):
+        run_jobs_on_ray(setting.out, [job], address="local", workers=1, threads=1, show=nothing)
+    assert not is_done(setting.out, job)
+
+
+def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    with pytest.raises(RunError, match=r"--ray auto: no cluster.*--ray local"):
+        run_jobs_on_ray(setting.out, jobs_of(setting), address="auto", workers=None, threads=1, show=nothing)

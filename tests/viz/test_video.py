@@ -1,0 +1,91 @@
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clearway.errors import ClearwayError, RunError, SceneError
+from clearway.evaluate.single import single_episode
+from clearway.learn.load import Agent, load_agent
+from clearway.learn.train import train
+from clearway.viz.video import LAST_FRAME_TIMES, frames, walked, write_video
+from small_runs import small_learner, small_request, small_scenes
+
+
+@pytest.fixture(scope="module")
+def agent(tmp_path_factory: pytest.TempPathFactory) -> Agent:
+    folder = tmp_path_factory.mktemp("run") / "run"
+    return load_agent(train(small_request(learner=small_learner(frames=160)), folder).path)
+
+
+def episode(agent: Agent, scene: str | None = None, target: int | None = None, step_cap: int = 9):
+    return single_episode(agent, small_scenes(), scene, target, selection="sampled", step_cap=step_cap, seed=4)
+
+
+def test_the_frames_follow_the_episode(agent: Agent) -> None:
+    world, index, trajectory = episode(agent, "grid", 3)
+    assert world.scene_names[int(world.target_scene[index])] == "grid"
+    assert world.scene_state(index) == 3  # not trained on
+    shown = walked(world, agent.policy(world), index, trajectory, 4)
+    assert shown.probabilities.shape == (len(trajectory.states), 4)
+    np.testing.assert_allclose(shown.probabilities.sum(1), 1, rtol=1e-5)
+    pictures = list(frames(small_scenes(), shown))
+    assert len(pictures) == len(trajectory.states)
+    assert all(side % 2 == 0 for side in pictures[0].shape[:2])  # as H.264 wants it
+    assert all((a != b).any() for a, b in itertools.pairwise(pictures))
+
+
+def test_the_policy_is_asked_with_the_history_that_it_walked_with(agent: Agent) -> None:
+    world, index, trajectory = episode(agent)
+    asked = []
+
+    def policy(history, target):
+        asked.append((history, target))
+        return agent.policy(world)(history, target)
+
+    walked(world, policy, index, trajectory, 4)
+    ((history, target),) = asked
+    states = trajectory.states.tolist()
+    assert history[0].tolist() == [states[0]] * 4
+    assert history[5].tolist() == states[2:6]
+    assert set(target.tolist()) == {index}
+
+
+@pytest.mark.parametrize("name", ["film.mp4", "film.gif"])
+def test_a_film_can_be_read_again(agent: Agent, tmp_path: Path, name: str) -> None:
+    world, index, trajectory = episode(agent, step_cap=4)
+    pictures = list(frames(small_scenes(), walked(world, agent.policy(world), index, trajectory, 4)))
+    write_video(tmp_path / name, iter(pictures), frames_per_s=2)
+    expected = len(pictures) + LAST_FRAME_TIMES
+    if name.endswith(".gif"):
+        with Image.open(tmp_path / name) as film:
+            length_ms = 0
+            for frame in range(film.n_frames):  # equal frames become one that stays longer
+                film.seek(frame)
+                length_ms += film.info["duration"]
+        assert length_ms == 500 * expected
+        return
+    import av
+
+    with av.open(str(tmp_path / name)) as film:
+        found = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+        assert film.streams.video[0].average_rate == 2
+    assert len(found) == expected
+    assert found[0].shape == pictures[0].shape
+    assert np.abs(found[0].astype(float) - pictures[0]).mean() < 4
+
+
+def test_another_ending_is_refused_and_leaves_nothing(agent: Agent, tmp_path: Path) -> None:
+    world, index, trajectory = episode(agent, step_cap=2)
+    pictures = frames(small_scenes(), walked(world, agent.policy(world), index, trajectory, 4))
+    with pytest.raises(ClearwayError, match=r"film\.avi.*\.mp4 or \.gif"):
+        write_video(tmp_path / "film.avi", pictures)
+    assert not list(tmp_path.iterdir())
+
+
+def test_scenes_and_targets_that_are_not_there_are_refused(agent: Agent) -> None:
+    with pytest.raises(RunError, match="corridor, grid"):
+        episode(agent, "attic")
+    with pytest.raises(SceneError, match="99999"):
+        episode(agent, "grid", 99999)
