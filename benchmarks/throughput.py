@@ -65,7 +65,7 @@ STATES = (180, 408, 468, 676)
 FEATURES = 2048
 ROW_CHUNK = 4000  # rows of a naive update held at a time
 ENDLESS = 10**9  # frames of the schedules; none ends during a benchmark
-A2C = replace(DEFAULT.as_a2c(), frames=ENDLESS, hindsight=False, bootstrap_cut=False)
+A2C = replace(DEFAULT.as_a2c(), frames=ENDLESS, hindsight=False, lookahead=0.0, bootstrap_cut=False)
 PPO = replace(DEFAULT, frames=ENDLESS)
 
 

@@ -29,6 +29,8 @@ def test_the_paper_s_settings() -> None:
         "value_weight": 0.5,
         "entropy_start": 0.01,
         "entropy_end": 0.01,
+        "log_barrier": 0.0,
+        "lookahead": 0.0,
         "sum_loss": True,
         "optimiser": "rmsprop",
         "lr_start": 7.0e-4,
@@ -41,7 +43,7 @@ def test_the_paper_s_settings() -> None:
         "envs": 100,
         "envs_by": "scenes",
     }
-    without_meaning = {"ratio_clip", "siamese_step"}  # there is one pass, of one minibatch
+    without_meaning = {"ratio_clip", "siamese_step", "lookahead_temperature"}  # there is one pass, of one minibatch
     assert {name: value for name, value in asdict(PAPER_A2C).items() if name not in without_meaning} == published
 
 
@@ -49,7 +51,7 @@ def test_the_default_is_the_recipe() -> None:
     recipe = {
         "envs": 400,
         "rollout_steps": 20,
-        "step_limit": 200,
+        "step_limit": 40,
         "bootstrap_cut": True,
         "epochs": 2,
         "minibatches": 4,
@@ -61,6 +63,9 @@ def test_the_default_is_the_recipe() -> None:
         "clip_rewards": False,
         "entropy_start": 0.02,
         "entropy_end": 0.003,
+        "log_barrier": 1e-3,
+        "lookahead": 0.02,
+        "lookahead_temperature": 0.005,
         "optimiser": "adam",
         "clip_norm": 0.5,
         "clip_each_tensor": False,

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from clearway.learn.losses import Batch, actor_critic_loss, loss_gradient
+from clearway.learn.losses import Batch, actor_critic_loss, loss_gradient, merged
 
 LOG_4 = math.log(4)
 SETTINGS = {"entropy_weight": 0.1, "value_weight": 0.5, "ratio_clip": 0.2, "sum_loss": False}
@@ -110,6 +110,39 @@ def test_entropy_alone_pulls_towards_uniform() -> None:
     _, gradient = loss_gradient(output, made_batch([0], [log_prob], [0.0], [0.0]), **SETTINGS)
     assert gradient[0, 0] > 0  # descending lowers the score that stands out
     assert (gradient[0, 1:4] < 0).all()
+
+
+def test_the_log_barrier_pushes_an_impossible_action_as_hard_as_an_unlikely_one() -> None:
+    """d/dscores of -w mean_a log pi(a) = w (pi - 1/4), where the entropy's gradient vanishes with pi."""
+    settings = SETTINGS | {"entropy_weight": 0.0, "barrier_weight": 0.2}
+    scores = torch.tensor([[0.0, 0.0, 0.0, -50.0, 0.0]])
+    _, gradient = loss_gradient(scores, made_batch([0], [-math.log(3)], [0.0], [0.0]), **settings)
+    expected = 0.2 * (torch.tensor([1 / 3, 1 / 3, 1 / 3, 0.0]) - 0.25)
+    torch.testing.assert_close(gradient[0, :4], expected)
+    _, of_entropy = loss_gradient(scores, made_batch([0], [-math.log(3)], [0.0], [0.0]), **SETTINGS)
+    assert of_entropy[0, 3].abs() < 1e-12
+
+
+def test_the_policy_is_drawn_towards_what_is_better_however_unlikely() -> None:
+    """d/dscores of -w sum_a better(a) log pi(a) = w (pi sum(better) - better); rows of zeros feel nothing."""
+    settings = SETTINGS | {"entropy_weight": 0.0, "lookahead_weight": 0.2}
+    output = torch.tensor([[0.0, 0.0, 0.0, -50.0, 0.0]]).repeat(2, 1)
+    better = torch.tensor([[0.1, 0.2, 0.0, 0.7], [0.0] * 4])
+    batch = replace(made_batch([0, 0], [-math.log(3)] * 2, [0.0, 0.0], [0.0, 0.0]), better=better)
+    _, gradient = loss_gradient(output, batch, **settings)
+    pi = torch.tensor([1 / 3, 1 / 3, 1 / 3, 0.0])
+    torch.testing.assert_close(gradient[0, :4], 0.2 / 2 * (pi - better[0]))
+    assert not gradient[1, :4].any()
+    assert torch.equal(batch.rows(torch.tensor([1]), (1,)).better, better[1:])
+
+
+def test_merged_rows_are_drawn_only_where_the_first_batch_was() -> None:
+    _, batch = random_case(4)
+    first = replace(batch, better=torch.full((4, 4), 0.25), rows_per_scene=(3, 1))
+    both = merged(first, replace(batch, rows_per_scene=(2, 2)))
+    assert both.rows_per_scene == (5, 3)
+    assert both.better.sum(1).tolist() == [1, 1, 1, 0, 0, 1, 0, 0]
+    assert merged(batch, batch).better is None
 
 
 def test_rows_keep_what_belongs_together() -> None:

@@ -17,7 +17,7 @@ from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
 
-A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, step_limit=5)
+A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, lookahead=0.0, step_limit=5)
 
 
 def predicted(trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
@@ -60,6 +60,7 @@ def naive_update(trainer: Trainer, lr: float) -> SiameseActorCritic:
     entropy = -(log_pi.exp() * log_pi).sum(-1)
     error = advantage + value.detach() - value
     loss = -taken * advantage - learner.entropy_start * entropy + learner.value_weight / 2 * error**2
+    loss = loss - learner.log_barrier * log_pi.mean(-1)
     network.zero_grad()
     (loss.sum() if learner.sum_loss else loss.mean()).backward()
     if learner.optimiser == "adam":
@@ -127,6 +128,9 @@ def test_schedules_run_from_start_to_end() -> None:
     updates = [trainer.update() for _ in range(10)]
     assert trainer.finished
     assert [u.lr for u in updates] == pytest.approx([1e-2 - 9e-4 * k for k in range(10)])
+    assert learner.barrier_weight_at(0) == learner.log_barrier
+    assert learner.barrier_weight_at(learner.frames // 2) == pytest.approx(learner.log_barrier / 2)
+    assert learner.barrier_weight_at(2 * learner.frames) == 0
     assert [u.entropy_weight for u in updates] == pytest.approx([0.1 * 0.01 ** (k / 10) for k in range(10)])
     assert trainer.frames == 800
     assert trainer.updates == 10

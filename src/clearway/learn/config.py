@@ -17,6 +17,8 @@ _A3C_NEEDS = {
     "siamese_lr": 1,
     "hindsight": False,
     "balance": 0,
+    "log_barrier": 0,
+    "lookahead": 0,
     "optimiser": "rmsprop",
 }
 
@@ -34,7 +36,7 @@ class Learner:
     """How environments are divided: in proportion to the scenes' states, or as many for each scene."""
     rollout_steps: int = 20
     """Steps of every environment between updates. Of a3c: the most steps of a segment."""
-    step_limit: int = 200
+    step_limit: int = 40
     """Steps after which a training episode is cut."""
     bootstrap_cut: bool = True
     """Add the value of the pose where an episode was cut; False treats the cut as an end, as Zhu's code does."""
@@ -56,6 +58,10 @@ class Learner:
     """Lambda of generalised advantage estimation; 1 gives n-step returns."""
     hindsight: bool = True
     """Learn also from passing other targets of the scene by, with truncated importance ratios."""
+    lookahead: float = 0.02
+    """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better; 0: none."""
+    lookahead_temperature: float = 0.005
+    """How much better counts: probabilities grow by exp(advantage / temperature) at most."""
     balance: float = 3.0
     """A target's weight at reset is 1 + balance * (1 - its recent success); 0 draws all alike."""
 
@@ -77,6 +83,9 @@ class Learner:
     entropy_start: float = 0.02
     entropy_end: float = 0.003
     """The entropy bonus falls geometrically from start to end."""
+    log_barrier: float = 1e-3
+    """Weight of the mean log-probability of all actions at the start; falls linearly to 0. It keeps every action
+    possible, where the entropy bonus lets one become certain (Agarwal et al., JMLR 2021, section 5.2)."""
     sum_loss: bool = False
     """Sum the loss over a batch, as A3C does, rather than average it."""
 
@@ -108,10 +117,18 @@ class Learner:
         for name in ("discount", "gae_lambda"):
             if not 0 <= getattr(self, name) <= 1:
                 raise RunError(f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range")
-        for name in ("entropy_start", "entropy_end", "lr_start", "siamese_lr", "clip_norm", "reward_scale"):
+        for name in (
+            "entropy_start",
+            "entropy_end",
+            "lr_start",
+            "siamese_lr",
+            "clip_norm",
+            "reward_scale",
+            "lookahead_temperature",
+        ):
             if not getattr(self, name) > 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected more than 0. Give a positive {name}")
-        for name in ("lr_end", "balance", "ratio_clip", "value_weight", "feature_basis"):
+        for name in ("lr_end", "balance", "log_barrier", "lookahead", "ratio_clip", "value_weight", "feature_basis"):
             if not getattr(self, name) >= 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected at least 0. Give a larger {name}")
         if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):
@@ -131,6 +148,10 @@ class Learner:
     def entropy_weight_at(self, frames: int) -> float:
         """Weight of the entropy bonus after that many frames."""
         return self.entropy_start * (self.entropy_end / self.entropy_start) ** min(frames / self.frames, 1.0)
+
+    def barrier_weight_at(self, frames: int) -> float:
+        """Weight of the log barrier after that many frames."""
+        return self.log_barrier * (1 - min(frames / self.frames, 1.0))
 
     def as_a2c(self) -> Learner:
         """The same settings with one update a rollout."""
@@ -154,6 +175,7 @@ PAPER_A2C = Learner(
     discount=0.99,
     gae_lambda=1.0,
     hindsight=False,
+    lookahead=0.0,
     balance=0.0,
     algorithm="a2c",
     epochs=1,
@@ -162,6 +184,7 @@ PAPER_A2C = Learner(
     value_weight=0.5,
     entropy_start=0.01,
     entropy_end=0.01,
+    log_barrier=0.0,
     sum_loss=True,
     optimiser="rmsprop",
     lr_start=7.0e-4,

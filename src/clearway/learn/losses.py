@@ -1,9 +1,11 @@
 """The loss that A2C and PPO share, as a pure function of a batch.
 
-    L = mean( -min(ratio A, clip(ratio, 1 - c, 1 + c) A) - entropy_weight H(pi) + value_weight / 2 (R - V)^2 )
+    L = mean( -min(ratio A, clip(ratio, 1 - c, 1 + c) A) - entropy_weight H(pi) + value_weight / 2 (R - V)^2
+              - barrier_weight mean_a log pi(a) - lookahead_weight sum_a better(a) log pi(a) )
 
-(Schulman et al., 2017, equation 9.) On the first pass over a rollout the ratio is 1 and its gradient is A2C's,
--A grad log pi, so A2C is the case of one pass. Zhu's 0.25 (R - V)^2 is value_weight 0.5.
+(Schulman et al., 2017, equation 9; the last term is the log barrier of Agarwal et al., JMLR 2021, section 5.2.) On the
+first pass over a rollout the ratio is 1 and its gradient is A2C's, -A grad log pi, so A2C is the case of one pass.
+Zhu's 0.25 (R - V)^2 is value_weight 0.5.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ class Batch:
         log_prob: (B,) of the action when it was taken.
         advantage, value_target: (B,).
         rows_per_scene: number of rows of each scene.
+        better: (B, A) probabilities that the policy is drawn towards, see `lookahead`; all 0 in rows without; or None.
     """
 
     history: Tensor
@@ -36,6 +39,7 @@ class Batch:
     advantage: Tensor
     value_target: Tensor
     rows_per_scene: tuple[int, ...]
+    better: Tensor | None = None
 
     def __len__(self) -> int:
         """B."""
@@ -51,16 +55,21 @@ class Batch:
             self.advantage[index],
             self.value_target[index],
             rows_per_scene,
+            None if self.better is None else self.better[index],
         )
 
 
 def merged(first: Batch, second: Batch) -> Batch:
-    """The rows of two batches, each ordered by scene, as one batch ordered by scene."""
+    """The rows of two batches, each ordered by scene, as one batch ordered by scene; `better` is the first one's."""
     scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
     scene = torch.cat(
         [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
     )
     order = torch.argsort(scene, stable=True)
+
+    better = None
+    if first.better is not None:
+        better = torch.cat([first.better, first.better.new_zeros(len(second), ACTION_COUNT)])[order]
 
     def joined(name: str) -> Tensor:
         return torch.cat([getattr(first, name), getattr(second, name)])[order]
@@ -72,6 +81,7 @@ def merged(first: Batch, second: Batch) -> Batch:
         log_prob=joined("log_prob"),
         advantage=joined("advantage"),
         value_target=joined("value_target"),
+        better=better,
         rows_per_scene=tuple(a + b for a, b in zip(first.rows_per_scene, second.rows_per_scene, strict=True)),
     )
 
@@ -96,6 +106,8 @@ def actor_critic_loss(
     value_weight: float,
     ratio_clip: float,
     sum_loss: bool,
+    barrier_weight: float = 0.0,
+    lookahead_weight: float = 0.0,
 ) -> LossTerms:
     """The loss of network outputs (B, A + 1): action scores, then the value."""
     log_pi = torch.log_softmax(output[:, :ACTION_COUNT], 1)
@@ -104,7 +116,9 @@ def actor_critic_loss(
     limited = ratio.clamp(1 - ratio_clip, 1 + ratio_clip)
     policy = -torch.minimum(ratio * batch.advantage, limited * batch.advantage)
     value = 0.5 * (batch.value_target - output[:, ACTION_COUNT]).square()
-    each = policy - entropy_weight * entropy + value_weight * value
+    each = policy - entropy_weight * entropy + value_weight * value - barrier_weight * log_pi.mean(1)
+    if batch.better is not None:
+        each = each - lookahead_weight * (batch.better * log_pi).sum(1)
     total = each.sum() if sum_loss else each.mean()
     clipped = (ratio != limited).float().mean()
     return LossTerms(total, policy.mean(), value.mean(), entropy.mean(), clipped)
@@ -118,6 +132,8 @@ def loss_gradient(
     value_weight: float,
     ratio_clip: float,
     sum_loss: bool,
+    barrier_weight: float = 0.0,
+    lookahead_weight: float = 0.0,
 ) -> tuple[LossTerms, Tensor]:
     """The loss and its gradient with respect to the outputs, (B, A + 1)."""
     leaf = output.detach().requires_grad_()
@@ -129,6 +145,8 @@ def loss_gradient(
             value_weight=value_weight,
             ratio_clip=ratio_clip,
             sum_loss=sum_loss,
+            barrier_weight=barrier_weight,
+            lookahead_weight=lookahead_weight,
         )
         (gradient,) = torch.autograd.grad(terms.total, leaf)
     return LossTerms(**{name: value.detach() for name, value in vars(terms).items()}), gradient

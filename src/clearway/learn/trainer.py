@@ -18,6 +18,7 @@ from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.config import Learner
 from clearway.learn.hindsight import hindsight_batch
+from clearway.learn.lookahead import Observed, better_policy
 from clearway.learn.losses import Batch, LossTerms, loss_gradient, merged
 from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
@@ -94,6 +95,7 @@ class Trainer:
             step_limit=learner.step_limit,
             history_length=learner.history_length,
         )
+        self.observed = Observed(world)
         self.statistics = EpisodeStatistics(self.env_count, world.target_count, device)
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.one_pass = learner.epochs * learner.minibatches == 1
@@ -185,7 +187,26 @@ class Trainer:
             as_rows(value_target),
             tuple(count * learner.rollout_steps for count in rows_per_scene),
         )
+        if learner.lookahead:
+            self.observed.add(batch.history[:, -1], action, as_rows(rollout.arrived))
+            batch = replace(batch, better=self._better(batch, log_pi, rollout.kept.value))
         return batch, float(explained)
+
+    def _better(self, batch: Batch, log_pi: Tensor, value: Tensor) -> Tensor:
+        """(B, A) what looking one step ahead finds better."""
+        learner = self.learner
+        return better_policy(
+            batch.history,
+            batch.target,
+            log_pi,
+            value,
+            self.observed,
+            self.navigation,
+            self.lookup,
+            discount=learner.discount,
+            reward_scale=learner.reward_scale,
+            temperature=learner.lookahead_temperature,
+        )
 
     def _value_at_cuts(self, rollout: Rollout) -> Tensor:
         """(T, N) discounted value of the pose where an episode was cut, to be added to that step's reward; else 0."""
@@ -234,6 +255,8 @@ class Trainer:
                 value_weight=learner.value_weight,
                 ratio_clip=learner.ratio_clip,
                 sum_loss=learner.sum_loss,
+                barrier_weight=learner.barrier_weight_at(self.frames),
+                lookahead_weight=learner.lookahead,
             )
             self.lookup.backward(*rows, activations, gradient)
             siamese_moves = (number + 1) % together == 0
@@ -283,6 +306,7 @@ class Trainer:
             "statistics": self.statistics.tensors(),
             "actions": {"drawn": self.action_stream.drawn},
             "choice": {"weights": self.navigation.choice.weights},
+            "observed": {"next_state": self.observed.next_state},
         }
         return {f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()}
 
@@ -301,6 +325,7 @@ class Trainer:
         self.navigation.load_tensors(part("navigation"))
         self.statistics.load_tensors(part("statistics"))
         self.action_stream.drawn = tensors["actions.drawn"].to(self.world.device).clone()
+        self.observed.next_state = tensors["observed.next_state"].to(self.world.device).clone()
         self.navigation.choice.reweigh(tensors["choice.weights"].to(self.world.device).clone())
         self.frames, self.updates = frames, updates
         self.lookup.refresh()

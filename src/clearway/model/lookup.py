@@ -104,6 +104,8 @@ class LookupNetwork:
         net = self.network
         if siamese_weight:
             torch.mm(self.features, net.siamese_weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
+        self.fusion_in = net.fusion_weight[0].T.contiguous()  # small products are faster with (in, out) weights
+        self.scene_in = net.scene_weight.transpose(1, 2).contiguous()
         slots = self.projected[self.target_state].view(-1, self.history_length, self.width)
         self.wanted = slots.sum(1).add_(net.siamese_bias).relu_()  # (M, H)
         self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
@@ -124,12 +126,12 @@ class LookupNetwork:
         out = out or Activations.empty(len(history), self.width, history.device)
         rows = self.projected.view(-1, self.width)
         torch.add(embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen).relu_()
-        torch.addmm(self.target_term[target], out.seen, net.fusion_weight[0].T, out=out.fused).relu_()
+        torch.addmm(self.target_term[target], out.seen, self.fusion_in, out=out.fused).relu_()
         first = 0
         for scene, count in enumerate(rows_per_scene):
             if count:
                 part = out.rows(first, first + count)
-                torch.addmm(net.scene_bias[scene], part.fused, net.scene_weight[scene].T, out=part.special).relu_()
+                torch.addmm(net.scene_bias[scene], part.fused, self.scene_in[scene], out=part.special).relu_()
                 torch.addmm(net.output_bias[scene], part.special, net.output_weight[scene].T, out=part.output)
             first += count
         return out
