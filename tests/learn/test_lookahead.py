@@ -102,7 +102,7 @@ def test_a_certain_policy_learns_of_an_action_that_it_never_takes(trainer: Train
 
 
 def test_the_trainer_remembers_only_what_its_environments_did() -> None:
-    trainer = small_trainer(small_learner())
+    trainer = small_trainer(small_learner(lookahead=0.02))
     assert (trainer.observed.next_state == UNKNOWN).all()
     taken = torch.zeros_like(trainer.observed.next_state, dtype=torch.bool)
     collect = trainer.collector.collect
@@ -122,6 +122,6 @@ def test_the_trainer_remembers_only_what_its_environments_did() -> None:
 
 
 def test_without_it_nothing_is_remembered() -> None:
-    trainer = small_trainer(small_learner(lookahead=0.0))
+    trainer = small_trainer(small_learner())
     trainer.update()
     assert (trainer.observed.next_state == UNKNOWN).all()
