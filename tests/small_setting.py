@@ -7,7 +7,7 @@ from pathlib import Path
 
 from clearway.experiments.budget import SMOKE
 from clearway.experiments.plan import SceneFile
-from clearway.experiments.setting import PUBLISHED, RECIPE, Setting
+from clearway.experiments.setting import Setting
 from clearway.learn.config import DEFAULT, PAPER_A2C
 from clearway.learn.run_folder import scene_digest
 from clearway.scenes.scene import Scene
@@ -42,5 +42,5 @@ def small_setting(out: Path, seeds: int = 2) -> Setting:
         targets=((0, 13, 30), (5, 22)),
         budget=BUDGET,
         seeds=tuple(range(seeds)),
-        learners={PUBLISHED: small_learner(PAPER_A2C), RECIPE: small_learner(DEFAULT)},
+        learners={"published": small_learner(PAPER_A2C), "default": small_learner(DEFAULT)},
     )

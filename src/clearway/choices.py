@@ -10,3 +10,12 @@ ZoneLevel = Literal["pose", "cell"]
 
 RoomName = Literal["bathroom", "bedroom", "living_room", "kitchen"]
 """See `clearway.scenes.rooms`."""
+
+ExperimentName = Literal["table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis"]
+"""See `clearway.experiments.catalogue`."""
+
+BudgetName = Literal["smoke", "paper"]
+"""See `clearway.experiments.budget`."""
+
+LearnerName = Literal["published", "published-a3c", "default"]
+"""See `clearway.experiments.setting`."""

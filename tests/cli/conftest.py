@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -53,9 +54,11 @@ def call(*words: object) -> Answer:
     """Run `clearway` with these words."""
     out, err = io.StringIO(), io.StringIO()
     code = 0
-    with redirect_stdout(out), redirect_stderr(err):
+    line = [str(word) for word in words]
+    with redirect_stdout(out), redirect_stderr(err), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["clearway", *line])
         try:
-            main([str(word) for word in words])
+            main(line)
         except SystemExit as leaving:
             assert isinstance(leaving.code, int)
             code = leaving.code

@@ -2,12 +2,15 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from clearway.choices import BudgetName, ExperimentName, LearnerName
 from clearway.experiments import setting
 from clearway.experiments.budget import BUDGETS
-from clearway.learn.config import DEFAULT, PAPER_A2C
+from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.learn.config import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.scenes.thor_v1 import write_scene
 from small_runs import small_learner
 from small_setting import BUDGET, small_rooms
@@ -17,7 +20,7 @@ from small_setting import BUDGET, small_rooms
 def dumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of two small scenes; budget and learners are small too."""
     monkeypatch.setitem(BUDGETS, "smoke", BUDGET)
-    monkeypatch.setattr(setting, "_budgeted", lambda learner, budget: small_learner(learner))
+    monkeypatch.setattr(setting, "_budgeted", lambda name, budget: small_learner(setting.LEARNERS[name]))
     folder = tmp_path / "dumps"
     folder.mkdir()
     for scene in small_rooms():
@@ -52,6 +55,7 @@ def test_a_report_from_what_is_complete(clearway, dumps: Path, tmp_path: Path) -
     shutil.rmtree(first)
     (section,) = clearway("report", out, "--json").json["sections"]
     assert section["missing"] == [first.name]
+    assert "reproduce fig5" in json.loads((out / "report.json").read_text())["facts"]["command"]  # not the report's own
     assert not first.exists()  # nothing was trained
     assert clearway("reproduce", "fig5", "--scenes", dumps, "--out", out, "--learners", "default").code == 0
     assert json.loads((out / "report.json").read_text())["sections"] == whole
@@ -61,24 +65,43 @@ def test_a_report_from_what_is_complete(clearway, dumps: Path, tmp_path: Path) -
 def test_a_folder_without_a_reproduction_is_refused(clearway, tmp_path: Path, content: str | None) -> None:
     if content is not None:
         (tmp_path / "reproduction.json").write_text(content)
-    clearway("report", tmp_path).refusal(str(tmp_path), "clearway reproduce")
+    assert clearway("report", tmp_path).refusal(str(tmp_path), "clearway reproduce")
 
 
 def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:
     (scene, _) = small_rooms()
     write_scene(replace(scene, features=None, encoder=None), dumps / "bathroom.h5")
     answer = clearway("reproduce", "table1", "--scenes", dumps, "--out", tmp_path / "out")
-    answer.refusal("bathroom.h5", "no features", "clearway scenes import")
+    assert answer.refusal("bathroom.h5", "no features", "clearway scenes import")
 
 
 @pytest.mark.parametrize(
     ("words", "part"), [(("--seeds", 0), "seeds"), (("--workers", 0), "workers"), (("--threads", 0), "threads")]
 )
 def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_path: Path) -> None:
-    clearway("reproduce", "table1", "--out", tmp_path / "out", *words).refusal(part)
+    assert clearway("reproduce", "table1", "--out", tmp_path / "out", *words).refusal(part)
     assert not (tmp_path / "out").exists()
 
 
 def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
-    assert setting.LEARNERS[setting.PUBLISHED] == PAPER_A2C
-    assert setting.LEARNERS[setting.RECIPE] == DEFAULT
+    assert setting.LEARNERS == {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}
+    assert set(setting.LEARNERS) == set(get_args(LearnerName))
+    assert set(EXPERIMENTS) == set(get_args(ExperimentName))
+    assert set(BUDGETS) == set(get_args(BudgetName))
+
+
+def test_no_experiment_is_refused(clearway, tmp_path: Path) -> None:
+    assert clearway("reproduce", "--out", tmp_path / "out").refusal("no experiment", "table1", "all")
+    assert not (tmp_path / "out").exists()
+
+
+def test_rooms_beside_dumps_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:
+    answer = clearway("reproduce", "fig5", "--scenes", dumps, "--rooms", "kitchen", "--out", tmp_path / "out")
+    assert answer.refusal("--rooms", "--scenes")
+
+
+def test_other_frames_and_rooms_show_on_top() -> None:
+    changed = BUDGETS["paper"].changed(("kitchen",), 2_000_000)
+    assert (changed.frames, changed.default_frames, changed.rooms) == (2_000_000, 2_000_000, ("kitchen",))
+    assert "2,000,000" in changed.warning and "10,000,000" in changed.warning
+    assert BUDGETS["paper"].changed() == BUDGETS["paper"]

@@ -7,14 +7,13 @@ from rich.console import Console
 from clearway.experiments.board import RunState, clock, state_of, state_table
 from clearway.experiments.job import do
 from clearway.experiments.plan import Job
-from clearway.experiments.setting import RECIPE
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
 
 
 def test_a_run_s_state_is_read_from_its_files(tmp_path: Path) -> None:
     setting = small_setting(tmp_path, seeds=1)
-    (run,) = setting.runs(setting.learners[RECIPE], COLLISION_AWARE)
+    (run,) = setting.runs(setting.learners["default"], COLLISION_AWARE)
     job = Job(run, (setting.trial(),))
     assert state_of(tmp_path, job, under_way=False) == RunState(run.name, "waiting", 0, 800, None, 0, 5, None)
     assert state_of(tmp_path, job, under_way=True).state == "training"

@@ -11,7 +11,7 @@ from clearway.errors import RunError
 from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.plan import Job
-from clearway.experiments.setting import RECIPE, Setting
+from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
 
@@ -28,7 +28,7 @@ def _disconnected() -> Iterator[None]:
 
 
 def jobs_of(setting: Setting, frames: int = 800) -> list[Job]:
-    learner = replace(setting.learners[RECIPE], frames=frames)
+    learner = replace(setting.learners["default"], frames=frames)
     return [Job(run, (setting.trial(),)) for run in setting.runs(learner, COLLISION_AWARE)]
 
 

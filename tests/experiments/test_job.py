@@ -7,7 +7,6 @@ import pytest
 from clearway.errors import RunError
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.plan import Job
-from clearway.experiments.setting import RECIPE
 from clearway.learn import train
 from clearway.learn.trainer import Trainer, Update
 from clearway.reward import COLLISION_AWARE
@@ -16,9 +15,9 @@ from small_setting import small_setting
 
 def made_job(out: Path) -> Job:
     setting = small_setting(out, seeds=1)
-    learner = replace(setting.learners[RECIPE], lr_start=1e-2, lr_end=1e-2)  # every update shows
+    learner = replace(setting.learners["default"], lr_start=1e-2, lr_end=1e-2)  # every update shows
     (run,) = setting.runs(learner, COLLISION_AWARE)
-    return Job(run, (setting.trial(), setting.trial(frames=400), setting.trial(((1,), (2, 3)))))
+    return Job(run, (setting.trial(), setting.trial(halfway=True), setting.trial(((1,), (2, 3)))))
 
 
 def test_a_job_trains_and_walks_its_trials(tmp_path: Path) -> None:
@@ -74,8 +73,16 @@ def test_a_scene_that_has_changed_is_refused(tmp_path: Path) -> None:
         do(tmp_path, Job(replace(job.run, scenes=changed), job.trials), threads=1)
 
 
+def test_a_run_keeps_its_halfway_even_where_nothing_is_tried_there_yet(tmp_path: Path) -> None:
+    job = made_job(tmp_path)
+    at_the_end, halfway, _ = job.trials
+    do(tmp_path, Job(job.run, (at_the_end,)), threads=1)
+    do(tmp_path, Job(job.run, (halfway,)), threads=1)
+    assert episodes_of(tmp_path, job.run, halfway) is not None
+
+
 def test_milestones_are_kept_beside_the_checkpoints(tmp_path: Path) -> None:
     job = made_job(tmp_path)
     do(tmp_path, job, threads=1)
     folder = run_folder(tmp_path, job.run)
-    assert [path.name for path in folder.milestone(400).iterdir()] == ["frames-000000000400"]
+    assert [path.name for path in folder.milestone(job.run.halfway).iterdir()] == ["frames-000000000400"]

@@ -10,13 +10,13 @@ from clearway.experiments import local
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.local import affordable_workers, run_jobs
 from clearway.experiments.plan import Job
-from clearway.experiments.setting import RECIPE, Setting
+from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
 
 
 def jobs_of(setting: Setting) -> list[Job]:
-    runs = setting.runs(setting.learners[RECIPE], COLLISION_AWARE)
+    runs = setting.runs(setting.learners["default"], COLLISION_AWARE)
     return [Job(run, (setting.trial(),)) for run in runs]
 
 

@@ -38,7 +38,7 @@ def test_a_trial_s_name_tells_it_from_others() -> None:
     trials = [
         Trial(((1,),)),
         Trial(((2,),)),
-        Trial(((1,),), frames=400),
+        Trial(((1,),), halfway=True),
         Trial(((1,),), step_cap=9),
         Trial(((1,),), seed=2),
     ]
@@ -47,7 +47,6 @@ def test_a_trial_s_name_tells_it_from_others() -> None:
 
 def test_a_run_is_planned_once_with_all_its_trials() -> None:
     other = replace(RUN, seed=1)
-    first, second = Trial(((1,),)), Trial(((1,),), frames=400)
+    first, second = Trial(((1,),)), Trial(((1,),), halfway=True)
     jobs = merged([Job(RUN, (first,)), Job(other, (first,)), Job(RUN, (second, first))])
     assert jobs == [Job(RUN, (first, second)), Job(other, (first,))]
-    assert jobs[0].milestones == (400,)

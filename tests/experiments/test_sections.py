@@ -2,11 +2,12 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from clearway.experiments import analysis, fig3
+from clearway.experiments import analysis, fig3, hard
 from clearway.experiments.analysis import pareto_front
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.job import do, episodes_of, is_done
@@ -47,9 +48,9 @@ def test_runs_are_shared_between_experiments(setting: Setting) -> None:
 
 def test_before_any_run_every_section_says_what_is_missing(tmp_path: Path) -> None:
     empty = small_setting(tmp_path, seeds=1)
-    for name, experiment in EXPERIMENTS.items():
+    for experiment in EXPERIMENTS.values():
         section = experiment.section(empty)
-        assert section.missing or name == "analysis"
+        assert section.missing
         assert all(claim.verdict == "undecided" for claim in section.claims)
 
 
@@ -60,7 +61,7 @@ def test_nothing_is_missing_in_the_end(sections: dict[str, Section]) -> None:
 
 def test_table1_holds_what_the_episodes_say(setting: Setting, sections: dict[str, Section]) -> None:
     table, by_target = sections["table1"].tables
-    (row,) = [r for r in table.rows if r[:3] == ("steps", "default recipe", "bump")]
+    (row,) = [r for r in table.rows if r[:3] == ("steps", "default", "bump")]
     runs = [job for job in planned(setting, ["table1"]) if job.run.reward.name == "bump" and job.run.learner.hindsight]
     tables = [episodes_of(setting.out, job.run, job.trials[0]) for job in runs]
     per_target = [[t.steps[t.target == m].mean() for m in range(5)] for t in tables]
@@ -70,7 +71,7 @@ def test_table1_holds_what_the_episodes_say(setting: Setting, sections: dict[str
     assert [named["bathroom"], named["kitchen"]] == pytest.approx(expected)
     assert named["average"] == pytest.approx(sum(expected) / 2)
     assert named["seeds"] == 2
-    assert len(by_target.rows) == 5 * 2 * 3 * 2  # targets, learners, rewards, seeds
+    assert len(by_target.rows) == 5 * (2 * 3 + 2) * 2  # targets, learners by rewards and two without clipping, seeds
     assert set(column(by_target, "seed")) == {0, 1}
 
 
@@ -78,14 +79,29 @@ def test_table1_has_the_exact_references_and_the_paper_s_figures(sections: dict[
     table = sections["table1"].tables[0]
     agents = column(table, "agent")
     assert {"shortest path", "optimum (collision-aware)", "soft fixed point (shortest)", "random walk"} <= set(agents)
-    paper = [row[-1] for row in table.rows if row[:3] == ("collisions", "default recipe", "collision-aware")]
+    paper = [row[-1] for row in table.rows if row[:3] == ("collisions", "default", "collision-aware")]
     assert paper == [0.082]
+
+
+def test_table1_repeats_the_clipping_learner_without_clipping(setting: Setting, sections: dict[str, Section]) -> None:
+    table = sections["table1"].tables[0]
+    kinds = {row[1:3] for row in table.rows if row[1] not in ("exact", "walked")}
+    assert {agent for learner, agent in kinds if learner == "published, unclipped"} == {"shortest", "collision-aware"}
+    assert not any(learner == "default, unclipped" for learner, _ in kinds)  # it does not clip
+    unclipped = {job.run.learner.clip_rewards for job in planned(setting, ["table1"]) if not job.run.learner.hindsight}
+    assert unclipped == {True, False}
+
+
+def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Section]) -> None:
+    both = replace(setting, learners={**setting.learners, "published-a3c": setting.learners["published"]})
+    names = [figure.name for figure in fig3.section(both).figures]
+    assert len(set(names)) == len(names) == 3 * 2
 
 
 def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
-    assert len(claims) == 4 * 4  # tables 1 to 3 and figure 4, two learners, two claims
-    assert all(claim.text.startswith(("published (A2C): ", "default recipe: ")) for claim in claims)
+    assert len(claims) == 2 + 4 * 4  # tables 1 to 3 and figure 4, two learners, two claims; one more learner in table 1
+    assert all(claim.text.startswith(("published: ", "published, unclipped: ", "default: ")) for claim in claims)
 
 
 def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
@@ -128,6 +144,13 @@ def test_the_analysis_is_solved_once(setting: Setting, monkeypatch: pytest.Monke
     before = analysis.section(setting).tables
     monkeypatch.setattr(analysis, "world_yardsticks", lambda *a, **k: pytest.fail("solved again"))
     assert analysis.section(setting).tables == before
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"scenes": {}}'])
+def test_a_damaged_file_of_kept_results_is_made_anew(setting: Setting, sections: dict, damage: str) -> None:
+    (setting.out / hard.FILE).write_text(damage)
+    assert EXPERIMENTS["table2"].section(setting) == sections["table2"]
+    assert json.loads((setting.out / hard.FILE).read_text())["rule"] == hard.RULE
 
 
 def test_pareto_front_by_hand() -> None:

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
 from clearway.cli.arguments import check_at_least, scene_files
 from clearway.cli.console import print_json, stderr_console
+from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
     from clearway.experiments.reproduce import Reproduction
-
-Name = Literal["all", "table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis"]
-LearnerName = Literal["published", "published-a3c", "default"]
 
 
 @dataclass(frozen=True)
@@ -29,14 +28,18 @@ class Reproduce:
     Example: clearway reproduce all --budget smoke
     """
 
-    names: Annotated[tuple[Name, ...], tyro.conf.Positional]
+    names: Annotated[tuple[Literal["all"] | ExperimentName, ...], tyro.conf.Positional]
     """Experiments, or all."""
     out: Path = Path("reproduction")
     """Folder of scenes, runs and the report."""
-    budget: Literal["smoke", "paper"] = "smoke"
+    budget: BudgetName = "smoke"
     """smoke: minutes, to see that it runs. paper: the paper's frames and five seeds, many hours."""
     scenes: Path | None = None
     """Folder of scene files with features, such as the published dumps, instead of the default rooms."""
+    rooms: tuple[RoomName, ...] | None = None
+    """Which of the default rooms; by default as the budget says."""
+    frames: int | None = None
+    """Training frames of every learner; by default as the budget says."""
     encoder: str = "auto"
     """For the default rooms: auto, random-resnet50, or a model's name or folder."""
     seeds: int | None = None
@@ -56,25 +59,27 @@ class Reproduce:
         """Run what is missing, write the report, say where it is."""
         from clearway.experiments.catalogue import EXPERIMENTS
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
-        from clearway.experiments.setting import PUBLISHED, PUBLISHED_ASYNC, RECIPE
 
-        check_at_least(1, threads=self.threads)
-        if self.seeds is not None:
-            check_at_least(1, seeds=self.seeds)
-        if self.workers is not None:
-            check_at_least(1, workers=self.workers)
-        learners = {"published": PUBLISHED, "published-a3c": PUBLISHED_ASYNC, "default": RECIPE}
+        check_at_least(1, threads=self.threads, seeds=self.seeds, workers=self.workers, frames=self.frames)
+        if not self.names:
+            raise ClearwayError(f"no experiment named. Name some of {', '.join(EXPERIMENTS)}, or all")
+        if self.rooms and self.scenes:
+            raise ClearwayError("--rooms are default rooms, and --scenes stand in their place. Give one of the two")
+        named = [name for name in EXPERIMENTS if name in self.names]
         request = ReproduceRequest(
-            names=tuple(EXPERIMENTS) if "all" in self.names else tuple(dict.fromkeys(self.names)),  # type: ignore[arg-type]
+            names=list(EXPERIMENTS) if "all" in self.names else named,
             out=self.out,
             budget=self.budget,
             dumps=scene_files((self.scenes,)) if self.scenes else (),
+            rooms=self.rooms,
+            frames=self.frames,
             encoder=self.encoder,
             seeds=self.seeds,
-            learners=[learners[name] for name in dict.fromkeys(self.learners)],
+            learners=list(dict.fromkeys(self.learners)),
             workers=self.workers,
             threads=self.threads,
             ray=self.ray,
+            command=shlex.join(["clearway", *sys.argv[1:]]),
         )
         _write(reproduce(request, show_progress=True), self.out, self.json)
 
@@ -103,22 +108,23 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     import json
 
     from clearway.learn.run_folder import hardware, package_versions
-    from clearway.viz.report import JSON, MARKDOWN, SMOKE_WARNING, write_report
+    from clearway.viz.report import JSON, MARKDOWN, write_report
 
     setting = found.setting
     budget = setting.budget
     facts = {
-        "command": shlex.join(["clearway", *sys.argv[1:]]),
+        "command": found.command,
         "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
         "features": setting.encoder,
         "seeds": ", ".join(map(str, setting.seeds)),
         "evaluation": f"{budget.episodes_per_target} episodes a target, at most {budget.step_cap:,} steps",
-        "learners": ", ".join(f"{name}: {learner.frames:,} frames" for name, learner in setting.learners.items()),
+        "learners": ", ".join(
+            f"{name} ({learner.algorithm}): {learner.frames:,} frames" for name, learner in setting.learners.items()
+        ),
         "versions": ", ".join(f"{name} {version}" for name, version in package_versions().items()),
         "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
     }
-    warning = SMOKE_WARNING if budget.name == "smoke" else ""
-    page = write_report(out, "The paper's experiments, redone", found.sections, facts, warning)
+    page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning)
     if as_json:
         print_json(json.loads((out / JSON).read_text(encoding="utf-8")))
     stderr_console().print(f"report: {page} and {out / MARKDOWN}", highlight=False)

@@ -22,6 +22,18 @@ class Estimate:
     value: float
     interval: tuple[float, float] | None
 
+    def __str__(self) -> str:
+        """To three significant digits, with the interval."""
+        if self.interval is None:
+            return f"{self.value:.3g}"
+        low, high = self.interval
+        return f"{self.value:.3g} [{low:.3g}, {high:.3g}]"
+
+    @property
+    def ends(self) -> str | None:
+        """The interval alone, to three significant digits."""
+        return None if self.interval is None else f"{self.interval[0]:.3g} - {self.interval[1]:.3g}"
+
 
 def mean_estimate(scores: np.ndarray, target_scene: np.ndarray, *, resamples: int = RESAMPLES) -> Estimate:
     """The plain mean over scenes of the means over their targets and all seeds.

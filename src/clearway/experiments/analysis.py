@@ -12,15 +12,15 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.envs.world import World, make_world
+from clearway.envs.world import World
+from clearway.evaluate.metrics import average, by_scene
 from clearway.evaluate.optimum import world_yardsticks
 from clearway.evaluate.oracle import ENTROPY_WEIGHT, Expected
-from clearway.experiments import table1
-from clearway.experiments.groups import compared
+from clearway.experiments.groups import PAIR, all_jobs, all_missing, compared
+from clearway.experiments.kept import keep, kept
 from clearway.experiments.plan import Job
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
-from clearway.files import written_whole
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
 
 FILE = "analysis.json"
@@ -50,11 +50,14 @@ class Point:
 PAPERS_POINT = Point(COLLISION_AWARE.beta, COLLISION_AWARE.gamma, ENTROPY_WEIGHT, True, "pose")
 
 
-def grid(smoke: bool) -> Iterator[Point]:
-    """The settings: one kind of change at a time around the paper's, and the two penalties together."""
-    betas = BETAS[:2] if smoke else BETAS
-    for beta in betas:
-        for share in GAMMA_SHARES[1:2] if smoke else GAMMA_SHARES:
+def grid(whole: bool) -> Iterator[Point]:
+    """The settings: one kind of change at a time around the paper's, and the two penalties together.
+
+    Args:
+        whole: False leaves most penalties out.
+    """
+    for beta in BETAS if whole else BETAS[:2]:
+        for share in GAMMA_SHARES if whole else GAMMA_SHARES[1:2]:
             gamma = round(COLLISION_AWARE.alpha + share * (beta - COLLISION_AWARE.alpha), 6)
             yield replace(PAPERS_POINT, beta=beta, gamma=gamma)
     for beta, gamma in ((SHORTEST.beta, SHORTEST.gamma), (PAPERS_POINT.beta, PAPERS_POINT.gamma)):
@@ -66,12 +69,12 @@ def grid(smoke: bool) -> Iterator[Point]:
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done for the agents' points: nothing that the main experiment does not do."""
-    return table1.jobs(setting)
+    return all_jobs(compared(setting, PAIR))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    found = _solved(setting, list(dict.fromkeys(grid(setting.budget.name == "smoke"))))
+    found = _solved(setting, list(dict.fromkeys(grid(setting.budget.whole_grid))))
     rows: list[tuple[Value, ...]] = []
     for point, policies in found:
         for policy, figures in policies.items():
@@ -87,6 +90,7 @@ def section(setting: Setting) -> Section:
         ),
         tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows)),),
         figures=tuple(_pareto(setting, found, metric) for metric in ("collision_visits", "collisions")),
+        missing=all_missing(compared(setting, PAIR), setting.out),
     )
 
 
@@ -96,38 +100,25 @@ Solved = list[tuple[Point, dict[str, dict[str, float]]]]
 def _solved(setting: Setting, points: Sequence[Point]) -> Solved:
     """Figures of every point; those solved before are read from the analysis's file."""
     path = setting.out / FILE
-    scenes = {file.name: [file.digest, list(own)] for file, own in zip(setting.files, setting.targets, strict=True)}
-    known: dict[str, dict] = {}
-    if path.exists():
-        content = json.loads(path.read_text(encoding="utf-8"))
-        known = content["points"] if content["scenes"] == scenes else {}
-    worlds = {level: _world(setting, level) for level in LEVELS}
+    of = {"scenes": {f.name: [f.digest, list(own)] for f, own in zip(setting.files, setting.targets, strict=True)}}
+    known: dict[str, dict] = kept(path, of, "points") or {}
+    worlds = {level: setting.world(zone_level=level) for level in LEVELS}
     for point in points:
         key = json.dumps(asdict(point))
         if key not in known:
             known[key] = _figures(worlds, point)
-            with written_whole(path) as part:
-                part.write_text(json.dumps({"scenes": scenes, "points": known}) + "\n", encoding="utf-8")
+            keep(path, of, {"points": known})
     return [(point, known[json.dumps(asdict(point))]) for point in points]
-
-
-def _world(setting: Setting, level: ZoneLevel) -> World:
-    targets = {scene.name: own for scene, own in zip(setting.scenes, setting.targets, strict=True)}
-    return make_world(setting.scenes, targets, level)
 
 
 def _figures(worlds: dict[ZoneLevel, World], point: Point) -> dict[str, dict[str, float]]:
     """Of the optimal and the soft policy. Visits are counted in the zones of the point's own level."""
     world = worlds[point.level]
     exact = [each.yardstick for each in world_yardsticks(world, point.reward, entropy_weight=point.entropy)]
-    scene = world.target_scene.numpy()
 
     def means(policies: Sequence[Expected]) -> dict[str, float]:
-        columns = {name: np.array([getattr(policy, name) for policy in policies]) for name in FIGURES}
-        return {
-            name: float(np.mean([values[scene == number].mean() for number in range(world.scene_count)]))
-            for name, values in columns.items()
-        }
+        values = np.array([[getattr(policy, name) for name in FIGURES] for policy in policies])
+        return dict(zip(FIGURES, average(by_scene(values, world.target_scene.numpy())).tolist(), strict=True))
 
     return {"optimal": means([each.optimal for each in exact]), "soft": means([each.soft for each in exact])}
 
@@ -144,7 +135,7 @@ def _pareto(setting: Setting, found: Solved, metric: str) -> ReportFigure:
         Series("the paper's setting", [x for x, _ in own], [y for _, y in own], points=True),
     ]
     world = setting.world()
-    for group in compared(setting, (SHORTEST, COLLISION_AWARE)):
+    for group in compared(setting, PAIR):
         values = group.scores(setting.out, world.target_count)
         if len(values):
             x, y = (values.of(name).mean(1).tolist() for name in ("steps", metric))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+from clearway.choices import BudgetName, RoomName
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
 from clearway.scenes.rooms import ROOM_NAMES
-
-BudgetName = Literal["smoke", "paper"]
 
 
 @dataclass(frozen=True)
@@ -23,22 +22,45 @@ class Budget:
         seeds: agents of each kind.
         episodes_per_target, step_cap: of every evaluation.
         most_scenes: scenes taken of a folder of dumps; None: all.
+        whole_grid: solve all settings of the analysis, not a few of them.
+        warning: stands on top of the report; empty for none.
     """
 
     name: BudgetName
-    rooms: tuple[str, ...]
+    rooms: tuple[RoomName, ...]
     frames: int
     default_frames: int | None
     seeds: int
     episodes_per_target: int
     step_cap: int
     most_scenes: int | None = None
+    whole_grid: bool = True
+    warning: str = ""
+
+    def changed(self, rooms: Sequence[RoomName] | None = None, frames: int | None = None) -> Budget:
+        """The budget with other rooms, or with the same number of frames for every learner; None changes nothing."""
+        found = self if rooms is None else replace(self, rooms=tuple(rooms))
+        if frames is None:
+            return found
+        warning = found.warning or f"Trained for {frames:,} frames; the paper trains for {PAPER.frames:,}."
+        return replace(found, frames=frames, default_frames=frames, warning=warning)
 
 
 PAPER = Budget("paper", ROOM_NAMES, 10_000_000, None, 5, EPISODES_PER_TARGET, STEP_CAP)
 """The paper's frames, with five seeds instead of one."""
 
-SMOKE = Budget("smoke", ("bathroom",), 24_000, 24_000, 2, 10, 1_000, most_scenes=1)
+SMOKE = Budget(
+    "smoke",
+    ("bathroom",),
+    24_000,
+    24_000,
+    2,
+    10,
+    1_000,
+    most_scenes=1,
+    whole_grid=False,
+    warning="Smoke budget: shows that everything runs. Its figures say nothing about the paper.",
+)
 """Shows within minutes that everything runs; its figures say nothing about the paper."""
 
 BUDGETS: dict[BudgetName, Budget] = {"paper": PAPER, "smoke": SMOKE}

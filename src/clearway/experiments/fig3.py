@@ -5,28 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.evaluate.episodes import EpisodeTable
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job
 from clearway.experiments.section import ReportFigure, Section, Series
 from clearway.experiments.setting import Setting
-from clearway.reward import COLLISION_AWARE, SHORTEST
 
-REWARDS = (SHORTEST, COLLISION_AWARE)
 FIGURES = {"steps": "steps so far", "collisions": "collisions so far"}
 
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done: nothing that the main experiment does not do."""
-    return all_jobs(compared(setting, REWARDS))
+    return all_jobs(compared(setting, PAIR))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    groups = compared(setting, REWARDS)
+    groups = compared(setting, PAIR)
     figures = [
         ReportFigure(
-            f"fig3_{learner.split()[0]}_{metric}",
+            f"fig3_{learner}_{metric}",
             f"{learner}: {metric} over the episodes",
             "episodes of every target",
             f"{label}, mean over targets",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from clearway.evaluate.across_seeds import mean_estimate
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import run_folder
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
@@ -15,8 +15,6 @@ from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
-REWARDS = (SHORTEST, COLLISION_AWARE)
-HALFWAY = 0.5
 METRICS = ("steps", "collisions")
 CURVE_POINTS = 50
 
@@ -44,7 +42,7 @@ def section(setting: Setting) -> Section:
 
 
 def _groups(setting: Setting) -> list[Group]:
-    return [group for after in (HALFWAY, None) for group in compared(setting, REWARDS, after=after)]
+    return [group for halfway in (True, False) for group in compared(setting, PAIR, halfway=halfway)]
 
 
 def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
@@ -52,14 +50,14 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     rows: list[tuple[Value, ...]] = []
     for group in groups:
         values = group.scores(setting.out, world.target_count)
-        frames = group.trial.frames or group.runs[0].learner.frames
+        frames = group.runs[0].halfway if group.trial.halfway else group.runs[0].learner.frames
         figures: list[Value] = []
         for metric in METRICS:
             if not len(values):
                 figures += [None, None]
                 continue
             found = mean_estimate(values.of(metric), world.target_scene.numpy())
-            figures += [found.value, None if found.interval is None else "{:.3g} - {:.3g}".format(*found.interval)]
+            figures += [found.value, found.ends]
         rows.append((group.learner, group.agent, frames, len(values), *figures))
     headings = ("learner", "agent", "frames", "seeds", "steps", "95 %", "collisions", "95 % of collisions")
     return ReportTable("fig4", "Halfway and in the end", headings, tuple(rows))
@@ -73,7 +71,7 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
         halfway = {
             group.agent: group.scores(setting.out, world.target_count)
             for group in groups
-            if group.learner == learner and group.trial.frames is not None
+            if group.learner == learner and group.trial.halfway
         }
         ours, baseline = halfway[COLLISION_AWARE.name], halfway[SHORTEST.name]
         for metric in METRICS:
@@ -86,12 +84,12 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
 def _curves(setting: Setting, groups: Sequence[Group]) -> list[ReportFigure]:
     figures = []
     for learner in setting.learners:
-        own = [group for group in groups if group.learner == learner and group.trial.frames is None]
+        own = [group for group in groups if group.learner == learner and not group.trial.halfway]
         for metric in METRICS:
             for axis in ("frames", "seconds"):
                 series = tuple(line for group in own if (line := _curve(setting, group, axis, metric)) is not None)
                 if series:
-                    name = f"fig4_{learner.split()[0]}_{metric}_{axis}"
+                    name = f"fig4_{learner}_{metric}_{axis}"
                     title = f"{learner}: {metric} of training episodes"
                     figures.append(ReportFigure(name, title, f"training {axis}", f"{metric} an episode", series))
     return figures

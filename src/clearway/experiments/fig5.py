@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.experiments import generalisation
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
-from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.scene import Scene
 
-REWARDS = (SHORTEST, COLLISION_AWARE)
 DISTANCES = (1, 2, 4, 8)
 
 
@@ -30,13 +28,13 @@ def section(setting: Setting) -> Section:
     for steps in DISTANCES:
         groups = _groups(setting, steps)
         world = setting.world(groups[0].trial.targets)
-        walked = generalisation.random_walk(world, groups[0].trial)
+        walked = random_walk(world, groups[0].trial)
         found = [(f"{g.learner}, {g.agent}", g, g.scores(setting.out, world.target_count)) for g in groups]
         for label, group, values in found:
             rows.append((steps, group.learner, group.agent, len(values), *generalisation.cells(values, world)))
             points.setdefault(label, []).append((steps, values, world))
-        rows.append((steps, None, generalisation.RANDOM, None, *generalisation.cells(walked, world)))
-        points.setdefault(generalisation.RANDOM, []).append((steps, walked, world))
+        rows.append((steps, None, RANDOM_WALK, None, *generalisation.cells(walked, world)))
+        points.setdefault(RANDOM_WALK, []).append((steps, walked, world))
         missing.update(dict.fromkeys(all_missing(groups, setting.out)))
     lines = [generalisation.line(label, own) for label, own in points.items()]
     headings = ("steps away", "learner", "agent", "seeds", *generalisation.HEADINGS)
@@ -62,7 +60,7 @@ def _known(lines: list[Series | None]) -> tuple[Series, ...]:
 
 
 def _groups(setting: Setting, steps: int) -> list[Group]:
-    return compared(setting, REWARDS, tried_on=unseen_targets(setting, steps))
+    return compared(setting, PAIR, tried_on=unseen_targets(setting, steps))
 
 
 def unseen_targets(setting: Setting, steps: int) -> TargetSets:
@@ -74,7 +72,7 @@ def _unseen(scene: Scene, trained: tuple[int, ...], steps: int) -> tuple[int, ..
     rng = np.random.default_rng([steps, scene.state_count])
     chosen: list[int] = []
     for distance in scene.distances_to(np.array(trained)):
-        free = np.setdiff1d(generalisation.states_at(distance, steps), [*trained, *chosen])
+        free = np.setdiff1d(np.flatnonzero(distance == steps), [*trained, *chosen])
         if len(free):
             chosen.append(int(rng.choice(free)))
     return tuple(sorted(chosen))

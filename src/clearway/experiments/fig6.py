@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clearway.experiments import generalisation
-from clearway.experiments.groups import Group, all_jobs, compared
+from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, compared, random_walk
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
@@ -24,9 +24,9 @@ def section(setting: Setting) -> Section:
     """What came of it."""
     held_out = held_out_targets(setting)
     world = setting.world(held_out)
-    walked = generalisation.random_walk(world, setting.trial(held_out))
+    walked = random_walk(world, setting.trial(held_out))
     rows: list[tuple[Value, ...]] = []
-    points: dict[str, list] = {generalisation.RANDOM: []}
+    points: dict[str, list] = {RANDOM_WALK: []}
     missing: dict[str, None] = {}
     for count in TRAINED:
         for group in _groups(setting, count):
@@ -34,8 +34,8 @@ def section(setting: Setting) -> Section:
             rows.append((count, group.learner, len(values), *generalisation.cells(values, world)))
             points.setdefault(group.learner, []).append((count, values, world))
             missing.update(dict.fromkeys(group.missing(setting.out)))
-        points[generalisation.RANDOM].append((count, walked, world))
-    rows.append((None, generalisation.RANDOM, None, *generalisation.cells(walked, world)))
+        points[RANDOM_WALK].append((count, walked, world))
+    rows.append((None, RANDOM_WALK, None, *generalisation.cells(walked, world)))
     lines = [generalisation.line(label, own) for label, own in points.items()]
     headings = ("targets a scene", "learner", "seeds", *generalisation.HEADINGS)
     return Section(

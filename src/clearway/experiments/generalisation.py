@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from clearway.envs.world import World
 from clearway.evaluate.across_seeds import mean_estimate
-from clearway.evaluate.episodes import run_episodes
-from clearway.evaluate.policies import random_policy
-from clearway.experiments.groups import Scores, scores
-from clearway.experiments.plan import Trial
+from clearway.experiments.groups import Scores
 from clearway.experiments.section import Series, Value
 
 METRICS = ("sc", "sc_4x", "spl")
@@ -18,7 +13,6 @@ NOTE = (
     "sc: share of episodes that reach the target in under 500 steps. It flatters: a random walk reaches much within "
     "500 steps, so beside it stand the share within 4 times the shortest path, and SPL."
 )
-RANDOM = "random walk"
 
 
 def cells(values: Scores, world: World) -> tuple[Value, ...]:
@@ -26,24 +20,8 @@ def cells(values: Scores, world: World) -> tuple[Value, ...]:
     if not len(values):
         return (None,) * len(HEADINGS)
     estimates = [mean_estimate(values.of(metric), world.target_scene.numpy()) for metric in METRICS]
-    ends = estimates[0].interval
-    return (
-        estimates[0].value,
-        None if ends is None else "{:.3g} - {:.3g}".format(*ends),
-        *(e.value for e in estimates[1:]),
-    )
-
-
-def random_walk(world: World, trial: Trial) -> Scores:
-    """The random walk's figures under the same protocol."""
-    table = run_episodes(
-        world,
-        random_policy(),
-        episodes_per_target=trial.episodes_per_target,
-        step_cap=trial.step_cap,
-        seed=trial.seed,
-    )
-    return scores({0: table}, world.target_count)
+    first, *rest = estimates
+    return (first.value, first.ends, *(estimate.value for estimate in rest))
 
 
 def line(label: str, points: list[tuple[float, Scores, World]]) -> Series | None:
@@ -58,8 +36,3 @@ def line(label: str, points: list[tuple[float, Scores, World]]) -> Series | None
     low = [each[0] for each in ends if each is not None] if complete else None
     high = [each[1] for each in ends if each is not None] if complete else None
     return Series(label, [x for x, _ in known], [found.value for _, found in known], low, high)
-
-
-def states_at(distance: np.ndarray, steps: int) -> np.ndarray:
-    """States at exactly so many steps, (n,); distance: (S,) steps from a target."""
-    return np.flatnonzero(distance == steps)

@@ -8,12 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.evaluate.episodes import EpisodeTable
+from clearway.envs.world import World
+from clearway.evaluate.episodes import EpisodeTable, run_episodes
 from clearway.evaluate.metrics import METRIC_NAMES, by_target
+from clearway.evaluate.policies import random_policy
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
 from clearway.experiments.setting import Setting
-from clearway.reward import Reward
+from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
+
+PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
+"""The two rewards that the paper compares."""
+
+RANDOM_WALK = "random walk"
 
 
 @dataclass(frozen=True)
@@ -73,34 +80,42 @@ def scores(tables: Mapping[int, EpisodeTable], target_count: int) -> Scores:
     return Scores(tuple(tables), np.stack(values) if values else np.empty((0, target_count, len(METRIC_NAMES))))
 
 
+def random_walk(world: World, trial: Trial) -> Scores:
+    """The random walk's figures on the world's targets, under the trial's protocol."""
+    table = run_episodes(
+        world,
+        random_policy(),
+        episodes_per_target=trial.episodes_per_target,
+        step_cap=trial.step_cap,
+        seed=trial.seed,
+    )
+    return scores({0: table}, world.target_count)
+
+
 def compared(
     setting: Setting,
     rewards: Sequence[Reward],
     *,
-    learners: Sequence[str] | None = None,
     targets: TargetSets | None = None,
     tried_on: TargetSets | None = None,
     frames_factor: float = 1,
-    after: float | None = None,
+    halfway: bool = False,
 ) -> list[Group]:
     """A group for each learner and reward.
 
     Args:
         setting: see there.
         rewards: to be compared.
-        learners: names; None: all of the setting.
         targets: to be trained on; None: the paper's.
         tried_on: to be tried on; None: those trained on.
         frames_factor: multiplies the learners' frames.
-        after: try the agent after this share of its frames; None: in the end.
+        halfway: try the agents halfway through their training, not in the end.
     """
     found = []
-    for name in setting.learners if learners is None else learners:
-        learner = setting.learners[name]
+    for name, learner in setting.learners.items():
         for reward in rewards:
             runs = setting.runs(learner, reward, targets, frames_factor)
-            frames = None if after is None else round(runs[0].learner.frames * after)
-            trial = setting.trial(targets if tried_on is None else tried_on, frames)
+            trial = setting.trial(targets if tried_on is None else tried_on, halfway=halfway)
             found.append(Group(name, reward.name, runs, trial))
     return found
 

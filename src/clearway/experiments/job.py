@@ -56,11 +56,11 @@ def do(out: Path, job: Job, threads: int) -> None:
         seed=run.seed,
         paths={scene.name: scene.path for scene in run.scenes},
     )
-    folder = train(request, run_folder(out, run).path, resume=True, milestones=job.milestones)
+    folder = train(request, run_folder(out, run).path, resume=True, milestones=(run.halfway,))
     for trial in job.trials:
         path = trial_path(out, run, trial)
         if not path.exists():
-            about = {"run": run.name, "frames": trial.frames, "seed": trial.seed, "step_cap": trial.step_cap}
+            about = {"run": run.name, "halfway": trial.halfway, "seed": trial.seed, "step_cap": trial.step_cap}
             write_episodes(path, _walk(folder, scenes, run, trial), about)
 
 
@@ -81,7 +81,7 @@ def _scenes(run: PlannedRun) -> list[Scene]:
 
 
 def _walk(folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Trial) -> EpisodeTable:
-    kept = None if trial.frames is None else newest_checkpoint(folder.milestone(trial.frames))
+    kept = newest_checkpoint(folder.milestone(run.halfway)) if trial.halfway else None
     agent = load_agent(folder.path, kept)
     world = make_world(scenes, {scene.name: own for scene, own in zip(scenes, trial.targets, strict=True)})
     return run_episodes(

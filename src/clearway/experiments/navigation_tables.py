@@ -9,10 +9,9 @@ import numpy as np
 
 from clearway.envs.world import World
 from clearway.evaluate.across_seeds import mean_estimate
-from clearway.evaluate.episodes import EpisodeTable, run_episodes
+from clearway.evaluate.metrics import by_scene
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
-from clearway.evaluate.policies import random_policy
-from clearway.experiments.groups import Group, Scores, scores
+from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
 from clearway.experiments.paper_numbers import REMINDER, REMINDER_ORIGINAL, PaperRow
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import ReportTable, Value
@@ -41,7 +40,7 @@ def navigation_tables(
     found = [(group, group.scores(setting.out, world.target_count)) for group in groups]
     rewards = list(dict.fromkeys(group.runs[0].reward for group in groups))
     exact = _references(world, rewards)
-    walked = scores({0: _random_walk(setting, world)}, world.target_count)
+    walked = random_walk(world, setting.trial(targets))
     rows: list[tuple[Value, ...]] = []
     for metric in METRICS:
         for group, values in found:
@@ -49,7 +48,7 @@ def navigation_tables(
             own = of_paper.of(metric, "average") if of_paper else None
             rows.append(_group_row(world, group, values, metric, own))
         rows += [_reference_row(world, agent, figures[metric], metric) for agent, figures in exact]
-        rows.append(_reference_row(world, "random walk", walked.of(metric)[0], metric, kind="walked"))
+        rows.append(_reference_row(world, RANDOM_WALK, walked.of(metric)[0], metric, kind="walked"))
     left = ("figure", "learner", "agent", "seeds", "failed targets")
     headings = (*left, *world.scene_names, "average", "95 %", PAPER_COLUMN)
     notes = (
@@ -67,8 +66,8 @@ def _group_row(world: World, group: Group, values: Scores, metric: str, of_paper
     target_scene = world.target_scene.numpy()
     failed = int((values.of("success") < 1).sum())
     estimate = mean_estimate(values.of(metric), target_scene)
-    ends = None if estimate.interval is None else "{:.3g} - {:.3g}".format(*estimate.interval)
-    return (*learnt, failed, *_by_scene(world, values.of(metric).mean(0)), estimate.value, ends, of_paper)
+    means = _by_scene(world, values.of(metric).mean(0))
+    return (*learnt, failed, *means, estimate.value, estimate.ends, of_paper)
 
 
 def _reference_row(world: World, name: str, by_target: np.ndarray, metric: str, kind: str = EXACT) -> tuple[Value, ...]:
@@ -77,8 +76,8 @@ def _reference_row(world: World, name: str, by_target: np.ndarray, metric: str, 
 
 
 def _by_scene(world: World, by_target: np.ndarray) -> list[float]:
-    scene = world.target_scene.numpy()
-    return [float(by_target[scene == number].mean()) for number in range(world.scene_count)]
+    """(M,) -> C means."""
+    return by_scene(by_target[:, None], world.target_scene.numpy())[:, 0].tolist()
 
 
 def _references(world: World, rewards: Sequence[Reward]) -> list[tuple[str, dict[str, np.ndarray]]]:
@@ -93,17 +92,6 @@ def _references(world: World, rewards: Sequence[Reward]) -> list[tuple[str, dict
             figures = {metric: np.array([getattr(policy, metric) for policy in policies]) for metric in METRICS}
             found.append((f"{name} ({reward.name})", figures))
     return found
-
-
-def _random_walk(setting: Setting, world: World) -> EpisodeTable:
-    trial = setting.trial()
-    return run_episodes(
-        world,
-        random_policy(),
-        episodes_per_target=trial.episodes_per_target,
-        step_cap=trial.step_cap,
-        seed=trial.seed,
-    )
 
 
 def _target_table(name: str, title: str, world: World, found: Sequence[tuple[Group, Scores]]) -> ReportTable:

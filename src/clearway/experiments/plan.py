@@ -44,6 +44,11 @@ class PlannedRun:
     seed: int
 
     @property
+    def halfway(self) -> int:
+        """Frames after half of the training; the agent is kept there too, see `RunFolder.milestone`."""
+        return self.learner.frames // 2
+
+    @property
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
@@ -60,13 +65,13 @@ class Trial:
 
     Attributes:
         targets: of each scene.
-        frames: try the agent as it was after so many frames; None for the trained agent.
+        halfway: try the agent as it was halfway through its training, not the trained one.
         episodes_per_target, step_cap: of the protocol.
         seed: of starts and sampled actions.
     """
 
     targets: TargetSets
-    frames: int | None = None
+    halfway: bool = False
     episodes_per_target: int = EPISODES_PER_TARGET
     step_cap: int = STEP_CAP
     seed: int = 0
@@ -75,7 +80,7 @@ class Trial:
     def name(self) -> str:
         """Name of its file in the run's folder."""
         digest = hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
-        return f"{'end' if self.frames is None else self.frames}-{sum(map(len, self.targets))}t-{digest}"
+        return f"{'halfway' if self.halfway else 'end'}-{sum(map(len, self.targets))}t-{digest}"
 
 
 @dataclass(frozen=True)
@@ -84,11 +89,6 @@ class Job:
 
     run: PlannedRun
     trials: tuple[Trial, ...]
-
-    @property
-    def milestones(self) -> tuple[int, ...]:
-        """Frames after which the agent must be kept."""
-        return tuple(sorted({trial.frames for trial in self.trials if trial.frames is not None}))
 
 
 def merged(jobs: Iterable[Job]) -> list[Job]:

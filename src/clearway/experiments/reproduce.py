@@ -7,16 +7,17 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
 from clearway.errors import RunError
 from clearway.experiments.board import board
-from clearway.experiments.budget import BUDGETS, BudgetName
-from clearway.experiments.catalogue import EXPERIMENTS, ExperimentName
+from clearway.experiments.budget import BUDGETS
+from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import is_done
 from clearway.experiments.local import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
-from clearway.experiments.setting import PUBLISHED, RECIPE, Setting, prepare
+from clearway.experiments.setting import Setting, prepare
 from clearway.files import written_whole
 
 
@@ -29,11 +30,14 @@ class ReproduceRequest:
         out: folder of everything; what is complete there is kept.
         budget: name of the budget.
         dumps: scene files; none: the default rooms.
+        rooms: which of the default rooms; None: as the budget says.
+        frames: of every learner; None: as the budget says.
         encoder: for the default rooms.
         seeds: how many; None: as the budget says.
         learners: names among `setting.LEARNERS`.
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
+        command: that asked for it, for the report.
         ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
     """
 
@@ -41,18 +45,22 @@ class ReproduceRequest:
     out: Path
     budget: BudgetName
     dumps: Sequence[Path] = ()
+    rooms: Sequence[RoomName] | None = None
+    frames: int | None = None
     encoder: str = "auto"
     seeds: int | None = None
-    learners: Sequence[str] = (PUBLISHED, RECIPE)
+    learners: Sequence[LearnerName] = ("published", "default")
     workers: int | None = None
     threads: int = 1
     ray: str | None = None
+    command: str = ""
 
 
 @dataclass(frozen=True)
 class Reproduction:
     """What came of it: the setting, and a section for each experiment."""
 
+    command: str
     setting: Setting
     sections: list[Section]
 
@@ -108,13 +116,13 @@ def gather(out: Path) -> Reproduction:
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
-    return Reproduction(setting, [EXPERIMENTS[name].section(setting) for name in request.names])
+    return Reproduction(request.command, setting, [EXPERIMENTS[name].section(setting) for name in request.names])
 
 
 def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
     return prepare(
         request.out,
-        BUDGETS[request.budget],
+        BUDGETS[request.budget].changed(request.rooms, request.frames),
         dumps=request.dumps,
         encoder=request.encoder,
         seeds=request.seeds,
@@ -124,9 +132,7 @@ def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
 
 
 def _request_json(request: ReproduceRequest) -> dict[str, object]:
-    content = {
-        name: value for name, value in asdict(request).items() if name not in ("out", "workers", "threads", "ray")
-    }
+    content = {name: value for name, value in asdict(request).items() if name not in HOW_NOT_WHAT}
     return {**content, "dumps": [str(dump.resolve()) for dump in request.dumps]}
 
 

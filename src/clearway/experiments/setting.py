@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from clearway.choices import LearnerName, ZoneLevel
 from clearway.envs.world import World, make_world
 from clearway.errors import SceneError
 from clearway.experiments.budget import Budget
@@ -20,8 +21,7 @@ from clearway.scenes.targets import ZHU_TARGETS, default_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
 SCENES = "scenes"
-PUBLISHED, PUBLISHED_ASYNC, RECIPE = "published (A2C)", "published (A3C)", "default recipe"
-LEARNERS: dict[str, Learner] = {PUBLISHED: PAPER_A2C, PUBLISHED_ASYNC: PAPER_A3C, RECIPE: DEFAULT}
+LEARNERS: dict[LearnerName, Learner] = {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Setting:
     targets: TargetSets
     budget: Budget
     seeds: tuple[int, ...]
-    learners: dict[str, Learner]
+    learners: Mapping[str, Learner]
 
     @property
     def original(self) -> bool:
@@ -55,10 +55,11 @@ class Setting:
         """Name of what made the features."""
         return ", ".join(sorted({scene.encoder.name if scene.encoder else "unknown" for scene in self.scenes}))
 
-    def world(self, targets: TargetSets | None = None) -> World:
+    def world(self, targets: TargetSets | None = None, zone_level: ZoneLevel = "pose") -> World:
         """The scenes with some targets, the paper's by default."""
         own = self.targets if targets is None else targets
-        return make_world(self.scenes, {scene.name: chosen for scene, chosen in zip(self.scenes, own, strict=True)})
+        by_name = {scene.name: chosen for scene, chosen in zip(self.scenes, own, strict=True)}
+        return make_world(self.scenes, by_name, zone_level)
 
     def runs(
         self, learner: Learner, reward: Reward, targets: TargetSets | None = None, frames_factor: float = 1
@@ -68,10 +69,10 @@ class Setting:
         own = self.targets if targets is None else targets
         return tuple(PlannedRun(self.files, own, reward, longer, seed) for seed in self.seeds)
 
-    def trial(self, targets: TargetSets | None = None, frames: int | None = None) -> Trial:
-        """The protocol on some targets, the paper's by default; of the agent after some frames, or in the end."""
+    def trial(self, targets: TargetSets | None = None, *, halfway: bool = False) -> Trial:
+        """The protocol on some targets, the paper's by default; of the agent halfway, or in the end."""
         own = self.targets if targets is None else targets
-        return Trial(own, frames, self.budget.episodes_per_target, self.budget.step_cap)
+        return Trial(own, halfway, self.budget.episodes_per_target, self.budget.step_cap)
 
 
 def prepare(
@@ -81,7 +82,7 @@ def prepare(
     dumps: Sequence[Path] = (),
     encoder: str,
     seeds: int | None = None,
-    learners: Sequence[str] = (PUBLISHED, RECIPE),
+    learners: Sequence[LearnerName],
     show_progress: bool = False,
 ) -> Setting:
     """The setting of a reproduction; default rooms are built, encoded and written to `out` the first time.
@@ -113,7 +114,7 @@ def prepare(
         targets=tuple(default_targets(scene) for scene in scenes),
         budget=budget,
         seeds=tuple(range(budget.seeds if seeds is None else seeds)),
-        learners={name: _budgeted(LEARNERS[name], budget) for name in learners},
+        learners={name: _budgeted(name, budget) for name in learners},
     )
 
 
@@ -127,6 +128,6 @@ def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) ->
     return paths
 
 
-def _budgeted(learner: Learner, budget: Budget) -> Learner:
-    frames = budget.default_frames if learner == DEFAULT else budget.frames
-    return learner if frames is None else replace(learner, frames=frames)
+def _budgeted(name: LearnerName, budget: Budget) -> Learner:
+    frames = budget.default_frames if name == "default" else budget.frames
+    return LEARNERS[name] if frames is None else replace(LEARNERS[name], frames=frames)

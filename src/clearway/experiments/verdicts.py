@@ -49,14 +49,6 @@ def _evidence(what: str, first: np.ndarray, second: np.ndarray, target_scene: np
     means = [mean_estimate(scores, target_scene) for scores in (first, second)]
     less = probability_of_less(first, second, target_scene)
     return (
-        f"{what}: {text_of(means[0])} against {text_of(means[1])}, difference {text_of(found)}; probability that a run "
-        f"has fewer: {text_of(less)}; {len(first)} and {len(second)} seeds."
+        f"{what}: {means[0]} against {means[1]}, difference {found}; probability that a run has fewer: {less}; "
+        f"{len(first)} and {len(second)} seeds."
     )
-
-
-def text_of(estimate: Estimate, digits: int = 3) -> str:
-    """A figure with its interval, to so many significant digits."""
-    if estimate.interval is None:
-        return f"{estimate.value:.{digits}g}"
-    low, high = estimate.interval
-    return f"{estimate.value:.{digits}g} [{low:.{digits}g}, {high:.{digits}g}]"

@@ -24,7 +24,6 @@ from clearway.viz.report_figures import draw_report_figure
 
 HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
 SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
-SMOKE_WARNING = "Smoke budget: shows that everything runs. Its figures say nothing about the paper."
 
 
 def write_report(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> Path:

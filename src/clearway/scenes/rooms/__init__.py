@@ -8,12 +8,13 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from clearway.choices import RoomName
 from clearway.errors import SceneError
 
 if TYPE_CHECKING:
     from clearway.scenes.rooms.room import Room
 
-ROOM_NAMES = ("bathroom", "bedroom", "living_room", "kitchen")
+ROOM_NAMES: tuple[RoomName, ...] = ("bathroom", "bedroom", "living_room", "kitchen")
 
 
 def build_room(name: str, seed: int = 0, *, looks: bool = True) -> Room:
