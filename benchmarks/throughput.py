@@ -51,7 +51,7 @@ from clearway.envs.navigation import Navigation, TargetChoice
 from clearway.envs.streams import Streams
 from clearway.envs.world import World, make_world
 from clearway.learn.config import DEFAULT, Learner
-from clearway.learn.losses import Batch, actor_critic_loss
+from clearway.learn.losses import Batch, LossSettings, actor_critic_loss
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.trainer import Trainer
@@ -184,16 +184,10 @@ class NaiveA2C:
         """One rollout and one step of the optimiser."""
         batches = self.rollout()
         rows = self.learner.envs * self.learner.rollout_steps
+        settings = replace(LossSettings.after(0, self.learner), sum_loss=True)
         self.adam.zero_grad()
         for batch in batches:
-            terms = actor_critic_loss(
-                self.predicted(batch.history, batch.target),
-                batch,
-                entropy_weight=self.learner.entropy_start,
-                value_weight=self.learner.value_weight,
-                ratio_clip=self.learner.ratio_clip,
-                sum_loss=True,
-            )
+            terms = actor_critic_loss(self.predicted(batch.history, batch.target), batch, settings)
             (terms.total / rows).backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), self.learner.clip_norm)
         self.adam.step()

@@ -12,6 +12,7 @@ from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
+from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
 
@@ -67,6 +68,23 @@ def test_a_cluster_gives_what_this_process_gives_though_a_node_is_killed(tmp_pat
         cluster.shutdown()
     assert not doomed, "both runs were over before the node was killed"
     assert same_episodes(here, there, frames)
+
+
+def test_an_interruption_saves_a_checkpoint_of_what_is_under_way(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    jobs = jobs_of(setting, frames=80 * 100_000)
+    seen: set[str] = set()
+
+    def interrupt(under_way: Sequence[Job]) -> None:
+        seen.update(job.run.name for job in under_way)
+        if seen:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_jobs_on_ray(setting.out, jobs, address="local", workers=1, threads=1, show=interrupt)
+    assert len(seen) == 1  # the other one was waiting for the only processor
+    (job,) = [job for job in jobs if job.run.name in seen]
+    assert read_progress(newest_checkpoint(run_folder(setting.out, job.run).checkpoints)).frames > 0
 
 
 def test_what_the_user_did_wrong_is_said_as_on_one_machine(tmp_path: Path) -> None:

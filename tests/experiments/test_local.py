@@ -1,5 +1,8 @@
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -85,6 +88,23 @@ def test_an_interruption_stops_all_workers_and_leaves_what_can_be_resumed(tmp_pa
     assert not local.multiprocessing.active_children()
     run_jobs(setting.out, jobs, workers=2, threads=1, show=nothing)
     assert all(is_done(setting.out, job) for job in jobs)
+
+
+def test_ctrl_c_is_said_once_and_not_by_workers(tmp_path: Path) -> None:
+    """The terminal sends SIGINT to every process of the group, also to workers that are still importing."""
+    words = ["--budget", "smoke", "--scenes", tmp_path / "scenes", "--out", tmp_path / "out", "--frames", "1000000"]
+    small_setting(tmp_path)
+    command = [sys.executable, "-m", "clearway", "reproduce", "fig3", *map(str, words)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, start_new_session=True, text=True) as process:
+        runs = tmp_path / "out" / "reproduction.json"
+        while not runs.exists():
+            time.sleep(0.02)
+        time.sleep(0.5)  # the workers are importing by now
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "interrupted" in said
 
 
 def test_memory_limits_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:

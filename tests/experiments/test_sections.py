@@ -92,6 +92,17 @@ def test_table1_repeats_the_clipping_learner_without_clipping(setting: Setting, 
     assert unclipped == {True, False}
 
 
+def test_maps_show_both_agents_from_one_start(setting: Setting, sections: dict[str, Section]) -> None:
+    shown = sections["table1"].maps
+    assert len(shown) == 3 * 2 == len({each.name for each in shown})  # learners with the unclipped one, scenes
+    for each in shown:
+        assert set(each.walks) == {"shortest", "collision-aware"}
+        assert len({walk[0] for walk in each.walks.values()}) == 1
+        (scene,) = [scene for scene in setting.scenes if scene.name == each.scene]
+        assert all(0 <= state < scene.state_count for walk in each.walks.values() for state in walk)
+        assert each.target in setting.targets[setting.scenes.index(scene)]
+
+
 def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Section]) -> None:
     both = replace(setting, learners={**setting.learners, "published-a3c": setting.learners["published"]})
     names = [figure.name for figure in fig3.section(both).figures]
@@ -157,8 +168,12 @@ def test_pareto_front_by_hand() -> None:
     assert pareto_front([(3, 1), (1, 3), (2, 2), (2, 3), (4, 1), (1, 4)]) == [(1, 3), (2, 2), (3, 1)]
 
 
-def test_the_report_is_complete_and_stands_alone(tmp_path: Path, sections: dict[str, Section]) -> None:
-    page = write_report(tmp_path, "Title", list(sections.values()), {"command": "clearway <reproduce>"}, "Only smoke.")
+def test_the_report_is_complete_and_stands_alone(
+    tmp_path: Path, setting: Setting, sections: dict[str, Section]
+) -> None:
+    page = write_report(
+        tmp_path, "Title", list(sections.values()), {"command": "clearway <reproduce>"}, "Only smoke.", setting.scenes
+    )
     html = page.read_text(encoding="utf-8")
     assert page.name == HTML
     assert "clearway &lt;reproduce&gt;" in html and "Only smoke." in html
@@ -173,6 +188,6 @@ def test_the_report_is_complete_and_stands_alone(tmp_path: Path, sections: dict[
                 rows = list(csv.reader(file))
             assert rows[0] == list(table.headings)
             assert len(rows) == 1 + len(table.rows)
-        for figure in section.figures:
+        for figure in section.pictures:
             assert (tmp_path / "figures" / f"{figure.name}.png").stat().st_size > 1000
             assert f"figures/{figure.name}.png" in markdown

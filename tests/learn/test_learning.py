@@ -10,7 +10,7 @@ from torch import Tensor
 from clearway.envs.navigation import Navigation
 from clearway.learn import trainer as trainer_module
 from clearway.learn.config import DEFAULT, Learner
-from clearway.learn.losses import Batch, loss_gradient
+from clearway.learn.losses import Batch, LossSettings, loss_gradient
 from clearway.learn.rollout import sample_actions
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
@@ -46,9 +46,9 @@ def trained(learner: Learner) -> Trainer:
     return trainer
 
 
-def flipped(output: Tensor, batch: Batch, **settings: Any) -> Any:
+def flipped(output: Tensor, batch: Batch, settings: LossSettings) -> Any:
     """The loss with every advantage's sign turned round."""
-    return loss_gradient(output, replace(batch, advantage=-batch.advantage), **settings)
+    return loss_gradient(output, replace(batch, advantage=-batch.advantage), settings)
 
 
 def solves_everything(learner: Learner) -> bool:

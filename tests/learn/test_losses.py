@@ -5,10 +5,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from clearway.learn.losses import Batch, actor_critic_loss, loss_gradient, merged
+from clearway.learn.losses import Batch, LossSettings, actor_critic_loss, loss_gradient, merged
 
 LOG_4 = math.log(4)
-SETTINGS = {"entropy_weight": 0.1, "value_weight": 0.5, "ratio_clip": 0.2, "sum_loss": False}
+SETTINGS = LossSettings(entropy_weight=0.1, value_weight=0.5, ratio_clip=0.2, sum_loss=False)
 
 
 def made_batch(action: list[int], log_prob: list[float], advantage: list[float], value_target: list[float]) -> Batch:
@@ -46,7 +46,7 @@ def random_case(rows: int) -> tuple[Tensor, Batch]:
 
 
 def test_terms_worked_by_hand() -> None:
-    terms = actor_critic_loss(uniform_output(1.0), made_batch([2], [-LOG_4], [2.0], [3.0]), **SETTINGS)
+    terms = actor_critic_loss(uniform_output(1.0), made_batch([2], [-LOG_4], [2.0], [3.0]), SETTINGS)
     assert terms.policy.item() == pytest.approx(-2.0)
     assert terms.value.item() == pytest.approx(2.0)  # half of (3 - 1)^2
     assert terms.entropy.item() == pytest.approx(LOG_4)
@@ -56,14 +56,14 @@ def test_terms_worked_by_hand() -> None:
 
 def test_value_weight_a_half_is_zhu_s_quarter_of_the_squared_error() -> None:
     batch = made_batch([0], [-LOG_4], [0.0], [3.0])
-    terms = actor_critic_loss(uniform_output(-1.0), batch, **SETTINGS | {"entropy_weight": 0.0})
+    terms = actor_critic_loss(uniform_output(-1.0), batch, replace(SETTINGS, entropy_weight=0.0))
     assert terms.total.item() == pytest.approx(0.25 * (3 - -1) ** 2)
 
 
 def test_sum_is_the_mean_times_the_rows() -> None:
     output, batch = random_case(6)
-    mean, gradient = loss_gradient(output, batch, **SETTINGS)
-    total, summed = loss_gradient(output, batch, **SETTINGS | {"sum_loss": True})
+    mean, gradient = loss_gradient(output, batch, SETTINGS)
+    total, summed = loss_gradient(output, batch, replace(SETTINGS, sum_loss=True))
     assert total.total.item() == pytest.approx(6 * mean.total.item(), rel=1e-5)
     torch.testing.assert_close(summed, 6 * gradient)
     assert total.policy.item() == pytest.approx(mean.policy.item())  # the parts are means either way
@@ -72,7 +72,7 @@ def test_sum_is_the_mean_times_the_rows() -> None:
 def test_on_the_first_pass_the_gradient_is_a2c_s() -> None:
     """d/dscores = (pi - 1_a) A + w pi (log pi + H);  d/dV = v (V - R)."""
     output, batch = random_case(9)
-    _, gradient = loss_gradient(output, batch, **SETTINGS)
+    _, gradient = loss_gradient(output, batch, SETTINGS)
     log_pi = torch.log_softmax(output[:, :4], 1)
     pi = log_pi.exp()
     entropy = -(pi * log_pi).sum(1, keepdim=True)
@@ -96,7 +96,7 @@ def test_the_clip_stops_only_steps_that_go_too_far(
     ratio: float, advantage: float, policy_loss: float, moves: bool
 ) -> None:
     batch = made_batch([1], [-LOG_4 - math.log(ratio)], [advantage], [0.0])
-    terms, gradient = loss_gradient(uniform_output(0.0), batch, **SETTINGS | {"entropy_weight": 0.0})
+    terms, gradient = loss_gradient(uniform_output(0.0), batch, replace(SETTINGS, entropy_weight=0.0))
     assert terms.policy.item() == pytest.approx(policy_loss, rel=1e-5)
     assert terms.clipped.item() == 1.0
     assert bool(gradient[0, :4].any()) == moves
@@ -107,29 +107,29 @@ def test_the_clip_stops_only_steps_that_go_too_far(
 def test_entropy_alone_pulls_towards_uniform() -> None:
     output = torch.tensor([[2.0, 0.0, 0.0, 0.0, 0.0]])
     log_prob = torch.log_softmax(output[0, :4], 0)[0].item()
-    _, gradient = loss_gradient(output, made_batch([0], [log_prob], [0.0], [0.0]), **SETTINGS)
+    _, gradient = loss_gradient(output, made_batch([0], [log_prob], [0.0], [0.0]), SETTINGS)
     assert gradient[0, 0] > 0  # descending lowers the score that stands out
     assert (gradient[0, 1:4] < 0).all()
 
 
 def test_the_log_barrier_pushes_an_impossible_action_as_hard_as_an_unlikely_one() -> None:
     """d/dscores of -w mean_a log pi(a) = w (pi - 1/4), where the entropy's gradient vanishes with pi."""
-    settings = SETTINGS | {"entropy_weight": 0.0, "barrier_weight": 0.2}
+    settings = replace(SETTINGS, entropy_weight=0.0, barrier_weight=0.2)
     scores = torch.tensor([[0.0, 0.0, 0.0, -50.0, 0.0]])
-    _, gradient = loss_gradient(scores, made_batch([0], [-math.log(3)], [0.0], [0.0]), **settings)
+    _, gradient = loss_gradient(scores, made_batch([0], [-math.log(3)], [0.0], [0.0]), settings)
     expected = 0.2 * (torch.tensor([1 / 3, 1 / 3, 1 / 3, 0.0]) - 0.25)
     torch.testing.assert_close(gradient[0, :4], expected)
-    _, of_entropy = loss_gradient(scores, made_batch([0], [-math.log(3)], [0.0], [0.0]), **SETTINGS)
+    _, of_entropy = loss_gradient(scores, made_batch([0], [-math.log(3)], [0.0], [0.0]), SETTINGS)
     assert of_entropy[0, 3].abs() < 1e-12
 
 
 def test_the_policy_is_drawn_towards_what_is_better_however_unlikely() -> None:
     """d/dscores of -w sum_a better(a) log pi(a) = w (pi sum(better) - better); rows of zeros feel nothing."""
-    settings = SETTINGS | {"entropy_weight": 0.0, "lookahead_weight": 0.2}
+    settings = replace(SETTINGS, entropy_weight=0.0, lookahead_weight=0.2)
     output = torch.tensor([[0.0, 0.0, 0.0, -50.0, 0.0]]).repeat(2, 1)
     better = torch.tensor([[0.1, 0.2, 0.0, 0.7], [0.0] * 4])
     batch = replace(made_batch([0, 0], [-math.log(3)] * 2, [0.0, 0.0], [0.0, 0.0]), better=better)
-    _, gradient = loss_gradient(output, batch, **settings)
+    _, gradient = loss_gradient(output, batch, settings)
     pi = torch.tensor([1 / 3, 1 / 3, 1 / 3, 0.0])
     torch.testing.assert_close(gradient[0, :4], 0.2 / 2 * (pi - better[0]))
     assert not gradient[1, :4].any()

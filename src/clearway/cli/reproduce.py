@@ -124,7 +124,7 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
         "versions": ", ".join(f"{name} {version}" for name, version in package_versions().items()),
         "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
     }
-    page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning)
+    page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning, setting.scenes)
     if as_json:
         print_json(json.loads((out / JSON).read_text(encoding="utf-8")))
     stderr_console().print(f"report: {page} and {out / MARKDOWN}", highlight=False)

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import ClearwayError, RunError
-from clearway.experiments.job import do
+from clearway.experiments.job import do, run_folder
 from clearway.experiments.local import ATTEMPTS, JOB_BYTES, POLL_S
 from clearway.experiments.plan import Job
+from clearway.learn.run_folder import METRICS_FILE
 
-LOCAL, AUTO = "local", "auto"
+LOCAL = "local"
+GRACE_S = 60.0  # for jobs under way to save a checkpoint when the user interrupts
 
 
 def run_jobs_on_ray(
@@ -36,7 +38,7 @@ def run_jobs_on_ray(
         address: "local" starts Ray on this machine, "auto" finds a running cluster, or a cluster's address.
         workers: jobs side by side under "local"; None: as many as Ray finds room for.
         threads: processors that each job takes.
-        show: called now and then with the jobs that are not done yet.
+        show: called now and then with those under way.
 
     Raises:
         ClearwayError: Ray is not installed, the cluster cannot be reached, or a job failed.
@@ -47,16 +49,25 @@ def run_jobs_on_ray(
         # a fresh process a job, as on one machine; a job whose worker or node dies is begun again by Ray
         options = {"num_cpus": threads, "max_calls": 1, "max_retries": ATTEMPTS - 1, "memory": JOB_BYTES}
         remote = ray.remote(**options)(do)
+        before = {job.run.name: _last_sign(out, job) for job in jobs}
         waiting = {remote.options(name=job.run.name).remote(out.resolve(), job, threads): job for job in jobs}
         try:
             while waiting:
                 done, _ = ray.wait(list(waiting), timeout=POLL_S)
                 for reference in done:
                     _collected(ray, reference, waiting.pop(reference))
-                show(list(waiting.values()))
+                show([job for job in waiting.values() if _last_sign(out, job) != before[job.run.name]])
         finally:
             for reference in waiting:
                 ray.cancel(reference, force=False)  # training saves a checkpoint before it ends
+            if waiting:
+                ray.wait(list(waiting), num_returns=len(waiting), timeout=GRACE_S)
+
+
+def _last_sign(out: Path, job: Job) -> int | None:
+    """When the job last wrote to its metrics, nanoseconds; None where it has not yet."""
+    path = run_folder(out, job.run).path / METRICS_FILE
+    return path.stat().st_mtime_ns if path.exists() else None
 
 
 def _collected(ray: Any, reference: object, job: Job) -> None:

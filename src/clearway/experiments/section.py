@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -58,6 +58,25 @@ class ReportFigure:
 
 
 @dataclass(frozen=True)
+class ReportMap:
+    """A scene from above with the ways that agents took to one target; states in the scene's own numbering.
+
+    Attributes:
+        name: of its file.
+        title: above it.
+        scene: its name.
+        target: state.
+        walks: states one after another, by the agent's name.
+    """
+
+    name: str
+    title: str
+    scene: str
+    target: int
+    walks: Mapping[str, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
 class Claim:
     """Something that the paper says, and what was found."""
 
@@ -74,7 +93,7 @@ class Section:
         name: as on the command line.
         title: of the section.
         text: what was done, in a few sentences.
-        tables, figures, claims: what came of it.
+        tables, figures, maps, claims: what came of it.
         missing: runs that are not complete, by name.
     """
 
@@ -83,5 +102,11 @@ class Section:
     text: str
     tables: tuple[ReportTable, ...] = ()
     figures: tuple[ReportFigure, ...] = ()
+    maps: tuple[ReportMap, ...] = ()
     claims: tuple[Claim, ...] = ()
     missing: tuple[str, ...] = ()
+
+    @property
+    def pictures(self) -> tuple[ReportFigure | ReportMap, ...]:
+        """Figures, then maps."""
+        return (*self.figures, *self.maps)

@@ -11,6 +11,7 @@ from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
+from clearway.experiments.trajectories import maps
 from clearway.experiments.verdicts import judged_less, judged_no_more
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
 
@@ -34,6 +35,7 @@ def section(setting: Setting) -> Section:
             "learners clip rewards to [-1, 1], as the paper's code base does; unclipped, the target is worth 10."
         ),
         tables=tables,
+        maps=maps(setting, groups),
         claims=tuple(claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )

@@ -59,7 +59,8 @@ class Learner:
     hindsight: bool = True
     """Learn also from passing other targets of the scene by, with truncated importance ratios."""
     lookahead: float = 0.0
-    """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better; 0: none."""
+    """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better, at the start;
+    falls linearly to 0. 0: none."""
     lookahead_temperature: float = 0.005
     """How much better counts: probabilities grow by exp(advantage / temperature) at most."""
     balance: float = 3.0
@@ -152,6 +153,10 @@ class Learner:
     def barrier_weight_at(self, frames: int) -> float:
         """Weight of the log barrier after that many frames."""
         return self.log_barrier * (1 - min(frames / self.frames, 1.0))
+
+    def lookahead_weight_at(self, frames: int) -> float:
+        """Weight of look-ahead after that many frames."""
+        return self.lookahead * (1 - min(frames / self.frames, 1.0))
 
     def as_a2c(self) -> Learner:
         """The same settings with one update a rollout."""

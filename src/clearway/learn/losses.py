@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from clearway.learn.config import Learner
 from clearway.scenes.actions import ACTION_COUNT
 
 
@@ -87,6 +88,30 @@ def merged(first: Batch, second: Batch) -> Batch:
 
 
 @dataclass(frozen=True)
+class LossSettings:
+    """Weights and limits of the loss, see the head of this file; `sum_loss`: sum over rows rather than average."""
+
+    entropy_weight: float
+    value_weight: float
+    ratio_clip: float
+    sum_loss: bool
+    barrier_weight: float = 0.0
+    lookahead_weight: float = 0.0
+
+    @classmethod
+    def after(cls, frames: int, learner: Learner) -> LossSettings:
+        """A learner's settings after that many frames."""
+        return cls(
+            learner.entropy_weight_at(frames),
+            learner.value_weight,
+            learner.ratio_clip,
+            learner.sum_loss,
+            learner.barrier_weight_at(frames),
+            learner.lookahead_weight_at(frames),
+        )
+
+
+@dataclass(frozen=True)
 class LossTerms:
     """The loss and its parts, scalars."""
 
@@ -98,55 +123,27 @@ class LossTerms:
     """Share of rows whose ratio lies outside the clip."""
 
 
-def actor_critic_loss(
-    output: Tensor,
-    batch: Batch,
-    *,
-    entropy_weight: float,
-    value_weight: float,
-    ratio_clip: float,
-    sum_loss: bool,
-    barrier_weight: float = 0.0,
-    lookahead_weight: float = 0.0,
-) -> LossTerms:
+def actor_critic_loss(output: Tensor, batch: Batch, settings: LossSettings) -> LossTerms:
     """The loss of network outputs (B, A + 1): action scores, then the value."""
     log_pi = torch.log_softmax(output[:, :ACTION_COUNT], 1)
     entropy = -(log_pi.exp() * log_pi).sum(1)
     ratio = (log_pi.gather(1, batch.action[:, None])[:, 0] - batch.log_prob).exp()
-    limited = ratio.clamp(1 - ratio_clip, 1 + ratio_clip)
+    limited = ratio.clamp(1 - settings.ratio_clip, 1 + settings.ratio_clip)
     policy = -torch.minimum(ratio * batch.advantage, limited * batch.advantage)
     value = 0.5 * (batch.value_target - output[:, ACTION_COUNT]).square()
-    each = policy - entropy_weight * entropy + value_weight * value - barrier_weight * log_pi.mean(1)
+    each = policy - settings.entropy_weight * entropy + settings.value_weight * value
+    each = each - settings.barrier_weight * log_pi.mean(1)
     if batch.better is not None:
-        each = each - lookahead_weight * (batch.better * log_pi).sum(1)
-    total = each.sum() if sum_loss else each.mean()
+        each = each - settings.lookahead_weight * (batch.better * log_pi).sum(1)
+    total = each.sum() if settings.sum_loss else each.mean()
     clipped = (ratio != limited).float().mean()
     return LossTerms(total, policy.mean(), value.mean(), entropy.mean(), clipped)
 
 
-def loss_gradient(
-    output: Tensor,
-    batch: Batch,
-    *,
-    entropy_weight: float,
-    value_weight: float,
-    ratio_clip: float,
-    sum_loss: bool,
-    barrier_weight: float = 0.0,
-    lookahead_weight: float = 0.0,
-) -> tuple[LossTerms, Tensor]:
+def loss_gradient(output: Tensor, batch: Batch, settings: LossSettings) -> tuple[LossTerms, Tensor]:
     """The loss and its gradient with respect to the outputs, (B, A + 1)."""
     leaf = output.detach().requires_grad_()
     with torch.enable_grad():
-        terms = actor_critic_loss(
-            leaf,
-            batch,
-            entropy_weight=entropy_weight,
-            value_weight=value_weight,
-            ratio_clip=ratio_clip,
-            sum_loss=sum_loss,
-            barrier_weight=barrier_weight,
-            lookahead_weight=lookahead_weight,
-        )
+        terms = actor_critic_loss(leaf, batch, settings)
         (gradient,) = torch.autograd.grad(terms.total, leaf)
     return LossTerms(**{name: value.detach() for name, value in vars(terms).items()}), gradient

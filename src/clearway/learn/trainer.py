@@ -19,7 +19,7 @@ from clearway.errors import RunError
 from clearway.learn.config import Learner
 from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.lookahead import Observed, better_policy
-from clearway.learn.losses import Batch, LossTerms, loss_gradient, merged
+from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient, merged
 from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
@@ -121,7 +121,7 @@ class Trainer:
             RunError: the loss or a gradient is not finite.
         """
         learner = self.learner
-        lr, entropy_weight = learner.lr_at(self.frames), learner.entropy_weight_at(self.frames)
+        lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
         rollout = self.collector.collect(self.statistics)
         batch, explained = self._batch(rollout)
@@ -129,7 +129,7 @@ class Trainer:
         if learner.hindsight:
             batch = self._with_hindsight(rollout, batch)
         kept = self.collector.kept if self.one_pass and len(batch) == rows else None
-        terms, norms = self._learn(batch, kept, lr, entropy_weight)
+        terms, norms = self._learn(batch, kept, lr, settings)
         self.frames += self.frames_per_update
         self.updates += 1
         self._rebalance()
@@ -143,7 +143,7 @@ class Trainer:
             explained_variance=explained,
             hindsight_rows=len(batch) - rows,
             lr=lr,
-            entropy_weight=entropy_weight,
+            entropy_weight=settings.entropy_weight,
         )
         check_finite(result, self.frames)
         return result
@@ -237,7 +237,7 @@ class Trainer:
         return batch if told is None else merged(batch, told)
 
     def _learn(
-        self, batch: Batch, kept: Activations | None, lr: float, entropy_weight: float
+        self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings
     ) -> tuple[list[LossTerms], list[Tensor]]:
         """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
         learner = self.learner
@@ -248,16 +248,7 @@ class Trainer:
                 self.lookup.refresh(siamese_weight=number % together == 0)
             rows = part.history, part.target, part.rows_per_scene
             activations = kept or self.lookup.forward(*rows)
-            loss, gradient = loss_gradient(
-                activations.output,
-                part,
-                entropy_weight=entropy_weight,
-                value_weight=learner.value_weight,
-                ratio_clip=learner.ratio_clip,
-                sum_loss=learner.sum_loss,
-                barrier_weight=learner.barrier_weight_at(self.frames),
-                lookahead_weight=learner.lookahead,
-            )
+            loss, gradient = loss_gradient(activations.output, part, settings)
             self.lookup.backward(*rows, activations, gradient)
             siamese_moves = (number + 1) % together == 0
             if siamese_moves:

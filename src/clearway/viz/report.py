@@ -19,14 +19,22 @@ from pathlib import Path
 
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.files import written_whole
+from clearway.scenes.scene import Scene
 from clearway.viz.page_style import CSS
-from clearway.viz.report_figures import draw_report_figure
+from clearway.viz.report_figures import draw_report_figure, draw_report_map
 
 HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
 SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
 
 
-def write_report(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> Path:
+def write_report(
+    folder: Path,
+    title: str,
+    sections: Sequence[Section],
+    facts: Mapping[str, str],
+    warning: str,
+    scenes: Sequence[Scene],
+) -> Path:
     """Write all forms of the report into a folder and give back the page's path.
 
     Args:
@@ -35,12 +43,15 @@ def write_report(folder: Path, title: str, sections: Sequence[Section], facts: M
         sections: in order.
         facts: command, seeds, versions, hardware and the like, by name.
         warning: stands at the top; empty for none.
+        scenes: those of the maps.
     """
     for section in sections:
         for table in section.tables:
             _write_csv(folder / TABLES / f"{table.name}.csv", table)
         for figure in section.figures:
             draw_report_figure(figure, folder / FIGURES / f"{figure.name}.png")
+        for shown in section.maps:
+            draw_report_map(shown, scenes, folder / FIGURES / f"{shown.name}.png")
     content = {"title": title, "warning": warning, "facts": dict(facts), "sections": [asdict(s) for s in sections]}
     texts = {
         JSON: json.dumps(content, indent=2) + "\n",
@@ -100,7 +111,7 @@ def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str],
             lines += _markdown_table(_verdict_rows(section.claims))
         for table in section.tables:
             lines += [f"### {table.title}", "", *_markdown_table(table)]
-        for figure in section.figures:
+        for figure in section.pictures:
             lines += [f"![{figure.title}]({FIGURES}/{figure.name}.png)", ""]
     lines += ["## How it was made", "", *(f"- {name}: {value}" for name, value in facts.items())]
     return "\n".join(lines) + "\n"
@@ -140,7 +151,7 @@ def _section(folder: Path, section: Section) -> str:
     pictures = "".join(
         f'<figure><img alt="{escape(figure.title)}" src="data:image/png;base64,{_encoded(folder, figure.name)}">'
         f"<figcaption>{escape(figure.title)}</figcaption></figure>"
-        for figure in section.figures
+        for figure in section.pictures
     )
     parts += [f'<div class="gallery large">{pictures}</div>'] if pictures else []
     return f'<section id="{escape(section.name)}">{"".join(parts)}</section>'

@@ -1,15 +1,28 @@
-"""The figures of a report, drawn from their data: lines with intervals, and points; readable in grey."""
+"""The figures of a report, drawn from their data: lines with intervals, points, and maps; readable in grey."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from clearway import colours
-from clearway.experiments.section import ReportFigure
+from clearway.experiments.section import ReportFigure, ReportMap
+from clearway.scenes.scene import Scene
 from clearway.viz.figures import CURVES, new_figure
+from clearway.viz.maps import Walk, draw_map
+from clearway.zones import scene_zones
 
 WIDTH_IN, HEIGHT_IN = 6.4, 3.9
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+
+def draw_report_map(shown: ReportMap, scenes: Sequence[Scene], path: Path) -> None:
+    """Draw a map, whose scene is among those given, and save it as PNG."""
+    (scene,) = [each for each in scenes if each.name == shown.scene]
+    walks = [Walk(label, np.array(states)) for label, states in shown.walks.items()]
+    draw_map(scene, path, zones=scene_zones(scene), target=shown.target, walks=walks, title=shown.title)
 
 
 def draw_report_figure(figure: ReportFigure, path: Path) -> None:

@@ -22,7 +22,7 @@ from clearway.learn.a3c.gradients import clip_scales, clipped, squared_norms, wi
 from clearway.learn.a3c.local import LocalNetwork
 from clearway.learn.a3c.rmsprop import SharedRMSPropUpdate
 from clearway.learn.config import Learner
-from clearway.learn.losses import Batch, LossTerms, loss_gradient
+from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
@@ -125,8 +125,8 @@ class WorkerGroup:
         segments = self._walk(totals)
         length = segments.length
         rates = [learner.lr_at(frames + count) for count in (length.cumsum(0) - length).tolist()]
-        entropy_weight = learner.entropy_weight_at(frames)
-        terms, gradient, explained = self._loss(segments, entropy_weight)
+        settings = replace(LossSettings.after(frames, learner), sum_loss=True)  # a mean is taken segment by segment
+        terms, gradient, explained = self._loss(segments, settings)
         norm = self._update(gradient, rates)
         steps, updates = int(length.sum()), len(rates)
         figures = Update(
@@ -139,7 +139,7 @@ class WorkerGroup:
             explained_variance=explained,
             hindsight_rows=0,
             lr=rates[0],
-            entropy_weight=entropy_weight,
+            entropy_weight=settings.entropy_weight,
         )
         return Round(steps, updates, totals, figures)
 
@@ -187,7 +187,7 @@ class WorkerGroup:
             totals.index_add_(0, self.target[ended], rows)
             self.open_collisions[ended] = 0
 
-    def _loss(self, segments: Segments, entropy_weight: float) -> tuple[LossTerms, Tensor, float]:
+    def _loss(self, segments: Segments, settings: LossSettings) -> tuple[LossTerms, Tensor, float]:
         """The loss of all steps taken, its gradient (R, T, A + 1), and the explained variance of the values."""
         learner, taken = self.learner, segments.walked
         output = self.local.output.transpose(0, 1)  # (T + 1, R, A + 1)
@@ -210,14 +210,7 @@ class WorkerGroup:
             value_target=(advantage + value[:-1])[taken],
             rows_per_scene=(),
         )
-        terms, gradient = loss_gradient(
-            scores,
-            batch,
-            entropy_weight=entropy_weight,
-            value_weight=learner.value_weight,
-            ratio_clip=learner.ratio_clip,
-            sum_loss=True,
-        )
+        terms, gradient = loss_gradient(scores, batch, settings)
         placed = torch.zeros_like(output[:-1])
         placed[taken] = gradient
         if not learner.sum_loss:

@@ -1,0 +1,35 @@
+"""One episode in each scene that the agents of both rewards walked, for the report's maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from clearway.evaluate.showcase import showcases
+from clearway.experiments.groups import PAIR, Group
+from clearway.experiments.job import episodes_of, run_folder
+from clearway.experiments.section import ReportMap
+from clearway.experiments.setting import Setting
+from clearway.learn.load import load_agent
+
+
+def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
+    """For each learner and scene the longest episode that the first seed's agents of both rewards finish.
+
+    Learners of which one of the two runs is not complete are left out.
+    """
+    found = []
+    for learner in dict.fromkeys(group.learner for group in groups):
+        world, agents = setting.world(), {}
+        for group in groups:
+            run = group.runs[0]
+            if (group.learner, run.reward in PAIR) == (learner, True) and episodes_of(setting.out, run, group.trial):
+                agents[group.agent] = load_agent(run_folder(setting.out, run).path)
+        if len(agents) == len(PAIR):
+            policies = {name: agent.policy(world) for name, agent in agents.items()}
+            length = next(iter(agents.values())).record.learner.history_length
+            for show in showcases(world, policies, history_length=length):
+                walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
+                name = f"map_{learner.replace(', ', '_')}_{show.scene}"
+                title = f"{learner}: {show.scene}, {show.shortest_path_steps} steps at least"
+                found.append(ReportMap(name, title, show.scene, show.target, walks))
+    return tuple(found)
