@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -24,7 +23,7 @@ import numpy as np
 
 from clearway.errors import RenderError
 from clearway.progress import picture_progress
-from clearway.scenes.rooms.render_worker import CANNOT_DRAW, CANNOT_DRAW_MARK
+from clearway.scenes.rooms.render_worker import CANNOT_DRAW, CANNOT_DRAW_MARK, binary_model, view_line
 
 if TYPE_CHECKING:
     import mujoco
@@ -67,7 +66,7 @@ def render(
         raise RenderError(f"{workers} renderer processes cannot render; ask for 1 or more")
     count = min(workers or _core_count(), MOST_WORKERS, len(view.shots))
     pictures = np.empty((len(view.shots), view.height_px, view.width_px, 3), np.uint8)
-    room = pickle.dumps(model, protocol=pickle.HIGHEST_PROTOCOL)
+    room = binary_model(model)
     with (
         picture_progress(label, len(pictures), progress) as show_done,
         _started_workers(count) as started,
@@ -132,13 +131,13 @@ class _Worker:
         Args:
             pictures: what to fill.
             view: the share of this worker.
-            room: the pickled model.
+            room: the model as `binary_model` makes it.
             advance: called after each picture.
         """
         assert self.process.stdin is not None and self.process.stdout is not None
         try:
             with self.process.stdin as stdin:
-                pickle.dump(view, stdin, protocol=pickle.HIGHEST_PROTOCOL)
+                stdin.write(view_line(view))
                 stdin.write(room)
         except BrokenPipeError:
             raise self._failure(0, len(pictures)) from None
