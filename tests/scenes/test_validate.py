@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.scenes.actions import Action
-from clearway.scenes.scene import Scene
+from clearway.scenes.actions import BLOCKED, Action
+from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import check_scene, pose_quirks
 from made import corridor_scene, grid_scene
 
@@ -31,7 +31,7 @@ def test_sound_scenes_pass_without_quirks(seed: int) -> None:
         ("graph", (3, 1), -2, "graph", "state 3 leads to -2"),
         ("graph", (4, Action.TURN_RIGHT), -1, "graph", "the right turn is blocked at state 4"),
         ("graph", (4, Action.TURN_LEFT), -1, "graph", "the left turn is blocked at state 4"),
-        ("graph", (4, Action.TURN_RIGHT), 6, "graph", "four right turns do not lead back"),
+        ("graph", (4, Action.TURN_RIGHT), 6, "graph", "a right and a left turn do not lead back at state 4"),
         ("graph", (4, Action.TURN_LEFT), 5, "graph", "a right and a left turn do not lead back at state 7"),
         ("features", (7, 2), np.nan, "resnet_feature", "1 states, first 7, hold NaN or Inf"),
         ("features", (7, 2), np.inf, "resnet_feature", "NaN or Inf"),
@@ -73,6 +73,48 @@ def test_one_state_is_too_few() -> None:
     scene = replace(corridor_scene(1), graph=np.zeros((1, 4), np.int32))
     with pytest.raises(SceneError, match="has 1 states"):
         check_scene(scene)
+
+
+def turning_scene(heading_counts: tuple[int, ...]) -> Scene:
+    """Cells in a row without moves, each with its own number of headings."""
+    headings, graph, first = [], [], 0
+    for count in heading_counts:
+        own = first + np.arange(count)
+        headings += [360 * k // count for k in range(count)]
+        graph += [(BLOCKED, *turns, BLOCKED) for turns in zip(np.roll(own, -1), np.roll(own, 1), strict=True)]
+        first += count
+    cell = np.repeat(np.arange(len(heading_counts)), heading_counts)
+    return Scene(
+        name="turning",
+        observations=None,
+        features=None,
+        locations_m=np.stack([0.5 * cell, 0.0 * cell], axis=1),
+        headings_deg=np.array(headings),
+        graph=np.array(graph, np.int32),
+        made_by=Provenance("test"),
+    )
+
+
+@pytest.mark.parametrize("count", [3, 4, 8, 12])
+def test_a_scene_may_have_any_number_of_headings_if_all_places_have_it(count: int) -> None:
+    scene = turning_scene((count, count))
+    check_scene(scene)
+    assert (scene.heading_count, scene.turn_deg) == (count, 360 / count)
+    assert pose_quirks(scene) == []
+    assert pose_quirks(replace(scene, headings_deg=scene.headings_deg + 1)) == [
+        f"some headings are no multiples of {360 / count:g} degrees"
+    ]
+
+
+def test_places_with_different_headings_are_refused() -> None:
+    with pytest.raises(SceneError, match=r"lead back are not 4, as elsewhere, at state 8"):
+        check_scene(turning_scene((4, 4, 3)))
+
+
+@pytest.mark.parametrize("count", [1, 2, 361])
+def test_too_few_or_too_many_headings_are_refused(count: int) -> None:
+    with pytest.raises(SceneError, match=f"has {count} headings, expected 3 to 360"):
+        check_scene(turning_scene((count, count)))
 
 
 def test_quirks_of_poses_are_told() -> None:

@@ -1,6 +1,6 @@
 """A room from above as a picture: zones of every pose, the path so far, the agent, the target.
 
-Each cell is a square of four triangles, one a heading (the upper one looks along +z), coloured by the pose's zone.
+Each cell is made of triangles, one a heading, of four a square (the upper one looks along +z), coloured by the pose's zone.
 """
 
 from __future__ import annotations
@@ -83,8 +83,9 @@ class FloorMap:
         mask = Image.new("1", size)
         pen = ImageDraw.Draw(mask)
         half = self._scene.cell_size_m / 2 * CELL_SHARE
+        aside = half * np.tan(np.deg2rad(self._scene.turn_deg) / 2)  # four triangles make a square
         for state in states.tolist():
-            pen.polygon([self._at(state), self._at(state, half, -half), self._at(state, half, half)], fill=1)
+            pen.polygon([self._at(state), self._at(state, half, -aside), self._at(state, half, aside)], fill=1)
         return np.asarray(mask)
 
     def _draw_path(self, pen: ImageDraw.ImageDraw, states: np.ndarray) -> None:

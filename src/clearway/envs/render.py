@@ -21,7 +21,7 @@ MAP_WIDTH_PX = 480
 MARGIN_PX = 16
 CAPTION_HEIGHT_PX, LEGEND_HEIGHT_PX, TEXT_SIZE_PX = 34, 42, 16
 SMOOTH_FROM_PX = 100  # pictures lower than this are made-up ones: enlarge them pixel by pixel
-ARROWS = "↑→↓←"  # headings 0, 90, 180, 270
+ARROWS = "↑↗→↘↓↙←↖"  # headings 0, 45, 90, ...
 ANSI_MARKS = {Zone.FREE: "·", Zone.PRECOLLISION: "-", Zone.COLLISION: "!"}
 
 
@@ -65,7 +65,7 @@ class Renderer:
         text = [[ANSI_MARKS[Zone(zone)] if zone >= 0 else " " for zone in column] for column in worst.tolist()]
         text[grid[goal, 0]][grid[goal, 1]] = "T"
         here = int(states[-1])
-        text[grid[here, 0]][grid[here, 1]] = ARROWS[int(scene.headings_deg[here]) // 90]
+        text[grid[here, 0]][grid[here, 1]] = ARROWS[round(scene.headings_deg[here] / 45) % len(ARROWS)]
         rows = [" ".join(text[x][z] for x in range(width)).rstrip() for z in reversed(range(depth))]
         return "\n".join([self._status(episode, target), *rows])
 

@@ -58,7 +58,7 @@ class Learner:
     """Lambda of generalised advantage estimation; 1 gives n-step returns."""
     hindsight: bool = True
     """Learn also from passing other targets of the scene by, with truncated importance ratios."""
-    lookahead: float = 0.0
+    lookahead: float = 0.02
     """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better, at the start;
     falls linearly to 0. 0: none."""
     lookahead_temperature: float = 0.005
@@ -82,7 +82,7 @@ class Learner:
     value_weight: float = 0.5
     """Factor of the mean squared value error, halved: weight * 0.5 * (R - V)^2."""
     entropy_start: float = 0.02
-    entropy_end: float = 0.003
+    entropy_end: float = 0.002
     """The entropy bonus falls geometrically from start to end."""
     log_barrier: float = 1e-3
     """Weight of the mean log-probability of all actions at the start; falls linearly to 0. It keeps every action

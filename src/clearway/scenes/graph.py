@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, shortest_path
 
-from clearway.scenes.actions import BLOCKED
+from clearway.scenes.actions import BLOCKED, Action
 
 UNREACHABLE = -1
 
@@ -40,6 +40,14 @@ def distances_to(graph: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """
     steps = shortest_path(adjacency(graph).T.tocsr(), unweighted=True, indices=np.asarray(targets))
     return np.where(np.isfinite(steps), steps, UNREACHABLE).astype(np.int32)
+
+
+def turn_counts(graph: np.ndarray) -> np.ndarray:
+    """Right turns that lead each state back to itself, (S,) int; right turns must be a permutation of the states."""
+    count = len(graph)
+    turned = csr_array((np.ones(count), (np.arange(count), graph[:, Action.TURN_RIGHT])), shape=(count, count))
+    _, circle = connected_components(turned, directed=False)
+    return np.bincount(circle)[circle]
 
 
 def components(graph: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ class SceneSummary:
         name: of the scene.
         states: number of poses.
         cells: number of distinct locations.
+        headings: at each of them; a turn is 360 degrees divided by it.
         components: number of strongly connected components of the graph.
         component_sizes: states in each component, the largest first.
         mean_degree: mean number of cells that can be entered from a cell.
@@ -38,6 +39,7 @@ class SceneSummary:
     name: str
     states: int
     cells: int
+    headings: int
     components: int
     component_sizes: tuple[int, ...]
     mean_degree: float
@@ -68,6 +70,7 @@ def summary(scene: Scene) -> SceneSummary:
         name=scene.name,
         states=scene.state_count,
         cells=scene.cell_count,
+        headings=scene.heading_count,
         components=len(sizes),
         component_sizes=tuple(int(size) for size in sizes),
         mean_degree=mean_degree(scene),

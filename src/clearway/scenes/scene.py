@@ -87,7 +87,7 @@ class Scene:
         observations: (S, height, width, 3) uint8 RGB first-person pictures, read lazily; None if the file has none.
         features: (S, F) float32 frozen features of the pictures; None until they are encoded.
         locations_m: (S, 2) float64, x and z of the agent on the floor, metres.
-        headings_deg: (S,) int64, 0 looks along +z, 90 along +x (a right turn adds 90).
+        headings_deg: (S,) int64, 0 looks along +z, 90 along +x (a right turn adds `turn_deg`).
         graph: (S, A) int32, next state by action (`actions.Action`); -1 where the move is blocked.
         made_by: what made the scene.
         encoder: what made the features; None where features is None.
@@ -119,6 +119,16 @@ class Scene:
         rank = np.empty(len(first), np.int64)
         rank[np.argsort(first, kind="stable")] = np.arange(len(first))
         return rank[cell.reshape(-1)]
+
+    @cached_property
+    def heading_count(self) -> int:
+        """Headings at a location: so many right turns lead back to the same state."""
+        return int(graphs.turn_counts(self.graph)[0])
+
+    @property
+    def turn_deg(self) -> float:
+        """Angle of a turn, degrees."""
+        return 360 / self.heading_count
 
     @property
     def cell_count(self) -> int:

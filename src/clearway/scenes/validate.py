@@ -12,11 +12,13 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
+from clearway.scenes.graph import turn_counts
 from clearway.scenes.scene import Observations, Scene
 
 MIN_STATES = 2
 MAX_STATES = 65_536
 MAX_FEATURES = 65_536
+MIN_HEADINGS, MAX_HEADINGS = 3, 360
 MAX_PICTURE_SIDE = 2_048  # pixels
 MAX_COORDINATE_M = 10_000.0
 TURNS = (Action.TURN_RIGHT, Action.TURN_LEFT)
@@ -63,13 +65,21 @@ def check_graph(graph: np.ndarray, source: str | Path) -> None:
 
 
 def check_turns(graph: np.ndarray, source: str | Path) -> None:
-    """Check that turns are never blocked, four rights lead back, and right then left does. Raises SceneError."""
+    """Check that turns are never blocked, right then left leads back, and so does one number of rights everywhere.
+
+    Raises:
+        SceneError: one of these is not so.
+    """
     states = np.arange(len(graph))
     for turn in TURNS:
         _check_states(graph[:, turn] != BLOCKED, source, f"the {_words(turn)} is blocked")
     right, left = (graph[:, turn].astype(np.int64) for turn in TURNS)
-    _check_states(right[right[right[right]]] == states, source, "four right turns do not lead back")
     _check_states(left[right] == states, source, "a right and a left turn do not lead back")
+    turns = turn_counts(graph)
+    usual = int(np.bincount(turns).argmax())
+    _check_states(turns == usual, source, f"the right turns that lead back are not {usual}, as elsewhere,")
+    allowed = MIN_HEADINGS <= usual <= MAX_HEADINGS
+    _check(allowed, source, "graph", f"has {usual} headings, expected {MIN_HEADINGS} to {MAX_HEADINGS}")
 
 
 def check_features(features: np.ndarray, state_count: int, source: str | Path) -> None:
@@ -108,12 +118,13 @@ def check_observations(observations: Observations, state_count: int, source: str
 def pose_quirks(scene: Scene) -> list[str]:
     """What is odd about where the states lie and look, one sentence each; empty for a regular scene."""
     found = []
-    if np.any(scene.headings_deg % 90):
-        found.append("some headings are no multiples of 90 degrees")
+    turn_deg = scene.turn_deg
+    if np.any(scene.headings_deg % turn_deg):
+        found.append(f"some headings are no multiples of {turn_deg:g} degrees")
     turned = {turn: scene.graph[:, turn] for turn in TURNS}
-    for turn, right_deg in zip(TURNS, (90, -90), strict=True):
+    for turn, right_deg in zip(TURNS, (turn_deg, -turn_deg), strict=True):
         change_deg = (scene.headings_deg[turned[turn]] - scene.headings_deg) % 360
-        found += _quirk(change_deg != right_deg % 360, f"a {_words(turn)} changes the heading by {right_deg}")
+        found += _quirk(change_deg != right_deg % 360, f"a {_words(turn)} changes the heading by {right_deg:g}")
         far_m = np.abs(scene.locations_m[turned[turn]] - scene.locations_m).max(axis=1)
         found += _quirk(far_m > 0.1 * scene.cell_size_m, f"a {_words(turn)} keeps the location")
     for move, sign in zip(MOVES, (1, -1), strict=True):

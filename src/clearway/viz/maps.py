@@ -127,7 +127,7 @@ def _triangles(scene: Scene) -> np.ndarray:
     reach = 0.94 * scene.cell_size_m / 2
     turn = np.deg2rad(scene.headings_deg)
     ahead = np.stack([np.sin(turn), np.cos(turn)], axis=1)
-    aside = np.stack([np.cos(turn), -np.sin(turn)], axis=1)
+    aside = np.stack([np.cos(turn), -np.sin(turn)], axis=1) * np.tan(np.deg2rad(scene.turn_deg) / 2)
     corners = np.stack([0 * ahead, ahead + aside, ahead - aside], axis=1)
     return scene.locations_m[:, None] + reach * corners
 
@@ -149,7 +149,7 @@ def _draw_zones(axes: Axes, scene: Scene, zones: np.ndarray) -> list[Artist]:
         look: Look = {"facecolor": colour, "alpha": ZONE_OPACITY[zone], "linewidth": 0, "hatch": hatch}
         axes.add_collection(PolyCollection(corners[zones == zone], edgecolor=HATCH_INK, **look))
         entries.append(Patch(label=label, edgecolor=HATCH_INK, **look))
-    note = "triangles of a cell: its four headings"
+    note = f"triangles of a cell: its {scene.heading_count} headings"
     entries.append(Patch(facecolor="white", edgecolor="#b9bec5", linewidth=0.8, label=note))
     return entries
 
