@@ -17,8 +17,8 @@ K history, H width, M targets, O = 5 outputs, one update of `rows` rows needs
 
 A2C: tables once, forward for the rollout's rows and the values after its last step, backward once (the rollout's
 activations are used again). PPO: the same forward, then forward and backward for every minibatch, with the rows that
-hindsight adds; states are projected, and dW of the siamese layer is computed, once a pass (the first finds the tables
-ready), or once a minibatch with `siamese_step` so. Look-ahead's forward pass, a row for each next pose and target that
+hindsight adds; states are projected, and dW of the siamese layer is computed, as often as `siamese_step` says: once an update, a pass
+(the first finds the tables ready) or a minibatch. Look-ahead's forward pass, a row for each next pose and target that
 occur, is timed but not counted.
 
 The share of the peak. The machine's speed may change from minute to minute, so each timing of a case stands between two
@@ -268,7 +268,7 @@ def needed_gflop(world: World, learner: Learner, hindsight_rows: float) -> float
     if learner.algorithm == "a2c":
         return (gathered + rows * 2 * forward_row + projection + extra_targets) / 1e9
     passes, parts = learner.epochs, learner.epochs * learner.minibatches
-    siamese_steps = passes if learner.siamese_step == "pass" else parts
+    siamese_steps = parts // learner.siamese_minibatches
     learnt = passes * (rows + hindsight_rows) * 3 * forward_row + parts * extra_targets + siamese_steps * projection
     renewed = (siamese_steps - 1) * projection + (parts - 1) * (tables - projection)
     return (gathered + hindsight_rows * forward_row + renewed + learnt) / 1e9

@@ -154,7 +154,7 @@ class Trained:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     folder = tmp_path_factory.mktemp("trained")
     source = write_dump(folder / "dumps" / "bathroom_02.h5")
-    assert call("scenes", "import", source, "--out", folder / "scenes").code == 0
+    assert call("scenes", "import", "thor-v1", source, "--out", folder / "scenes").code == 0
     scene, run = folder / "scenes" / "bathroom_02.h5", folder / "run"
     answer = call("train", scene, "--out", run, "--alpha", "-0.02", "--gamma", "-1.5e-2", *SMALL)
     assert answer.code == 0, answer

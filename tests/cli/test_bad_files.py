@@ -38,7 +38,7 @@ def bad(request, dump, tmp_path):
 def test_import_refuses_it_and_leaves_nothing(clearway, dump, bad, tmp_path):
     path, problem = bad
     good = dump(tmp_path / "good.h5")
-    clearway("scenes", "import", good, path, "--out", tmp_path / "out").refusal(str(path), problem)
+    clearway("scenes", "import", "thor-v1", good, path, "--out", tmp_path / "out").refusal(str(path), problem)
     assert not (tmp_path / "out").exists()
 
 
@@ -61,7 +61,7 @@ def test_a_picture_that_turns_out_damaged_leaves_nothing_half_written(clearway, 
         chunk = file["observation"].id.get_chunk_info(40)
     content[chunk.byte_offset + chunk.size // 2] ^= 0x10
     path.write_bytes(content)
-    answer = clearway("scenes", "import", path, "--out", tmp_path / "out")
+    answer = clearway("scenes", "import", "thor-v1", path, "--out", tmp_path / "out")
     answer.refusal(str(path), "dataset 'observation'", "is damaged")
     assert list((tmp_path / "out").iterdir()) == []
 
@@ -69,8 +69,10 @@ def test_a_picture_that_turns_out_damaged_leaves_nothing_half_written(clearway, 
 def test_a_dump_is_not_written_over_itself_or_its_namesake(clearway, dump, tmp_path):
     first, second = dump(tmp_path / "a" / "attic.h5"), dump(tmp_path / "b" / "attic.h5")
     before = first.read_bytes()
-    clearway("scenes", "import", first, "--out", first.parent).refusal(str(first), "--out")
-    clearway("scenes", "import", first, second, "--out", tmp_path / "out").refusal(str(first), "has this name")
+    clearway("scenes", "import", "thor-v1", first, "--out", first.parent).refusal(str(first), "--out")
+    clearway("scenes", "import", "thor-v1", first, second, "--out", tmp_path / "out").refusal(
+        str(first), "has this name"
+    )
     assert first.read_bytes() == before
     assert not (tmp_path / "out").exists()
 

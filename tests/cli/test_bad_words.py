@@ -77,7 +77,7 @@ def test_targets_that_leave_open_which_scene(clearway, dump, tmp_path):
     "words",
     [
         ("train", "FILE", "--out", "run"),
-        ("scenes", "import", "FILE", "--out", "x"),
+        ("scenes", "import", "thor-v1", "FILE", "--out", "x"),
         ("scenes", "inspect", "FILE"),
         ("oracle", "FILE"),
         ("evaluate", "FILE"),
@@ -142,7 +142,7 @@ def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
     source = dump(tmp_path / "attic.h5")
     evaluate = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5)
     clearway("scenes", "inspect", trained.scene, "--map", below).refusal(str(tmp_path / "file"))
-    clearway("scenes", "import", source, "--out", below).refusal(str(tmp_path / "file"))
+    clearway("scenes", "import", "thor-v1", source, "--out", below).refusal(str(tmp_path / "file"))
     clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))
     clearway(*evaluate, "--pictures", below).refusal(str(tmp_path / "file"))
     clearway("demo", "--out", below).refusal(str(tmp_path / "file"))

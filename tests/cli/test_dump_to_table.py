@@ -22,7 +22,7 @@ def evaluated(clearway, trained):
 @pytest.mark.parametrize(("feature_axis", "unreachable"), [(10, -1), (1, 1000)])
 def test_a_dump_is_imported_as_it_is(clearway, dump, tmp_path, feature_axis, unreachable):
     source = dump(tmp_path / "kitchen_02.h5", feature_axis=feature_axis, unreachable=unreachable)
-    answer = clearway("scenes", "import", source, "--out", tmp_path / "scenes")
+    answer = clearway("scenes", "import", "thor-v1", source, "--out", tmp_path / "scenes")
     assert (answer.code, answer.out) == (0, "")
     assert answer.err == f"{tmp_path / 'scenes' / 'kitchen_02.h5'}: 76 states, 19 cells\n"
     original, imported = read_scene(source), read_scene(tmp_path / "scenes" / "kitchen_02.h5")

@@ -12,7 +12,7 @@ def plans(tmp_path: Path) -> Path:
 
 
 def test_every_plan_becomes_a_scene_that_can_be_trained(clearway, plans, tmp_path, small):
-    answer = clearway("scenes", "floor-plan", plans, "--out", tmp_path / "scenes", "--features", 24)
+    answer = clearway("scenes", "import", "floor-plan", plans, "--out", tmp_path / "scenes", "--features", 24)
     assert answer.code == 0, answer
     assert "hall.h5: 12 states, 3 cells" in answer.err and "ell.h5: 12 states" in answer.err
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "hall.h5", "--json").json
@@ -22,7 +22,7 @@ def test_every_plan_becomes_a_scene_that_can_be_trained(clearway, plans, tmp_pat
 
 def test_some_plans_with_another_size_and_seed(clearway, plans, tmp_path):
     words = ("--name", "ell", "--features", 8, "--seed", 4, "--cell-size", 0.5, "--out", tmp_path / "scenes")
-    assert clearway("scenes", "floor-plan", plans, *words).code == 0
+    assert clearway("scenes", "import", "floor-plan", plans, *words).code == 0
     assert [path.name for path in (tmp_path / "scenes").iterdir()] == ["ell.h5"]
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "ell.h5", "--json").json
     assert (found["feature_count"], found["seed"], found["mean_degree"]) == (8, 4, pytest.approx(4 / 3))
@@ -30,7 +30,9 @@ def test_some_plans_with_another_size_and_seed(clearway, plans, tmp_path):
 
 def test_a_map_can_be_drawn_without_a_picture_from_above(clearway, tmp_path):
     (tmp_path / "room.txt").write_text("..#\n...\n")
-    assert clearway("scenes", "floor-plan", tmp_path / "room.txt", "--out", tmp_path, "--features", 8).code == 0
+    assert (
+        clearway("scenes", "import", "floor-plan", tmp_path / "room.txt", "--out", tmp_path, "--features", 8).code == 0
+    )
     assert clearway("scenes", "inspect", tmp_path / "room.h5", "--map", tmp_path / "room.png").code == 0
     assert (tmp_path / "room.png").stat().st_size > 1000
 
@@ -45,5 +47,5 @@ def test_a_map_can_be_drawn_without_a_picture_from_above(clearway, tmp_path):
     ],
 )
 def test_what_cannot_be_made_is_one_line(clearway, plans, tmp_path, words, parts):
-    clearway("scenes", "floor-plan", plans, "--out", tmp_path / "scenes", *words).refusal(*parts)
+    clearway("scenes", "import", "floor-plan", plans, "--out", tmp_path / "scenes", *words).refusal(*parts)
     assert not (tmp_path / "scenes").exists()

@@ -16,6 +16,7 @@ import pytest
 import clearway as package
 from clearway.cli.console import showing_warnings
 from clearway.cli.main import Command, Scenes
+from clearway.cli.scene_imports import ImportScenes
 from clearway.cli.scenes import Inspect
 from clearway.errors import ClearwayError
 from clearway.perception import EncoderWarning
@@ -23,8 +24,9 @@ from clearway.perception import EncoderWarning
 COMMANDS = {
     "demo",
     "scenes build",
-    "scenes import",
-    "scenes floor-plan",
+    "scenes import thor-v1",
+    "scenes import floor-plan",
+    "scenes import images",
     "scenes inspect",
     "train",
     "evaluate",
@@ -35,11 +37,15 @@ COMMANDS = {
 }
 
 
+GROUPS = {Scenes: "command", ImportScenes: "kind"}  # commands that hold others, and where
+
+
 def kinds(commands: object) -> Iterator[type]:
-    """The classes behind all commands, those of `scenes` in its place."""
+    """The classes behind all commands, those of a group in its place."""
     for annotated in get_args(commands):
         kind = get_args(annotated)[0]
-        yield from kinds(get_type_hints(kind, include_extras=True)["command"]) if kind is Scenes else (kind,)
+        part = GROUPS.get(kind)
+        yield from kinds(get_type_hints(kind, include_extras=True)[part]) if part else (kind,)
 
 
 KINDS = tuple(kinds(Command))

@@ -15,11 +15,11 @@ import tyro
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
-from clearway.cli.floor_plan import FromFloorPlan
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.reproduce import Report, Reproduce
-from clearway.cli.scenes import Build, Import, Inspect
+from clearway.cli.scene_imports import ImportScenes
+from clearway.cli.scenes import Build, Inspect
 from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.errors import ClearwayError
@@ -32,15 +32,14 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build rooms, import dumps, make them of floor plans, inspect.
+    """Scene files: build rooms, import dumps, floor plans and photographs, inspect.
 
     Example: clearway scenes inspect bathroom.h5
     """
 
     command: (
         Annotated[Build, tyro.conf.subcommand("build")]
-        | Annotated[Import, tyro.conf.subcommand("import")]
-        | Annotated[FromFloorPlan, tyro.conf.subcommand("floor-plan")]
+        | Annotated[ImportScenes, tyro.conf.subcommand("import")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
     )
 

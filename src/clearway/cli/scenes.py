@@ -1,4 +1,4 @@
-"""`clearway scenes build|import|inspect`."""
+"""`clearway scenes build|inspect`."""
 
 from __future__ import annotations
 
@@ -51,40 +51,6 @@ class Build:
 
 
 @dataclass(frozen=True)
-class Import:
-    """Read thor_v1 dumps, check them, and write them as scene files of our own.
-
-    Example: clearway scenes import dumps/bathroom_02.h5 dumps/kitchen_02.h5 --out scenes
-    """
-
-    files: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """thor_v1 HDF5 files, or folders of them."""
-    out: Path
-    """Folder for the scene files."""
-    encoder: str | None = None
-    """Encode the pictures anew, all files together, with this encoder; by default the files' features stay."""
-    encoder_seed: int = 0
-    """Seed of random-resnet50."""
-
-    def run(self) -> None:
-        """Import and write."""
-        from clearway.perception import encode_scenes
-        from clearway.scenes.thor_v1 import read_scene, write_scene
-
-        if self.encoder:
-            check_seeds(encoder_seed=self.encoder_seed)
-        files = scene_files(self.files)
-        scenes = [read_scene(path) for path in files]
-        paths = [self.out / f"{scene.name}.h5" for scene in scenes]
-        _check_nothing_is_lost(files, paths)
-        if self.encoder:
-            scenes = encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True)
-        for scene, path in zip(scenes, paths, strict=True):
-            write_scene(scene, path)
-            stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
-
-
-@dataclass(frozen=True)
 class Inspect:
     """Say what a scene file holds, and draw its map.
 
@@ -118,16 +84,6 @@ class Inspect:
             print_json(content)
         else:
             _print_table(content)
-
-
-def _check_nothing_is_lost(files: list[Path], paths: list[Path]) -> None:
-    """Check that no file would be written over one of those that are read, or over another one of `paths`."""
-    read = {file.resolve() for file in files}
-    for file, path in zip(files, paths, strict=True):
-        if path.resolve() in read:
-            raise ClearwayError(f"{path}: would be written over a file to be imported. Give another folder with --out")
-        if paths.count(path) > 1:
-            raise ClearwayError(f"{file}: another file to be imported has this name. Import them one by one")
 
 
 def _print_table(content: dict[str, object]) -> None:

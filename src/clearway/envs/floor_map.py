@@ -1,6 +1,6 @@
 """A room from above as a picture: zones of every pose, the path so far, the agent, the target.
 
-Each cell is made of triangles, one a heading, of four a square (the upper one looks along +z), coloured by the pose's zone.
+Each cell is made of triangles, one a heading (the upper one looks along +z), coloured by the pose's zone.
 """
 
 from __future__ import annotations

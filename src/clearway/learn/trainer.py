@@ -241,7 +241,7 @@ class Trainer:
     ) -> tuple[list[LossTerms], list[Tensor]]:
         """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
         learner = self.learner
-        together = learner.minibatches if learner.siamese_step == "pass" else 1
+        together = learner.siamese_minibatches
         terms, norms = [], []
         for number, part in enumerate(self._minibatches(batch)):
             if number:

@@ -1,0 +1,161 @@
+"""`clearway scenes import KIND`: scenes from other people's data. docs/scenes.md has a page on each kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from clearway.cli.arguments import check_at_least, check_seeds, scene_files
+from clearway.cli.console import stderr_console
+from clearway.errors import ClearwayError
+
+if TYPE_CHECKING:
+    from clearway.scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class ImportDumps:
+    """Read thor_v1 dumps, check them, and write them as scene files of our own.
+
+    Example: clearway scenes import thor-v1 dumps/bathroom_02.h5 dumps/kitchen_02.h5 --out scenes
+    """
+
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """thor_v1 HDF5 files, or folders of them."""
+    out: Path
+    """Folder for the scene files."""
+    encoder: str | None = None
+    """Encode the pictures anew, all files together, with this encoder; by default the files' features stay."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Import and write."""
+        from clearway.perception import encode_scenes
+        from clearway.scenes.thor_v1 import read_scene
+
+        if self.encoder:
+            check_seeds(encoder_seed=self.encoder_seed)
+        files = scene_files(self.files)
+        scenes = [read_scene(path) for path in files]
+        paths = [self.out / f"{scene.name}.h5" for scene in scenes]
+        _check_nothing_is_lost(files, paths)
+        if self.encoder:
+            scenes = encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True)
+        write_scenes(scenes, self.out)
+
+
+@dataclass(frozen=True)
+class ImportFloorPlan:
+    """Make scenes of floor plans: four headings a cell, made-up features, no pictures.
+
+    Example: clearway scenes import floor-plan hall.txt --out scenes
+    """
+
+    file: Annotated[Path, tyro.conf.Positional]
+    """A map seen from above in .txt (# blocked, . reachable) or .csv (0 blocked, 1 reachable), a list of cells in .csv
+    (header x,z), or NumPy arrays of cells in .npz, one a plan."""
+    out: Path
+    """Folder for the scene files."""
+    name: tuple[str, ...] = ()
+    """Which plans of a .npz file; by default all."""
+    features: int = 2048
+    """Features a pose: smooth random functions of it. Scenes of one number and seed can be trained together."""
+    seed: int = 0
+    """Of the features."""
+    cell_size: float = 0.25
+    """Side of a cell, metres."""
+
+    def run(self) -> None:
+        """Make and write."""
+        from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
+        from clearway.scenes.floor_plans import floor_plan_scene
+
+        names = self.name or floor_plan_names(self.file)
+        plans = [read_floor_plan(self.file, name, cell_size_m=self.cell_size) for name in names]
+        for plan in plans:
+            write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
+
+
+@dataclass(frozen=True)
+class ImportImages:
+    """Make a scene of photographs and a table that says where each was taken.
+
+    Example: clearway scenes import images office/poses.csv --step 0.5 --out scenes
+    """
+
+    table: Annotated[Path, tyro.conf.Positional]
+    """CSV file with the columns file, x, z (metres) and heading (degrees, 0 along +z, 90 along +x); files lie beside it
+    or in folders beside it. Every location needs the same evenly spaced headings."""
+    out: Path
+    """Folder for the scene file."""
+    step: float = 0.5
+    """Length of a move: how far neighbouring locations are apart, metres."""
+    blocked: Path | None = None
+    """CSV file with the columns x1, z1, x2, z2: pairs of neighbouring locations without a way between them."""
+    name: str | None = None
+    """Of the scene; by default the table's."""
+    height: int = 300
+    """Of the scene's pictures, pixels; the width follows from the first photograph, others are cut to fit."""
+    encoder: str = "auto"
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Read, encode and write."""
+        from clearway.scenes.importers.images import read_images
+
+        check_at_least(1, height=self.height)
+        check_seeds(encoder_seed=self.encoder_seed)
+        scene = read_images(self.table, step_m=self.step, blocked=self.blocked, name=self.name, height_px=self.height)
+        encode_and_write([scene], self.out, self.encoder, self.encoder_seed)
+
+
+@dataclass(frozen=True)
+class ImportScenes:
+    """Make scene files of dumps, floor plans or photographs.
+
+    Example: clearway scenes import images office/poses.csv --out scenes
+    """
+
+    kind: (
+        Annotated[ImportDumps, tyro.conf.subcommand("thor-v1")]
+        | Annotated[ImportFloorPlan, tyro.conf.subcommand("floor-plan")]
+        | Annotated[ImportImages, tyro.conf.subcommand("images")]
+    )
+
+    def run(self) -> None:
+        """Import."""
+        self.kind.run()
+
+
+def encode_and_write(scenes: Sequence[Scene], out: Path, encoder: str, encoder_seed: int) -> None:
+    """Give scenes features, all by one encoder, and write them into a folder."""
+    from clearway.perception import encode_scenes
+
+    write_scenes(encode_scenes(scenes, encoder, seed=encoder_seed, progress=True), out)
+
+
+def write_scenes(scenes: Sequence[Scene], out: Path) -> None:
+    """Write each scene into a folder, under its name, and say so."""
+    from clearway.scenes.thor_v1 import write_scene
+
+    for scene in scenes:
+        path = out / f"{scene.name}.h5"
+        write_scene(scene, path)
+        stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
+
+
+def _check_nothing_is_lost(files: list[Path], paths: list[Path]) -> None:
+    """Check that no file would be written over one of those that are read, or over another one of `paths`."""
+    read = {file.resolve() for file in files}
+    for file, path in zip(files, paths, strict=True):
+        if path.resolve() in read:
+            raise ClearwayError(f"{path}: would be written over a file to be imported. Give another folder with --out")
+        if paths.count(path) > 1:
+            raise ClearwayError(f"{file}: another file to be imported has this name. Import them one by one")

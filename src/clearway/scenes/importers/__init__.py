@@ -1,0 +1,1 @@
+"""Scenes from what others have: photographs, other simulators' data, other data sets. One module a kind of source."""

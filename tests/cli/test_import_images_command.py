@@ -1,0 +1,35 @@
+from pathlib import Path
+
+from PIL import Image
+
+
+def photographed(folder: Path) -> Path:
+    """Two places, four photographs each."""
+    lines = ["file,x,z,heading"]
+    for z in (0.0, 0.5):
+        for heading in (0, 90, 180, 270):
+            name = f"{z}-{heading}.png"
+            Image.new("RGB", (40, 30), (int(100 * z), heading // 2, 9)).save(folder / name)
+            lines.append(f"{name},0,{z},{heading}")
+    table = folder / "office.csv"
+    table.write_text("\n".join(lines))
+    return table
+
+
+def test_photographs_become_a_scene_that_can_be_inspected(clearway, tmp_path: Path, monkeypatch) -> None:
+    table = photographed(tmp_path)
+    words = ("scenes", "import", "images", table, "--out", tmp_path / "scenes", "--height", 30)
+    answer = clearway(*words, "--encoder", "random-resnet50")
+    assert answer.code == 0, answer
+    found = clearway("scenes", "inspect", tmp_path / "scenes" / "office.h5", "--json").json
+    assert (found["states"], found["cells"], found["headings"]) == (8, 2, 4)
+    assert found["encoder"] == "random-resnet50"
+    assert found["source"] == "images"
+
+
+def test_a_missing_photograph_is_named_and_nothing_is_written(clearway, tmp_path: Path) -> None:
+    table = photographed(tmp_path)
+    (tmp_path / "0.5-90.png").unlink()
+    answer = clearway("scenes", "import", "images", table, "--out", tmp_path / "scenes")
+    assert answer.refusal("office.csv", "line 7", "0.5-90.png")
+    assert not (tmp_path / "scenes").exists()
