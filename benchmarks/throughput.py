@@ -17,9 +17,9 @@ K history, H width, M targets, O = 5 outputs, one update of `rows` rows needs
 
 A2C: tables once, forward for the rollout's rows and the values after its last step, backward once (the rollout's
 activations are used again). PPO: the same forward, then forward and backward for every minibatch, with the rows that
-hindsight adds; states are projected, and dW of the siamese layer is computed, as often as `siamese_step` says: once an update, a pass
-(the first finds the tables ready) or a minibatch. Look-ahead's forward pass, a row for each next pose and target that
-occur, is timed but not counted.
+hindsight adds; states are projected, and dW of the siamese layer is computed, as often as `siamese_step` says: once a
+pass (the first finds the tables ready) or once a minibatch. Look-ahead's forward pass, a row for each next pose and
+target that occur, is timed but not counted.
 
 The share of the peak. The machine's speed may change from minute to minute, so each timing of a case stands between two
 of a matrix product, of the size that was fastest at the start, and is divided by the faster of them; the share is the

@@ -122,6 +122,6 @@ def test_the_trainer_remembers_only_what_its_environments_did() -> None:
 
 
 def test_without_it_nothing_is_remembered() -> None:
-    trainer = small_trainer(small_learner())
+    trainer = small_trainer(small_learner(lookahead=0.0))
     trainer.update()
     assert (trainer.observed.next_state == UNKNOWN).all()

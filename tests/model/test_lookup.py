@@ -98,6 +98,16 @@ def test_forward_follows_the_parameters_after_refresh() -> None:
     torch.testing.assert_close(kept.value, value, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize("few_rows", [True, False])
+def test_start_values_are_those_of_a_history_of_one_pose(few_rows: bool) -> None:
+    _, lookup = made_network()
+    lookup.refresh(few_rows=few_rows)
+    state, target, rows_per_scene = torch.tensor([3, 7, 7, 15, 25]), torch.tensor([0, 1, 0, 2, 4]), (3, 1, 1)
+    expected = lookup.forward(state[:, None].expand(-1, HISTORY), target, rows_per_scene).value
+    torch.testing.assert_close(lookup.start_values(state, target, rows_per_scene), expected)
+    assert expected.unique().numel() == 5
+
+
 def test_backward_does_not_depend_on_what_was_computed_before() -> None:
     """Memory is kept between calls; a larger batch before must leave no trace."""
     network, lookup = made_network()

@@ -72,9 +72,9 @@ class Learner:
     """Passes over each rollout (1 with one minibatch is plain A2C)."""
     minibatches: int = 4
     """Parts that each pass is divided into."""
-    siamese_step: Literal["minibatch", "pass", "update"] = "pass"
-    """When the first layer's weight moves, which costs most: with every minibatch, or once a pass or an update with
-    the mean of its minibatches' gradients."""
+    siamese_step: Literal["minibatch", "pass"] = "pass"
+    """When the first layer's weight moves, which costs most: with every minibatch, or once a pass with the mean of its
+    minibatches' gradients."""
     siamese_lr: float = 2.0
     """Learning rate of the first layer's weight as a multiple of the others'."""
     ratio_clip: float = 0.2
@@ -145,7 +145,7 @@ class Learner:
     @property
     def siamese_minibatches(self) -> int:
         """Minibatches between two steps of the first layer's weight."""
-        return {"minibatch": 1, "pass": self.minibatches, "update": self.minibatches * self.epochs}[self.siamese_step]
+        return self.minibatches if self.siamese_step == "pass" else 1
 
     def lr_at(self, frames: int) -> float:
         """Learning rate after that many frames."""

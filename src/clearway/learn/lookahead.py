@@ -71,8 +71,7 @@ def better_policy(
     pairs, pair_of = torch.unique(keys, return_inverse=True)  # ascending: ordered by target, so by scene
     state, goal = pairs % world.state_count, pairs // world.state_count
     rows_per_scene = torch.bincount(world.target_scene[goal], minlength=world.scene_count).tolist()
-    start = state[:, None].expand(-1, history.shape[1])
-    start_value = network.forward(start, goal, rows_per_scene).value  # (P,)
+    start_value = network.start_values(state, goal, rows_per_scene)  # (P,)
     reached = state == world.target_state[goal]
     worth = discount * torch.where(reached, 0.0, start_value)
     blocked = (after == here)[known]

@@ -245,7 +245,7 @@ class Trainer:
         terms, norms = [], []
         for number, part in enumerate(self._minibatches(batch)):
             if number:
-                self.lookup.refresh(siamese_weight=number % together == 0)
+                self.lookup.refresh(siamese_weight=number % together == 0, few_rows=False)
             rows = part.history, part.target, part.rows_per_scene
             activations = kept or self.lookup.forward(*rows)
             loss, gradient = loss_gradient(activations.output, part, settings)

@@ -99,13 +99,19 @@ class LookupNetwork:
         self.refresh()
 
     @torch.no_grad()
-    def refresh(self, siamese_weight: bool = True) -> None:
-        """Compute the tables with the parameters as they are now; siamese_weight: it has changed too."""
+    def refresh(self, siamese_weight: bool = True, few_rows: bool = True) -> None:
+        """Compute the tables with the parameters as they are now.
+
+        Args:
+            siamese_weight: it has changed too.
+            few_rows: forward passes of few rows follow, which transposed copies of the weights speed up.
+        """
         net = self.network
         if siamese_weight:
             torch.mm(self.features, net.siamese_weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
-        self.fusion_in = net.fusion_weight[0].T.contiguous()  # small products are faster with (in, out) weights
-        self.scene_in = net.scene_weight.transpose(1, 2).contiguous()
+        self.fusion_in, self.scene_in = net.fusion_weight[0].T, net.scene_weight.transpose(1, 2)
+        if few_rows:
+            self.fusion_in, self.scene_in = self.fusion_in.contiguous(), self.scene_in.contiguous()
         slots = self.projected[self.target_state].view(-1, self.history_length, self.width)
         self.wanted = slots.sum(1).add_(net.siamese_bias).relu_()  # (M, H)
         self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
@@ -114,7 +120,7 @@ class LookupNetwork:
     def forward(
         self, history: Tensor, target: Tensor, rows_per_scene: Sequence[int], out: Activations | None = None
     ) -> Activations:
-        """Policy and value of B rows.
+        """Policy and value of B rows, with all that the backward pass needs.
 
         Args:
             history: (B, K) int64 states, newest last.
@@ -127,14 +133,30 @@ class LookupNetwork:
         rows = self.projected.view(-1, self.width)
         torch.add(embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen).relu_()
         torch.addmm(self.target_term[target], out.seen, self.fusion_in, out=out.fused).relu_()
-        first = 0
+        self._forward_scenes(rows_per_scene, out)
+        return out
+
+    @torch.no_grad()
+    def start_values(self, state: Tensor, target: Tensor, rows_per_scene: Sequence[int]) -> Tensor:
+        """Values (B,) of standing in states (B,) int64 at the start of an episode; other arguments as in `forward`.
+
+        A start's history is one pose, so the observation branch is computed once a state, not once a row.
+        """
+        out = Activations.empty(len(state), self.width, state.device)
+        seen = self.projected.view(-1, self.history_length, self.width).sum(1).add_(self.network.siamese_bias).relu_()
+        torch.add((seen @ self.fusion_in)[state], self.target_term[target], out=out.fused).relu_()
+        self._forward_scenes(rows_per_scene, out)
+        return out.value
+
+    def _forward_scenes(self, rows_per_scene: Sequence[int], out: Activations) -> None:
+        """The scenes' own layers, from `fused` on."""
+        net, first = self.network, 0
         for scene, count in enumerate(rows_per_scene):
             if count:
                 part = out.rows(first, first + count)
                 torch.addmm(net.scene_bias[scene], part.fused, self.scene_in[scene], out=part.special).relu_()
                 torch.addmm(net.output_bias[scene], part.special, net.output_weight[scene].T, out=part.output)
             first += count
-        return out
 
     @torch.no_grad()
     def backward(
