@@ -27,6 +27,8 @@ COMMANDS = {
     "scenes import thor-v1",
     "scenes import floor-plan",
     "scenes import images",
+    "scenes import savn",
+    "scenes import avd",
     "scenes inspect",
     "train",
     "evaluate",

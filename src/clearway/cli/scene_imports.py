@@ -117,6 +117,65 @@ class ImportImages:
 
 
 @dataclass(frozen=True)
+class ImportSavn:
+    """Make scenes of the offline iTHOR data of SAVN: level camera, four headings.
+
+    Example: clearway scenes import savn data/FloorPlan1_physics --out scenes
+    """
+
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Folders of one scene each, with graph.json and images.hdf5 or resnet50_fc.hdf5."""
+    out: Path
+    """Folder for the scene files."""
+    step: float = 0.5
+    """Length of a move, a multiple of 0.25 m."""
+    encoder: str | None = None
+    """Encode the pictures anew with this encoder; by default the features of resnet50_fc.hdf5 stay, where they are."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Read, encode and write."""
+        from clearway.scenes.importers.savn import read_savn
+
+        check_seeds(encoder_seed=self.encoder_seed)
+        scenes = [read_savn(folder, step_m=self.step) for folder in self.folders]
+        featured = all(scene.features is not None for scene in scenes)
+        if self.encoder is None and featured:
+            write_scenes(scenes, self.out)
+        else:
+            encode_and_write(scenes, self.out, self.encoder or "auto", self.encoder_seed)
+
+
+@dataclass(frozen=True)
+class ImportAvd:
+    """Make scenes of the Active Vision Dataset: real homes, twelve headings.
+
+    Example: clearway scenes import avd data/Home_001_1 data/Home_002_1 --out scenes
+    """
+
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Folders of one scene each, with annotations.json and jpg_rgb."""
+    out: Path
+    """Folder for the scene files."""
+    height: int = 300
+    """Of the scene's pictures, pixels; the width follows."""
+    encoder: str = "auto"
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Read, encode and write."""
+        from clearway.scenes.importers.avd import read_avd
+
+        check_at_least(1, height=self.height)
+        check_seeds(encoder_seed=self.encoder_seed)
+        scenes = [read_avd(folder, height_px=self.height) for folder in self.folders]
+        encode_and_write(scenes, self.out, self.encoder, self.encoder_seed)
+
+
+@dataclass(frozen=True)
 class ImportScenes:
     """Make scene files of dumps, floor plans or photographs.
 
@@ -127,6 +186,8 @@ class ImportScenes:
         Annotated[ImportDumps, tyro.conf.subcommand("thor-v1")]
         | Annotated[ImportFloorPlan, tyro.conf.subcommand("floor-plan")]
         | Annotated[ImportImages, tyro.conf.subcommand("images")]
+        | Annotated[ImportSavn, tyro.conf.subcommand("savn")]
+        | Annotated[ImportAvd, tyro.conf.subcommand("avd")]
     )
 
     def run(self) -> None:

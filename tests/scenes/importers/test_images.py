@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from clearway.errors import SceneError
-from clearway.scenes.importers import images
+from clearway.scenes.importers import photographs
 from clearway.scenes.importers.images import read_images
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
@@ -105,7 +105,7 @@ def test_a_photograph_that_changed_since_is_refused(tmp_path: Path) -> None:
 
 def test_a_picture_too_large_is_refused_before_it_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     table, _ = photographed(tmp_path)
-    monkeypatch.setattr(images, "MAX_PICTURE_PIXELS", 1_000)
+    monkeypatch.setattr(photographs, "MAX_PICTURE_PIXELS", 1_000)
     monkeypatch.setattr(Image.Image, "load", lambda self: pytest.fail("unpacked"))
     with pytest.raises(SceneError, match=r"40 x 30 pixels"):
         read_images(table, step_m=0.5)

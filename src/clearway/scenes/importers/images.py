@@ -9,55 +9,20 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageOps
 
 from clearway.errors import SceneError
+from clearway.scenes.importers.photographs import HEIGHT_PX, photographs
 from clearway.scenes.importers.pose_graph import recorded_pose_graph
-from clearway.scenes.pictures import file_stamp
 from clearway.scenes.scene import Provenance, Scene
-from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES
+from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES, check_scene
 from clearway.version import __version__
 
 SOURCE = "images"
 POSE_COLUMNS, EDGE_COLUMNS = ("file", "x", "z", "heading"), ("x1", "z1", "x2", "z2")
 MAX_TABLE_BYTES = 16 * 1024**2
-MAX_PICTURE_PIXELS = 80_000_000  # a photograph that unpacks to more is refused before it is unpacked
-FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
-HEIGHT_PX = 300
-
-
-@dataclass(frozen=True)
-class Photographs:
-    """Pictures (S, height, width, 3) uint8, read from their files, cut and scaled when they are looked at.
-
-    Attributes:
-        paths: S files.
-        stamps: what each file was like when the scene was made, see `file_stamp`.
-        shape: (S, height, width, 3).
-    """
-
-    paths: tuple[Path, ...]
-    stamps: tuple[tuple[int, ...], ...]
-    shape: tuple[int, ...]
-
-    def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
-        """The pictures asked for.
-
-        Raises:
-            SceneError: a file is gone, has changed, or is no picture.
-        """
-        wanted = np.arange(self.shape[0])[index]
-        pictures = np.empty((wanted.size, *self.shape[1:]), np.uint8)
-        for place, state in enumerate(wanted.reshape(-1).tolist()):
-            path = self.paths[state]
-            if file_stamp(path) != self.stamps[state]:
-                raise SceneError(path, "has changed since its scene was made", "Import the pictures again")
-            pictures[place] = _photograph(path, *self.shape[1:3])
-        return pictures.reshape(*wanted.shape, *self.shape[1:])
 
 
 def read_images(
@@ -93,10 +58,9 @@ def read_images(
         lines = enumerate(_rows(blocked, EDGE_COLUMNS), 2)
         edges = np.array([_numbers(blocked, number, row) for number, row in lines]).reshape(-1, 2, 2)
     graph = recorded_pose_graph(locations_m, headings_deg, step_m, blocked_edges=edges, source=blocked or table)
-    width = width_px or _width(paths[0], height_px)
-    return Scene(
+    scene = Scene(
         name=name or table.stem,
-        observations=Photographs(paths, tuple(map(file_stamp, paths)), (len(paths), height_px, width, 3)),
+        observations=photographs(paths, height_px, width_px),
         features=None,
         locations_m=locations_m,
         headings_deg=np.round(headings_deg).astype(np.int64) % 360,
@@ -104,6 +68,8 @@ def read_images(
         made_by=Provenance(SOURCE, versions={"clearway": __version__}, notes={"table": table.name}),
         cell_size_m=step_m,
     )
+    check_scene(scene, table)
+    return scene
 
 
 def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
@@ -150,27 +116,3 @@ def _picture_path(table: Path, number: int, word: str) -> Path:
     if not path.is_file():
         raise SceneError(table, f"line {number} names {word!r}, which is no file", "Correct the name, or add it")
     return path
-
-
-def _opened(path: Path) -> Image.Image:
-    """The picture as it is meant to be seen, not unpacked where it would be too large."""
-    try:
-        with Image.open(path, formats=FORMATS) as picture:
-            if math.prod(picture.size) > MAX_PICTURE_PIXELS:
-                raise SceneError(path, f"has {picture.size[0]} x {picture.size[1]} pixels", "Scale it down")
-            return ImageOps.exif_transpose(picture).convert("RGB")
-    except SceneError:
-        raise
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as fault:
-        kinds = ", ".join(FORMATS)
-        raise SceneError(path, f"cannot be read as a picture ({fault})", f"Give one of {kinds}") from fault
-
-
-def _width(path: Path, height_px: int) -> int:
-    width, height = _opened(path).size
-    return max(1, round(height_px * width / height))
-
-
-def _photograph(path: Path, height_px: int, width_px: int) -> np.ndarray:
-    """(height, width, 3) uint8: scaled to fill, and cut evenly where the sides' ratio differs."""
-    return np.asarray(ImageOps.fit(_opened(path), (width_px, height_px), Image.Resampling.LANCZOS))

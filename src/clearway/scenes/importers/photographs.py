@@ -1,0 +1,84 @@
+"""Picture files as the pictures of a scene, of any size and shape, read when they are looked at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageOps
+
+from clearway.errors import SceneError
+from clearway.scenes.pictures import file_stamp
+
+MAX_PICTURE_PIXELS = 80_000_000  # a photograph that unpacks to more is refused before it is unpacked
+FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
+HEIGHT_PX = 300
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """Pictures (S, height, width, 3) uint8, read from their files, cut and scaled when they are looked at.
+
+    Attributes:
+        paths: S files.
+        stamps: what each file was like when the scene was made, see `file_stamp`.
+        shape: (S, height, width, 3).
+    """
+
+    paths: tuple[Path, ...]
+    stamps: tuple[tuple[int, ...], ...]
+    shape: tuple[int, ...]
+
+    def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
+        """The pictures asked for.
+
+        Raises:
+            SceneError: a file is gone, has changed, or is no picture.
+        """
+        wanted = np.arange(self.shape[0])[index]
+        pictures = np.empty((wanted.size, *self.shape[1:]), np.uint8)
+        for place, state in enumerate(wanted.reshape(-1).tolist()):
+            path = self.paths[state]
+            if file_stamp(path) != self.stamps[state]:
+                raise SceneError(path, "has changed since its scene was made", "Import the pictures again")
+            pictures[place] = _photograph(path, *self.shape[1:3])
+        return pictures.reshape(*wanted.shape, *self.shape[1:])
+
+
+def photographs(paths: Sequence[Path], height_px: int = HEIGHT_PX, width_px: int | None = None) -> Photographs:
+    """Picture files as pictures of one size.
+
+    Args:
+        paths: S files.
+        height_px: of the pictures.
+        width_px: of the pictures; None: as the sides of the first file say. Others are cut to fit.
+
+    Raises:
+        SceneError: the first file is no picture.
+    """
+    if width_px is None:
+        width, height = _opened(paths[0]).size
+        width_px = max(1, round(height_px * width / height))
+    return Photographs(tuple(paths), tuple(map(file_stamp, paths)), (len(paths), height_px, width_px, 3))
+
+
+def _opened(path: Path) -> Image.Image:
+    """The picture as it is meant to be seen, not unpacked where it would be too large."""
+    try:
+        with Image.open(path, formats=FORMATS) as picture:
+            if math.prod(picture.size) > MAX_PICTURE_PIXELS:
+                raise SceneError(path, f"has {picture.size[0]} x {picture.size[1]} pixels", "Scale it down")
+            return ImageOps.exif_transpose(picture).convert("RGB")
+    except SceneError:
+        raise
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as fault:
+        kinds = ", ".join(FORMATS)
+        raise SceneError(path, f"cannot be read as a picture ({fault})", f"Give one of {kinds}") from fault
+
+
+def _photograph(path: Path, height_px: int, width_px: int) -> np.ndarray:
+    """(height, width, 3) uint8: scaled to fill, and cut evenly where the sides' ratio differs."""
+    return np.asarray(ImageOps.fit(_opened(path), (width_px, height_px), Image.Resampling.LANCZOS))
