@@ -29,6 +29,7 @@ COMMANDS = {
     "scenes import images",
     "scenes import savn",
     "scenes import avd",
+    "scenes import ai2thor",
     "scenes inspect",
     "train",
     "evaluate",

@@ -40,6 +40,13 @@ def check_finite(**values: float | None) -> None:
             raise ClearwayError(f"{_option(name)} is {value}, expected a finite number. Correct it")
 
 
+def check_positive(**values: float) -> None:
+    """Check that options, by name, are finite and above 0. Raises ClearwayError."""
+    for name, value in values.items():
+        if not 0 < value < math.inf:
+            raise ClearwayError(f"{_option(name)} is {value}, expected more than 0. Give a positive number")
+
+
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.cli.arguments import check_at_least, check_seeds, scene_files
+from clearway.cli.arguments import check_at_least, check_positive, check_seeds, scene_files
 from clearway.cli.console import stderr_console
 from clearway.errors import ClearwayError
 
@@ -176,6 +176,42 @@ class ImportAvd:
 
 
 @dataclass(frozen=True)
+class ImportAi2Thor:
+    """Photograph rooms of AI2-THOR, live through the package ai2thor.
+
+    Example: clearway scenes import ai2thor FloorPlan402 FloorPlan302 --out scenes
+    """
+
+    rooms: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Names of rooms in the simulator."""
+    out: Path
+    """Folder for the scene files."""
+    step: float = 0.5
+    """Length of a move, metres."""
+    width: int = 400
+    """Of the pictures, pixels."""
+    height: int = 300
+    """Of the pictures, pixels."""
+    encoder: str = "auto"
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+
+    def run(self) -> None:
+        """Photograph, encode and write."""
+        from clearway.scenes.importers.ai2thor import photographed, started
+
+        check_at_least(1, width=self.width, height=self.height)
+        check_seeds(encoder_seed=self.encoder_seed)
+        check_positive(step=self.step)
+        scenes = []
+        for name in self.rooms:
+            with started(name, self.step, self.width, self.height) as controller:
+                scenes.append(photographed(controller, name, step_m=self.step, progress=True))
+        encode_and_write(scenes, self.out, self.encoder, self.encoder_seed)
+
+
+@dataclass(frozen=True)
 class ImportScenes:
     """Make scene files of dumps, floor plans or photographs.
 
@@ -188,6 +224,7 @@ class ImportScenes:
         | Annotated[ImportImages, tyro.conf.subcommand("images")]
         | Annotated[ImportSavn, tyro.conf.subcommand("savn")]
         | Annotated[ImportAvd, tyro.conf.subcommand("avd")]
+        | Annotated[ImportAi2Thor, tyro.conf.subcommand("ai2thor")]
     )
 
     def run(self) -> None:
