@@ -200,6 +200,11 @@ def read_group_arrays(file: h5py.File, name: str, source: Path) -> dict[str, np.
     return arrays
 
 
+def write_text(item: h5py.Group | h5py.Dataset, name: str, text: str) -> None:
+    """Store a text as an attribute of fixed length, which HDF5 keeps under a checksum, unlike one of any length."""
+    item.attrs[name] = np.bytes_(text.encode())
+
+
 def write_array(
     parent: h5py.Group,
     name: str,

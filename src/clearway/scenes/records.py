@@ -65,13 +65,13 @@ def read_top_view(file: h5py.File, path: Path) -> TopView | None:
 
 def write_provenance(file: h5py.File, made_by: Provenance) -> None:
     """Keep what made the scene as one JSON attribute."""
-    file.attrs["made_by"] = json.dumps(asdict(made_by))
+    hdf5.write_text(file, "made_by", json.dumps(asdict(made_by)))
 
 
 def write_encoder(file: h5py.File, encoder: EncoderRecord) -> None:
     """Keep an encoder's record as a JSON attribute and its statistics as a group of arrays."""
     kept = {"name": encoder.name, "identity": encoder.identity, "settings": dict(encoder.settings)}
-    file.attrs["encoder"] = json.dumps(kept)
+    hdf5.write_text(file, "encoder", json.dumps(kept))
     group = file.create_group("encoder")
     for name, values in encoder.arrays.items():
         hdf5.write_array(group, name, values)
