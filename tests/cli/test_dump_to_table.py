@@ -1,6 +1,7 @@
 """A dump written by other code goes through every command."""
 
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,19 @@ def test_a_dump_is_imported_as_it_is(clearway, dump, tmp_path, feature_axis, unr
     assert np.array_equal(original.graph, imported.graph)
     assert np.array_equal(original.features, imported.features)
     assert np.array_equal(original.observations[:], imported.observations[:])
+
+
+def test_an_archive_of_dumps_is_imported_and_a_scene_exported_again(clearway, dump, tmp_path):
+    source = dump(tmp_path / "kitchen_02.h5")
+    with zipfile.ZipFile(tmp_path / "dumps.zip", "w") as archive:
+        archive.write(source, "thor/kitchen_02.h5")
+    assert clearway("scenes", "import", "thor-v1", tmp_path / "dumps.zip", "--out", tmp_path / "scenes").code == 0
+    imported = tmp_path / "scenes" / "kitchen_02.h5"
+    assert clearway("scenes", "export", imported, "--out", tmp_path / "again.h5").code == 0
+    original, again = read_scene(source), read_scene(tmp_path / "again.h5")
+    assert np.array_equal(original.graph, again.graph)
+    assert np.array_equal(original.observations[:], again.observations[:])
+    assert clearway("scenes", "export", imported, "--out", imported).refusal("kitchen_02.h5", "over the scene itself")
 
 
 def test_inspect_prints_the_figures_of_the_room(clearway, trained, tmp_path):

@@ -19,7 +19,7 @@ from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.reproduce import Report, Reproduce
 from clearway.cli.scene_imports import ImportScenes
-from clearway.cli.scenes import Build, Inspect
+from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.errors import ClearwayError
@@ -32,7 +32,7 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build rooms, import dumps, floor plans and photographs, inspect.
+    """Scene files: build rooms, import dumps, floor plans and photographs, inspect, export.
 
     Example: clearway scenes inspect bathroom.h5
     """
@@ -41,6 +41,7 @@ class Scenes:
         Annotated[Build, tyro.conf.subcommand("build")]
         | Annotated[ImportScenes, tyro.conf.subcommand("import")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
+        | Annotated[Export, tyro.conf.subcommand("export")]
     )
 
     def run(self) -> None:

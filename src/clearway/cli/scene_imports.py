@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.cli.arguments import check_at_least, check_positive, check_seeds, scene_files
+from clearway.cli.arguments import SCENE_SUFFIXES, check_at_least, check_positive, check_seeds, scene_files
 from clearway.cli.console import stderr_console
 from clearway.errors import ClearwayError
 
@@ -25,7 +25,7 @@ class ImportDumps:
     """
 
     files: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """thor_v1 HDF5 files, or folders of them."""
+    """thor_v1 HDF5 files, or folders or zip archives of them."""
     out: Path
     """Folder for the scene files."""
     encoder: str | None = None
@@ -35,18 +35,19 @@ class ImportDumps:
 
     def run(self) -> None:
         """Import and write."""
-        from clearway.perception import encode_scenes
+        from clearway.scenes.importers.archives import unpacked
         from clearway.scenes.thor_v1 import read_scene
 
         if self.encoder:
             check_seeds(encoder_seed=self.encoder_seed)
-        files = scene_files(self.files)
-        scenes = [read_scene(path) for path in files]
-        paths = [self.out / f"{scene.name}.h5" for scene in scenes]
-        _check_nothing_is_lost(files, paths)
-        if self.encoder:
-            scenes = encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True)
-        write_scenes(scenes, self.out)
+        with unpacked(self.files, SCENE_SUFFIXES) as paths:  # pictures stay in the files until they are written
+            files = scene_files(paths)
+            scenes = [read_scene(path) for path in files]
+            _check_nothing_is_lost(files, [self.out / f"{scene.name}.h5" for scene in scenes])
+            if self.encoder:
+                encode_and_write(scenes, self.out, self.encoder, self.encoder_seed)
+            else:
+                write_scenes(scenes, self.out)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""`clearway scenes build|inspect`."""
+"""`clearway scenes build|inspect|export`."""
 
 from __future__ import annotations
 
@@ -84,6 +84,31 @@ class Inspect:
             print_json(content)
         else:
             _print_table(content)
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write a scene for other people's loaders.
+
+    Example: clearway scenes export bathroom.h5 --out bathroom_thor.h5
+    """
+
+    file: Annotated[Path, tyro.conf.Positional]
+    """The scene file."""
+    out: Path
+    """The file to write."""
+    format: Literal["thor-v1"] = "thor-v1"
+    """The layout of the published dumps, and nothing else in the file; HDF5 1.8 reads it."""
+
+    def run(self) -> None:
+        """Read and write."""
+        from clearway.scenes.export import export_thor_v1
+        from clearway.scenes.thor_v1 import read_scene
+
+        if self.out.resolve() == self.file.resolve():
+            raise ClearwayError(f"{self.out}: would be written over the scene itself. Give another file with --out")
+        export_thor_v1(read_scene(self.file), self.out)
+        stderr_console().print(f"{self.out}: in the layout {self.format}", highlight=False)
 
 
 def _print_table(content: dict[str, object]) -> None:
