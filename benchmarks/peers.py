@@ -1,6 +1,6 @@
 """Our learner beside Stable-Baselines3, measured in one run: frames/s, and seconds until every target is solved.
 
-    pip install 'clearway[benchmarks]'
+    pip install 'clearway[sb3]'
     python benchmarks/peers.py                                 # the four default rooms; an hour and more
     python benchmarks/peers.py --cap-minutes 5 --seconds 5     # a first look
     python benchmarks/peers.py --scenes a.h5 b.h5 --json peers.json

@@ -2,12 +2,12 @@
 
 Nothing here makes it slower than it has to be: environments are made without Gymnasium's checker, the features come
 prepared, the network's layers are `nn.Linear`, its Adam is PyTorch's fused one, and beside SB3's own ways to run many
-environments there is `BatchedEnvs`, which gives it our batched one.
+environments there is our own `SB3VecEnv`, which gives it the batched one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,6 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.distributions import Distribution
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
@@ -26,7 +25,7 @@ from torch import Tensor
 
 import clearway.envs
 from clearway.envs.registration import DEFAULT_STEP_LIMIT, ENV_ID
-from clearway.envs.vector import ImageGoalVectorEnv
+from clearway.envs.sb3 import SB3VecEnv, scene_space
 from clearway.envs.world import World
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, Reward
@@ -38,11 +37,6 @@ VEC_ENVS = ("dummy", "subproc", "batched")
 
 
 # ----------------------------------------------------------------------------------------------------- environments
-
-
-def scene_space(scene_count: int) -> spaces.Box:
-    """Space of the scene's index, as the policy gets it."""
-    return spaces.Box(0, max(scene_count - 1, 1), (1,), np.float32)
 
 
 class SceneInObservation(gymnasium.Wrapper):
@@ -69,66 +63,6 @@ class SceneInObservation(gymnasium.Wrapper):
         return seen | {"scene": np.array([info["scene"]], np.float32)}
 
 
-class BatchedEnvs(VecEnv):
-    """Our vector environment in the form that SB3 wants, without a loop over environments."""
-
-    def __init__(self, envs: ImageGoalVectorEnv) -> None:
-        self.envs = envs
-        seen = envs.single_observation_space
-        assert isinstance(seen, spaces.Dict)
-        with_scene = spaces.Dict({**seen.spaces, "scene": scene_space(len(envs.scene_names))})
-        super().__init__(envs.num_envs, with_scene, spaces.Discrete(ACTION_COUNT))
-        self._actions = np.zeros(envs.num_envs, np.int64)
-
-    def reset(self) -> Observation:
-        """Begin all episodes, with the seeds given by `seed` the first time."""
-        seen, info = self.envs.reset(seed=[None if seed is None else int(seed) for seed in self._seeds])
-        self._reset_seeds()
-        return self._with_scene(seen, info["scene"])
-
-    def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions for `step_wait`."""
-        self._actions = actions
-
-    def step_wait(self) -> tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Step all; ended episodes begin anew, with their last observation in the info."""
-        seen, reward, terminated, truncated, info = self.envs.step(self._actions)
-        ended = terminated | truncated
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for env in np.flatnonzero(ended).tolist():
-            scene = np.array([info["final_info"]["scene"][env]], np.float32)
-            infos[env]["terminal_observation"] = info["final_obs"][env] | {"scene": scene}
-            infos[env]["TimeLimit.truncated"] = bool(truncated[env] and not terminated[env])
-        return self._with_scene(seen, info["scene"]), reward.astype(np.float32), ended, infos
-
-    def _with_scene(self, seen: Observation, scene: np.ndarray) -> Observation:
-        return {**seen, "scene": scene[:, None].astype(np.float32)}
-
-    def close(self) -> None:
-        """Close the environments."""
-        self.envs.close()
-
-    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
-        """The attribute, once for each environment asked for."""
-        return [getattr(self.envs, attr_name)] * len(list(self._get_indices(indices)))
-
-    def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
-        """Set the attribute for all."""
-        setattr(self.envs, attr_name, value)
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Call the method once, for all."""
-        return [getattr(self.envs, method_name)(*method_args, **method_kwargs)]
-
-    def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper], indices: int | Iterable[int] | None = None
-    ) -> list[bool]:
-        """Never."""
-        return [False] * len(list(self._get_indices(indices)))
-
-
 def single_env(scenes: Sequence[Scene], reward: Reward, step_limit: int, threads: int | None) -> gymnasium.Env:
     """One environment; threads: of torch in a process of its own, None leaves this process's."""
     if threads is not None:
@@ -149,14 +83,9 @@ def vec_env(
 ) -> VecEnv:
     """`count` environments of a kind of `VEC_ENVS`; the scenes' features are given out as they are."""
     if kind == "batched":
-        envs = ImageGoalVectorEnv(
-            list(scenes),
-            num_envs=count,
-            reward=reward,
-            max_episode_steps=step_limit,
-            autoreset_mode=AutoresetMode.SAME_STEP,
+        return SB3VecEnv(
+            list(scenes), num_envs=count, scene_in_observation=True, reward=reward, max_episode_steps=step_limit
         )
-        return BatchedEnvs(envs)
     threads = 1 if kind == "subproc" else None
     make: list[Callable[[], gymnasium.Env]] = [partial(single_env, scenes, reward, step_limit, threads)] * count
     return SubprocVecEnv(make, start_method="spawn") if kind == "subproc" else DummyVecEnv(make)

@@ -1,0 +1,35 @@
+"""Our environments under their names in Ray's registry: `register_rllib`. Needs RLlib, `pip install 'ray[rllib]'`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+
+from clearway.envs.registration import ENV_ID, register_environments
+from clearway.errors import EnvError
+
+
+def register_rllib() -> str:
+    """Register the environment with Ray and give back its name.
+
+    Use it as `AlgorithmConfig.environment(name, env_config={...})`; what stands in `env_config` goes to
+    `gymnasium.make`: scenes, targets, reward, observations, ...
+
+    Raises:
+        EnvError: RLlib is not installed.
+    """
+    try:
+        from ray.tune.registry import register_env
+    except ImportError as error:
+        raise EnvError("register_rllib needs RLlib. Install it: pip install 'ray[rllib]'") from error
+
+    register_env(ENV_ID, made)
+    return ENV_ID
+
+
+def made(config: Mapping[str, Any]) -> gymnasium.Env:
+    """One environment; RLlib makes it in each of its workers."""
+    register_environments()
+    return gymnasium.make(ENV_ID, **config)

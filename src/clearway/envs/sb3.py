@@ -1,0 +1,103 @@
+"""The batched environment in the form that Stable-Baselines3 wants: `SB3VecEnv`. Needs the extra `sb3`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+
+from clearway.envs.vector import ImageGoalVectorEnv, Observation
+from clearway.errors import EnvError
+from clearway.scenes.actions import ACTION_COUNT
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError as error:
+    raise EnvError("clearway.envs.sb3 needs Stable-Baselines3. Install it: pip install 'clearway[sb3]'") from error
+
+
+class SB3VecEnv(VecEnv):
+    """`ImageGoalVectorEnv` as a Stable-Baselines3 `VecEnv`, without a loop over environments.
+
+    Ended episodes begin anew in the same step. The info of an environment holds `collision`, `cost` (1.0 on a blocked
+    move), and where its episode ended `terminal_observation` and `TimeLimit.truncated`, from which SB3 bootstraps.
+
+    Args:
+        scenes, settings: as of `ImageGoalVectorEnv`.
+        num_envs: environments side by side.
+        scene_in_observation: add the scene's index, (1,) float32, as `scene`, for policies with a head a scene.
+    """
+
+    def __init__(self, scenes: Any, *, num_envs: int = 1, scene_in_observation: bool = False, **settings: Any) -> None:
+        self.envs = ImageGoalVectorEnv(scenes, num_envs=num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
+        self.scene_in_observation = scene_in_observation
+        seen = self.envs.single_observation_space
+        assert isinstance(seen, spaces.Dict)
+        if scene_in_observation:
+            seen = spaces.Dict({**seen.spaces, "scene": scene_space(len(self.envs.scene_names))})
+        super().__init__(num_envs, seen, spaces.Discrete(ACTION_COUNT))
+        self._actions = np.zeros(num_envs, np.int64)
+
+    def reset(self) -> Observation:
+        """Begin all episodes, with the seeds given by `seed` the first time."""
+        seen, info = self.envs.reset(seed=[None if seed is None else int(seed) for seed in self._seeds])
+        self._reset_seeds()
+        return self._with_scene(seen, info["scene"])
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions (N,) for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Step all: observations, rewards (N,) float32, ends (N,) bool, infos."""
+        seen, reward, terminated, truncated, info = self.envs.step(self._actions)
+        ended = terminated | truncated
+        collision = info["collision"]
+        if ended.any():  # what the last step of an episode did stands in its final info
+            collision = np.where(ended, info["final_info"]["collision"], collision)
+        infos: list[dict[str, Any]] = [{"collision": hit, "cost": float(hit)} for hit in collision.tolist()]
+        for env in np.flatnonzero(ended).tolist():
+            last = self._with_scene(info["final_obs"][env], info["final_info"]["scene"][env])
+            infos[env]["terminal_observation"] = last
+            infos[env]["TimeLimit.truncated"] = bool(truncated[env] and not terminated[env])
+        return self._with_scene(seen, info["scene"]), reward.astype(np.float32), ended, infos
+
+    def _with_scene(self, seen: Observation, scene: np.ndarray) -> Observation:
+        return {**seen, "scene": np.asarray(scene, np.float32)[..., None]} if self.scene_in_observation else seen
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.envs.close()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """A picture of each environment, if made with render_mode "rgb_array"."""
+        return list(self.envs.render() or [None] * self.num_envs)
+
+    def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
+        """The attribute, once for each environment asked for."""
+        return [getattr(self.envs, attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
+        """Set the attribute for all."""
+        setattr(self.envs, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call the method once, for all."""
+        return [getattr(self.envs, method_name)(*method_args, **method_kwargs)]
+
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper], indices: int | Iterable[int] | None = None
+    ) -> list[bool]:
+        """Never."""
+        return [False] * len(list(self._get_indices(indices)))
+
+
+def scene_space(scene_count: int) -> spaces.Box:
+    """Space of the scene's index, as a policy gets it."""
+    return spaces.Box(0, max(scene_count - 1, 1), (1,), np.float32)
