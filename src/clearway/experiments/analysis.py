@@ -88,7 +88,7 @@ def section(setting: Setting) -> Section:
             "policy, ties taken alike. Soft: where the loss comes to rest with that entropy weight; the paper's: beta "
             f"{PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, pose level."
         ),
-        tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows)),),
+        tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows), folded=True),),
         figures=tuple(_pareto(setting, found, metric) for metric in ("collision_visits", "collisions")),
         missing=all_missing(compared(setting, PAIR), setting.out),
     )

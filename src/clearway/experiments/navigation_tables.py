@@ -105,4 +105,4 @@ def _target_table(name: str, title: str, world: World, found: Sequence[tuple[Gro
                 for row, seed in enumerate(values.seeds)
             ]
     headings = ("scene", "target", "learner", "agent", "seed", *TARGET_METRICS)
-    return ReportTable(f"{name}_targets", f"{title}: every target", headings, tuple(rows))
+    return ReportTable(f"{name}_targets", f"{title}: every target", headings, tuple(rows), folded=True)

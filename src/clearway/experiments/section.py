@@ -20,6 +20,7 @@ class ReportTable:
         headings: of the columns.
         rows: as many values each; None where there is none yet.
         notes: below it.
+        folded: in the page it shows when asked for.
     """
 
     name: str
@@ -27,6 +28,7 @@ class ReportTable:
     headings: tuple[str, ...]
     rows: tuple[tuple[Value, ...], ...]
     notes: tuple[str, ...] = ()
+    folded: bool = False
 
     def __post_init__(self) -> None:
         """Every row must fit the headings."""

@@ -50,6 +50,9 @@ th, td { padding: .5rem .55rem; text-align: right; white-space: nowrap; vertical
 thead th { color: var(--soft); font-weight: 500; white-space: normal; vertical-align: bottom; font-size: .82rem; }
 th:first-child { text-align: left; position: sticky; left: 0; background: var(--card); }
 tbody th { font-weight: 600; }
+th.words, td.words { text-align: left; }
+td.long { white-space: normal; min-width: 22rem; }
+.warning { border-left: .3rem solid #b3261e; padding-left: .8rem; }
 tbody tr:last-child > * { border-bottom: 0; }
 td small, th small { display: block; color: var(--soft); font-weight: 400; font-size: .8rem; }
 .failed { color: var(--failed); font-weight: 600; }

@@ -24,6 +24,7 @@ from clearway.viz.page_style import CSS
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
 
 HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
+LONG_TEXT = 60  # letters; a column with more is broken into lines
 SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
 
 
@@ -130,7 +131,7 @@ def _markdown_table(table: ReportTable) -> list[str]:
 
 
 def _page(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
-    parts = [f"<p class=lead>{escape(warning)}</p>"] if warning else []
+    parts = [f'<p class="lead warning">{escape(warning)}</p>'] if warning else []
     body = "".join(_section(folder, section) for section in sections)
     made = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts.items())
     return (
@@ -162,13 +163,23 @@ def _encoded(folder: Path, name: str) -> str:
 
 
 def _table(table: ReportTable) -> str:
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in table.headings)
+    kinds = [_column_class([row[column] for row in table.rows]) for column in range(len(table.headings))]
+    head = "".join(f"<th{kind}>{escape(text)}</th>" for kind, text in zip(kinds, table.headings, strict=True))
     rows = "".join(
-        "<tr>" + "".join(f"<td>{escape(value_text(value))}</td>" for value in row) + "</tr>"
+        "<tr>"
+        + "".join(f"<td{kind}>{escape(value_text(value))}</td>" for kind, value in zip(kinds, row, strict=True))
+        + "</tr>"
         for row in table.rows[:SHOWN_ROWS]
     )
     notes = "".join(f"<p>{escape(note)}</p>" for note in (_folded(table), *table.notes) if note)
-    heading = f"<h3>{escape(table.title)}</h3>"
-    return (
-        f'{heading}<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
-    )
+    body = f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
+    title = escape(table.title)
+    return f"<details><summary>{title}</summary>{body}</details>" if table.folded else f"<h3>{title}</h3>{body}"
+
+
+def _column_class(values: Sequence[Value]) -> str:
+    """Columns of words stand on the left, long sentences are broken into lines; figures stay on the right."""
+    texts = [value for value in values if isinstance(value, str) and any(letter.isalpha() for letter in value)]
+    if not texts:
+        return ""
+    return ' class="words long"' if max(map(len, texts)) > LONG_TEXT else ' class="words"'
