@@ -122,8 +122,10 @@ def test_a_picture_too_large_is_refused_before_it_is_unpacked(tmp_path: Path, mo
         ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, "nan", 0]], ("line 2 holds",)),
         ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, 1e9, 0]], ("line 2 holds",)),
         ([["file", "x", "z", "heading"], ["gone.png", 0, 0, 0]], ("line 2", "gone.png", "no file")),
-        ([["file", "x", "z", "heading"], ["../flat.csv", 0, 0, 0]], ("outside the table's folder",)),
-        ([["file", "x", "z", "heading"], ["/etc/hostname", 0, 0, 0]], ("outside the table's folder",)),
+        ([["file", "x", "z", "heading"], ["a\0b.png", 0, 0, 0]], ("line 2", "no file")),
+        ([["file", "x", "z", "heading"], ["a" * 9000, 0, 0, 0]], ("line 2", "no file")),
+        ([["file", "x", "z", "heading"], ["../flat.csv", 0, 0, 0]], ("no file in the table's folder",)),
+        ([["file", "x", "z", "heading"], ["/etc/hostname", 0, 0, 0]], ("no file in the table's folder",)),
     ],
 )
 def test_tables_that_do_not_fit_are_refused(rows: list[Row], parts: tuple[str, ...], tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+import struct
 import tempfile
 import zipfile
 import zlib
@@ -18,7 +19,17 @@ MAX_BYTES = 64 * 1024**3  # of all scene files of an archive together, unpacked
 MAX_RATIO = 200  # unpacked bytes for each packed one, beyond the first MiB
 BLOCK_BYTES = 1024**2
 GET_ANOTHER = "Get another copy, or unpack it yourself and give the files"
-_FAULTS = (OSError, EOFError, ValueError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_FAULTS = (
+    OSError,
+    EOFError,
+    LookupError,  # zipfile's own, for a member without a name
+    ValueError,
+    RuntimeError,
+    MemoryError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @contextmanager

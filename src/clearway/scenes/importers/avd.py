@@ -18,7 +18,7 @@ import numpy as np
 from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 from clearway.scenes.importers.json_files import read_json
-from clearway.scenes.importers.photographs import HEIGHT_PX, photographs
+from clearway.scenes.importers.photographs import HEIGHT_PX, photographs, picture_within
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import MAX_STATES, MIN_HEADINGS, SceneWarning, check_scene
 from clearway.version import __version__
@@ -155,8 +155,7 @@ def _laid_out(graph: np.ndarray, heading_count: int) -> tuple[np.ndarray, np.nda
 
 
 def _picture_path(folder: Path, name: str) -> Path:
-    pictures = (folder / PICTURES).resolve()
-    path = (pictures / name).resolve()
-    if not path.is_relative_to(pictures) or not path.is_file():
+    path = picture_within(folder / PICTURES, name)
+    if path is None:
         raise SceneError(folder / ANNOTATIONS, f"names {name[:80]!r}, which is no file in {PICTURES}", GET_WHOLE)
     return path

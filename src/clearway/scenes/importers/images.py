@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.scenes.importers.photographs import HEIGHT_PX, photographs
+from clearway.scenes.importers.photographs import HEIGHT_PX, photographs, picture_within
 from clearway.scenes.importers.pose_graph import recorded_pose_graph
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES, check_scene
@@ -109,10 +109,8 @@ def _numbers(path: Path, number: int, words: list[str]) -> list[float]:
 
 
 def _picture_path(table: Path, number: int, word: str) -> Path:
-    folder = table.parent.resolve()
-    path = (folder / word).resolve()
-    if not path.is_relative_to(folder):
-        raise SceneError(table, f"line {number} names {word!r}, outside the table's folder", "Put it beside the table")
-    if not path.is_file():
-        raise SceneError(table, f"line {number} names {word!r}, which is no file", "Correct the name, or add it")
+    path = picture_within(table.parent, word)
+    if path is None:
+        problem = f"line {number} names {word[:80]!r}, which is no file in the table's folder"
+        raise SceneError(table, problem, "Correct the name, or put the file there")
     return path

@@ -48,6 +48,16 @@ class Photographs:
         return pictures.reshape(*wanted.shape, *self.shape[1:])
 
 
+def picture_within(folder: Path, name: str) -> Path | None:
+    """The file of that name in a folder or below it; None where there is none, or the name leads elsewhere."""
+    try:
+        inside = folder.resolve()
+        path = (inside / name).resolve()
+        return path if path.is_relative_to(inside) and path.is_file() else None
+    except (OSError, ValueError):  # a name too long, or with a null byte
+        return None
+
+
 def photographs(paths: Sequence[Path], height_px: int = HEIGHT_PX, width_px: int | None = None) -> Photographs:
     """Picture files as pictures of one size.
 
