@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +15,16 @@ from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
     from clearway.scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How pictures become features."""
+
+    encoder: str = "auto"
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +55,7 @@ class ImportDumps:
             scenes = [read_scene(path) for path in files]
             _check_nothing_is_lost(files, [self.out / f"{scene.name}.h5" for scene in scenes])
             if self.encoder:
-                encode_and_write(scenes, self.out, self.encoder, self.encoder_seed)
+                encode_and_write(scenes, self.out, Encoding(self.encoder, self.encoder_seed))
             else:
                 write_scenes(scenes, self.out)
 
@@ -102,19 +112,15 @@ class ImportImages:
     """Of the scene; by default the table's."""
     height: int = 300
     """Of the scene's pictures, pixels; the width follows from the first photograph, others are cut to fit."""
-    encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
-    encoder_seed: int = 0
-    """Seed of random-resnet50."""
+    encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
         """Read, encode and write."""
         from clearway.scenes.importers.images import read_images
 
         check_at_least(1, height=self.height)
-        check_seeds(encoder_seed=self.encoder_seed)
         scene = read_images(self.table, step_m=self.step, blocked=self.blocked, name=self.name, height_px=self.height)
-        encode_and_write([scene], self.out, self.encoder, self.encoder_seed)
+        encode_and_write([scene], self.out, self.encoding)
 
 
 @dataclass(frozen=True)
@@ -145,7 +151,7 @@ class ImportSavn:
         if self.encoder is None and featured:
             write_scenes(scenes, self.out)
         else:
-            encode_and_write(scenes, self.out, self.encoder or "auto", self.encoder_seed)
+            encode_and_write(scenes, self.out, Encoding(self.encoder or "auto", self.encoder_seed))
 
 
 @dataclass(frozen=True)
@@ -161,19 +167,15 @@ class ImportAvd:
     """Folder for the scene files."""
     height: int = 300
     """Of the scene's pictures, pixels; the width follows."""
-    encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
-    encoder_seed: int = 0
-    """Seed of random-resnet50."""
+    encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
         """Read, encode and write."""
         from clearway.scenes.importers.avd import read_avd
 
         check_at_least(1, height=self.height)
-        check_seeds(encoder_seed=self.encoder_seed)
         scenes = [read_avd(folder, height_px=self.height) for folder in self.folders]
-        encode_and_write(scenes, self.out, self.encoder, self.encoder_seed)
+        encode_and_write(scenes, self.out, self.encoding)
 
 
 @dataclass(frozen=True)
@@ -193,23 +195,20 @@ class ImportAi2Thor:
     """Of the pictures, pixels."""
     height: int = 300
     """Of the pictures, pixels."""
-    encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
-    encoder_seed: int = 0
-    """Seed of random-resnet50."""
+    encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
         """Photograph, encode and write."""
         from clearway.scenes.importers.ai2thor import photographed, started
 
         check_at_least(1, width=self.width, height=self.height)
-        check_seeds(encoder_seed=self.encoder_seed)
         check_positive(step=self.step)
+        check_seeds(encoder_seed=self.encoding.encoder_seed)  # before anything that takes minutes
         scenes = []
         for name in self.rooms:
             with started(name, self.step, self.width, self.height) as controller:
                 scenes.append(photographed(controller, name, step_m=self.step, progress=True))
-        encode_and_write(scenes, self.out, self.encoder, self.encoder_seed)
+        encode_and_write(scenes, self.out, self.encoding)
 
 
 @dataclass(frozen=True)
@@ -233,11 +232,12 @@ class ImportScenes:
         self.kind.run()
 
 
-def encode_and_write(scenes: Sequence[Scene], out: Path, encoder: str, encoder_seed: int) -> None:
+def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding) -> None:
     """Give scenes features, all by one encoder, and write them into a folder."""
     from clearway.perception import encode_scenes
 
-    write_scenes(encode_scenes(scenes, encoder, seed=encoder_seed, progress=True), out)
+    check_seeds(encoder_seed=encoding.encoder_seed)
+    write_scenes(encode_scenes(scenes, encoding.encoder, seed=encoding.encoder_seed, progress=True), out)
 
 
 def write_scenes(scenes: Sequence[Scene], out: Path) -> None:
