@@ -19,17 +19,16 @@ def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
     """
     found = []
     for learner in dict.fromkeys(group.learner for group in groups):
-        world, agents = setting.world(), {}
-        for group in groups:
-            run = group.runs[0]
-            if (group.learner, run.reward in PAIR) == (learner, True) and episodes_of(setting.out, run, group.trial):
-                agents[group.agent] = load_agent(run_folder(setting.out, run).path)
-        if len(agents) == len(PAIR):
-            policies = {name: agent.policy(world) for name, agent in agents.items()}
-            length = next(iter(agents.values())).record.learner.history_length
-            for show in showcases(world, policies, history_length=length):
-                walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
-                name = f"map_{learner.replace(', ', '_')}_{show.scene}"
-                title = f"{learner}: {show.scene}, {show.shortest_path_steps} steps at least"
-                found.append(ReportMap(name, title, show.scene, show.target, walks))
+        own = [group for group in groups if group.learner == learner and group.runs[0].reward in PAIR]
+        if any(episodes_of(setting.out, group.runs[0], group.trial) is None for group in own):
+            continue
+        world = setting.world()
+        agents = {group.agent: load_agent(run_folder(setting.out, group.runs[0]).path) for group in own}
+        policies = {name: agent.policy(world) for name, agent in agents.items()}
+        history_length = own[0].runs[0].learner.history_length
+        for show in showcases(world, policies, history_length=history_length):
+            walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
+            name = f"map_{learner.replace(', ', '_')}_{show.scene}"
+            title = f"{learner}: {show.scene}, {show.shortest_path_steps} steps at least"
+            found.append(ReportMap(name, title, show.scene, show.target, walks))
     return tuple(found)
