@@ -38,20 +38,20 @@ def bad(request, dump, tmp_path):
 def test_import_refuses_it_and_leaves_nothing(clearway, dump, bad, tmp_path):
     path, problem = bad
     good = dump(tmp_path / "good.h5")
-    clearway("scenes", "import", "thor-v1", good, path, "--out", tmp_path / "out").refusal(str(path), problem)
+    assert clearway("scenes", "import", "thor-v1", good, path, "--out", tmp_path / "out").refusal(str(path), problem)
     assert not (tmp_path / "out").exists()
 
 
 def test_train_refuses_it_and_leaves_nothing(clearway, bad, tmp_path):
     path, problem = bad
-    clearway("train", path, "--out", tmp_path / "run").refusal(str(path), problem)
+    assert clearway("train", path, "--out", tmp_path / "run").refusal(str(path), problem)
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("command", [("scenes", "inspect"), ("oracle",)], ids=" ".join)
 def test_others_refuse_it(clearway, bad, command):
     path, problem = bad
-    clearway(*command, path, "--json").refusal(str(path), problem)
+    assert clearway(*command, path, "--json").refusal(str(path), problem)
 
 
 def test_a_picture_that_turns_out_damaged_leaves_nothing_half_written(clearway, trained, tmp_path):
@@ -62,15 +62,15 @@ def test_a_picture_that_turns_out_damaged_leaves_nothing_half_written(clearway, 
     content[chunk.byte_offset + chunk.size // 2] ^= 0x10
     path.write_bytes(content)
     answer = clearway("scenes", "import", "thor-v1", path, "--out", tmp_path / "out")
-    answer.refusal(str(path), "dataset 'observation'", "is damaged")
+    assert answer.refusal(str(path), "dataset 'observation'", "is damaged")
     assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_a_dump_is_not_written_over_itself_or_its_namesake(clearway, dump, tmp_path):
     first, second = dump(tmp_path / "a" / "attic.h5"), dump(tmp_path / "b" / "attic.h5")
     before = first.read_bytes()
-    clearway("scenes", "import", "thor-v1", first, "--out", first.parent).refusal(str(first), "--out")
-    clearway("scenes", "import", "thor-v1", first, second, "--out", tmp_path / "out").refusal(
+    assert clearway("scenes", "import", "thor-v1", first, "--out", first.parent).refusal(str(first), "--out")
+    assert clearway("scenes", "import", "thor-v1", first, second, "--out", tmp_path / "out").refusal(
         str(first), "has this name"
     )
     assert first.read_bytes() == before
@@ -84,9 +84,9 @@ def test_scenes_that_do_not_belong_together(clearway, dump, tmp_path):
         file["resnet_feature"] = kept
 
     first, second = dump(tmp_path / "one.h5"), dump(tmp_path / "two.h5", change=shorter)
-    clearway("train", first, second, "--out", tmp_path / "run").refusal("two", "20 features", "same encoder")
+    assert clearway("train", first, second, "--out", tmp_path / "run").refusal("two", "20 features", "same encoder")
 
 
 def test_a_scene_without_features_is_not_trained_on(clearway, dump, tmp_path):
     path = dump(tmp_path / "bare.h5", change=lambda file: file.pop("resnet_feature"))
-    clearway("train", path, "--out", tmp_path / "run").refusal("features")
+    assert clearway("train", path, "--out", tmp_path / "run").refusal("features")

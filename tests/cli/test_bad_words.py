@@ -63,14 +63,14 @@ def test_a_refusal_in_colours_is_one_plain_line():
     ids=" ".join,
 )
 def test_training_that_cannot_be(clearway, trained, tmp_path, words, parts):
-    clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(*parts)
+    assert clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(*parts)
     assert not (tmp_path / "run" / "run.json").exists()
 
 
 def test_targets_that_leave_open_which_scene(clearway, dump, tmp_path):
     files = [dump(tmp_path / f"{name}.h5") for name in ("one", "two")]
     answer = clearway("train", *files, "--out", tmp_path / "run", "--targets", "26")
-    answer.refusal("--targets 26", "several scenes", "SCENE=26")
+    assert answer.refusal("--targets 26", "several scenes", "SCENE=26")
 
 
 @pytest.mark.parametrize(
@@ -88,30 +88,30 @@ def test_missing_files_and_empty_folders(clearway, tmp_path, monkeypatch, words)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     for name in ("missing.h5", "empty"):
-        clearway(*(name if word == "FILE" else word for word in words)).refusal(name)
+        assert clearway(*(name if word == "FILE" else word for word in words)).refusal(name)
     assert os.listdir() == ["empty"]
 
 
 def test_no_file_at_all(clearway, tmp_path):
-    clearway("train", "--out", tmp_path / "run").refusal("no scene file given")
+    assert clearway("train", "--out", tmp_path / "run").refusal("no scene file given")
 
 
 def test_a_folder_of_several_files_is_not_one_scene(clearway, dump, tmp_path):
     for name in ("one", "two"):
         dump(tmp_path / f"{name}.h5")
-    clearway("scenes", "inspect", tmp_path).refusal(str(tmp_path), "2 scene files", "one.h5")
+    assert clearway("scenes", "inspect", tmp_path).refusal(str(tmp_path), "2 scene files", "one.h5")
 
 
 def test_all_rooms_need_a_folder(clearway, tmp_path):
     path = tmp_path / "rooms.h5"
-    clearway("scenes", "build", "--room", "all", "--out", path).refusal(str(path), "four files", "--out")
+    assert clearway("scenes", "build", "--room", "all", "--out", path).refusal(str(path), "four files", "--out")
     assert not path.exists()
 
 
 @pytest.mark.parametrize("words", [("--seed", "-1"), ("--encoder-seed", "-1")], ids=" ".join)
 def test_rooms_have_no_negative_seed(clearway, tmp_path, words):
     answer = clearway("scenes", "build", "--room", "bathroom", "--out", tmp_path / "x.h5", *words)
-    answer.refusal(f"{words[0]} is -1")
+    assert answer.refusal(f"{words[0]} is -1")
 
 
 @pytest.mark.parametrize(
@@ -126,14 +126,16 @@ def test_rooms_have_no_negative_seed(clearway, tmp_path, words):
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
 def test_evaluation_that_cannot_be(clearway, trained, words, part):
-    clearway("evaluate", trained.run, *words).refusal(part)
+    assert clearway("evaluate", trained.run, *words).refusal(part)
 
 
 def test_a_checkpoint_of_another_network_is_one_line_too(clearway, trained, tmp_path, small):
     wider = tmp_path / "wider"
     assert clearway("train", trained.scene, "--out", wider, *small, "width=24").code == 0
     checkpoint = newest_checkpoint(wider / "checkpoints")
-    clearway("evaluate", trained.run, "--checkpoint", checkpoint).refusal(str(checkpoint), "does not fit its run")
+    assert clearway("evaluate", trained.run, "--checkpoint", checkpoint).refusal(
+        str(checkpoint), "does not fit its run"
+    )
 
 
 def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
@@ -141,8 +143,8 @@ def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
     below = tmp_path / "file" / "below"
     source = dump(tmp_path / "attic.h5")
     evaluate = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5)
-    clearway("scenes", "inspect", trained.scene, "--map", below).refusal(str(tmp_path / "file"))
-    clearway("scenes", "import", "thor-v1", source, "--out", below).refusal(str(tmp_path / "file"))
-    clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))
-    clearway(*evaluate, "--pictures", below).refusal(str(tmp_path / "file"))
-    clearway("demo", "--out", below).refusal(str(tmp_path / "file"))
+    assert clearway("scenes", "inspect", trained.scene, "--map", below).refusal(str(tmp_path / "file"))
+    assert clearway("scenes", "import", "thor-v1", source, "--out", below).refusal(str(tmp_path / "file"))
+    assert clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))
+    assert clearway(*evaluate, "--pictures", below).refusal(str(tmp_path / "file"))
+    assert clearway("demo", "--out", below).refusal(str(tmp_path / "file"))

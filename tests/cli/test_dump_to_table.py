@@ -120,14 +120,14 @@ def test_scenes_may_have_moved(clearway, trained, dump, tmp_path):
     words = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5, "--json", "--scenes")
     assert clearway(*words, moved.parent).code == 0
     elsewhere = dump(tmp_path / "moved" / "attic.h5")
-    clearway(*words, elsewhere).refusal("bathroom_02", "--scenes")
+    assert clearway(*words, elsewhere).refusal("bathroom_02", "--scenes")
 
 
 def test_a_run_goes_on_only_when_asked_to(clearway, trained, small):
     words = ("train", trained.scene, "--out", trained.run, "--alpha", "-0.02", "--gamma", "-1.5e-2", *small)
-    clearway(*words).refusal(str(trained.run), "holds a run already", "--resume")
+    assert clearway(*words).refusal(str(trained.run), "holds a run already", "--resume")
     assert clearway(*words, "--resume").code == 0
-    clearway(*words, "--resume", "--seed", 7).refusal("another experiment")
+    assert clearway(*words, "--resume", "--seed", 7).refusal("another experiment")
 
 
 def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):

@@ -47,5 +47,5 @@ def test_a_map_can_be_drawn_without_a_picture_from_above(clearway, tmp_path):
     ],
 )
 def test_what_cannot_be_made_is_one_line(clearway, plans, tmp_path, words, parts):
-    clearway("scenes", "import", "floor-plan", plans, "--out", tmp_path / "scenes", *words).refusal(*parts)
+    assert clearway("scenes", "import", "floor-plan", plans, "--out", tmp_path / "scenes", *words).refusal(*parts)
     assert not (tmp_path / "scenes").exists()

@@ -76,4 +76,4 @@ def test_a_table_without_json(clearway, corridor):
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
 def test_bad_settings(clearway, corridor, words, part):
-    clearway("oracle", corridor, *words).refusal(part)
+    assert clearway("oracle", corridor, *words).refusal(part)

@@ -46,4 +46,4 @@ def test_a_thousand_flipped_bits(scene_file: Path) -> None:
 
 @pytest.mark.slow
 def test_ten_thousand_flipped_bits(scene_file: Path) -> None:
-    outcomes(scene_file, chosen_bits(scene_file, 10_000, seed=1))
+    assert outcomes(scene_file, chosen_bits(scene_file, 10_000, seed=1)).total() == 10_000
