@@ -33,3 +33,10 @@ def test_a_missing_photograph_is_named_and_nothing_is_written(clearway, tmp_path
     answer = clearway("scenes", "import", "images", table, "--out", tmp_path / "scenes")
     assert answer.refusal("office.csv", "line 7", "0.5-90.png")
     assert not (tmp_path / "scenes").exists()
+
+
+def test_a_name_that_leads_out_of_the_folder_is_refused(clearway, tmp_path: Path) -> None:
+    table = photographed(tmp_path)
+    words = ("scenes", "import", "images", table, "--out", tmp_path / "scenes", "--name", "../office")
+    assert clearway(*words).refusal("../office", "without slashes")
+    assert not (tmp_path / "office.h5").exists()

@@ -29,3 +29,13 @@ def test_a_folder_becomes_a_scene_that_can_be_inspected(clearway, tmp_path: Path
 def test_a_folder_of_something_else_is_refused(clearway, tmp_path: Path) -> None:
     answer = clearway("scenes", "import", "savn", tmp_path, "--out", tmp_path / "scenes")
     assert answer.refusal("graph.json", "no such file")
+
+
+def test_two_scenes_of_one_name_are_refused_before_anything_is_written(clearway, tmp_path: Path) -> None:
+    for part in ("train", "test"):
+        (tmp_path / part).mkdir()
+        made_folder(tmp_path / part / "FloorPlan9")
+    folders = [tmp_path / part / "FloorPlan9" for part in ("train", "test")]
+    answer = clearway("scenes", "import", "savn", *folders, "--out", tmp_path / "scenes")
+    assert answer.refusal("FloorPlan9", "has this name", "one by one")
+    assert not (tmp_path / "scenes").exists()

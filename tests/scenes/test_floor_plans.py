@@ -1,7 +1,5 @@
 """Floor plans typed in by hand, as scenes."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan, floor_plan_scene
 from clearway.scenes.spread import feature_spread
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
+from imported import imported_by
 
 # An L seen from above; the cells' numbers by x, then z:
 #   . #      1
@@ -158,5 +157,4 @@ def test_more_features_than_a_file_may_hold() -> None:
 
 
 def test_a_plan_needs_neither_simulator_nor_torch() -> None:
-    script = "import sys, clearway.scenes.floor_plan_files; sys.exit(bool({'mujoco', 'torch'} & set(sys.modules)))"
-    subprocess.run([sys.executable, "-c", script], check=True, env={"PYTHONPATH": ":".join(sys.path)})
+    assert not {"mujoco", "torch"} & imported_by("import clearway.scenes.floor_plan_files")

@@ -53,11 +53,10 @@ class ImportDumps:
         with unpacked(self.files, SCENE_SUFFIXES) as paths:  # pictures stay in the files until they are written
             files = scene_files(paths)
             scenes = [read_scene(path) for path in files]
-            _check_nothing_is_lost(files, [self.out / f"{scene.name}.h5" for scene in scenes])
             if self.encoder:
-                encode_and_write(scenes, self.out, Encoding(self.encoder, self.encoder_seed))
+                encode_and_write(scenes, self.out, Encoding(self.encoder, self.encoder_seed), files)
             else:
-                write_scenes(scenes, self.out)
+                write_scenes(scenes, self.out, files)
 
 
 @dataclass(frozen=True)
@@ -232,29 +231,40 @@ class ImportScenes:
         self.kind.run()
 
 
-def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding) -> None:
-    """Give scenes features, all by one encoder, and write them into a folder."""
+def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding, files: Sequence[Path] = ()) -> None:
+    """Give scenes features, all by one encoder, and write them into a folder; arguments as of `write_scenes`."""
     from clearway.perception import encode_scenes
 
     check_seeds(encoder_seed=encoding.encoder_seed)
-    write_scenes(encode_scenes(scenes, encoding.encoder, seed=encoding.encoder_seed, progress=True), out)
+    _paths(scenes, out, files)  # before the minutes that encoding takes
+    write_scenes(encode_scenes(scenes, encoding.encoder, seed=encoding.encoder_seed, progress=True), out, files)
 
 
-def write_scenes(scenes: Sequence[Scene], out: Path) -> None:
-    """Write each scene into a folder, under its name, and say so."""
+def write_scenes(scenes: Sequence[Scene], out: Path, files: Sequence[Path] = ()) -> None:
+    """Write each scene into a folder, under its name, and say so.
+
+    Args:
+        scenes: to be written.
+        out: the folder.
+        files: that the scenes were read from, one each, and must not be written over; none where they were not.
+    """
     from clearway.scenes.thor_v1 import write_scene
 
-    for scene in scenes:
-        path = out / f"{scene.name}.h5"
+    for scene, path in zip(scenes, _paths(scenes, out, files), strict=True):
         write_scene(scene, path)
         stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
 
 
-def _check_nothing_is_lost(files: list[Path], paths: list[Path]) -> None:
-    """Check that no file would be written over one of those that are read, or over another one of `paths`."""
+def _paths(scenes: Sequence[Scene], out: Path, files: Sequence[Path]) -> list[Path]:
+    """Where the scenes are to be written, once it is seen that nothing is lost by it and all stay in the folder."""
+    names = [scene.name for scene in scenes]
     read = {file.resolve() for file in files}
-    for file, path in zip(files, paths, strict=True):
+    paths = [out / f"{name}.h5" for name in names]
+    for source, name, path in zip(files or names, names, paths, strict=True):
+        if Path(name).name != name:
+            raise ClearwayError(f"{name}: a scene's name becomes a file's. Give one without slashes")
         if path.resolve() in read:
             raise ClearwayError(f"{path}: would be written over a file to be imported. Give another folder with --out")
-        if paths.count(path) > 1:
-            raise ClearwayError(f"{file}: another file to be imported has this name. Import them one by one")
+        if names.count(name) > 1:
+            raise ClearwayError(f"{source}: another one to be imported has this name. Import them one by one")
+    return paths

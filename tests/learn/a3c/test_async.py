@@ -48,11 +48,14 @@ def children_of(process: int) -> list[int]:
     return [pid for pid in found if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
 
-def wait_until_gone(processes: list[int]) -> None:
+def are_gone_soon(processes: list[int]) -> bool:
+    """Within 30 s none of them runs any more."""
     deadline = time.monotonic() + 30
     while any(Path(f"/proc/{pid}").exists() and "Z" not in state_of(pid) for pid in processes):
-        assert time.monotonic() < deadline, "worker processes outlive their parent"
+        if time.monotonic() > deadline:
+            return False
         time.sleep(0.05)
+    return True
 
 
 def state_of(process: int) -> str:
@@ -114,7 +117,7 @@ def test_pauses_go_on_and_a_killed_worker_is_named(two_processes: AsyncTrainer) 
         while True:
             trainer.update()
     trainer.close()
-    wait_until_gone([number for number in numbers if number])
+    assert are_gone_soon([number for number in numbers if number])
 
 
 RUN = """
@@ -156,7 +159,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     process, workers = run_until_metrics(tmp_path)
     with process:
         process.kill()
-    wait_until_gone(workers)
+    assert are_gone_soon(workers)
 
 
 @pytest.mark.slow
@@ -168,7 +171,7 @@ def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -
         _, errors = process.communicate(timeout=60)
     assert process.returncode == -signal.SIGINT
     assert errors.count("Traceback") == 1, errors  # the parent's own
-    wait_until_gone(workers)
+    assert are_gone_soon(workers)
     trainer = a3c_request(10_000_000).trainer()
     folder = RunFolder(tmp_path)
     train._prepare(folder, a3c_request(10_000_000).record(), trainer, resume=True)

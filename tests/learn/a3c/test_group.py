@@ -65,12 +65,14 @@ def test_sequential_updates_of_one_worker_equal_the_plain_ones(worker: int) -> N
     ],
 )
 def test_rounds_of_several_workers_equal_the_plain_ones(learner: Learner) -> None:
-    check_against_plain([0, 5, 1, 2, 3, 4], learner, rounds=6)  # targets 0 0 1 2 in the corridor, 3 4 in the grid
+    assert check_against_plain(
+        [0, 5, 1, 2, 3, 4], learner, rounds=6
+    )  # targets 0 0 1 2 in the corridor, 3 4 in the grid
 
 
 def test_weights_larger_than_a_block_are_updated_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rmsprop, "BLOCK_ELEMENTS", 7 * 12)  # rows of 12 features: blocks of 7, 7 and 2 rows
-    check_against_plain([0, 3], A3C, rounds=3)
+    assert check_against_plain([0, 3], A3C, rounds=3)
 
 
 def test_a_worker_leaves_heads_of_other_scenes_alone() -> None:
