@@ -27,9 +27,10 @@ class SB3VecEnv(VecEnv):
     move), and where its episode ended `terminal_observation` and `TimeLimit.truncated`, from which SB3 bootstraps.
 
     Args:
-        scenes, settings: as of `ImageGoalVectorEnv`.
+        scenes: as of `ImageGoalVectorEnv`.
         num_envs: environments side by side.
         scene_in_observation: add the scene's index, (1,) float32, as `scene`, for policies with a head a scene.
+        **settings: others of `ImageGoalVectorEnv`.
     """
 
     def __init__(self, scenes: Any, *, num_envs: int = 1, scene_in_observation: bool = False, **settings: Any) -> None:

@@ -1,0 +1,86 @@
+"""The site builds without a broken link, and every command and program of README and tutorial does what it says."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from documents import ROOT, Block, code_blocks, run_block, shortened
+
+
+def test_blocks_are_found() -> None:
+    blocks = code_blocks(ROOT / "docs/tutorial.md")
+    assert blocks[0] == Block("sh", "clearway demo --out demo\n")
+    assert {block.language for block in blocks} == {"sh", "python"}
+
+
+def test_a_change_that_is_of_no_use_is_noticed() -> None:
+    assert shortened("train --frames 100", {"100": "5"}) == "train --frames 5"
+    with pytest.raises(AssertionError, match="no longer says '200'"):
+        shortened("train --frames 100", {"200": "5"})
+
+
+def test_a_block_that_fails_is_noticed(tmp_path: Path) -> None:
+    assert run_block(Block("sh", "false\ntrue\n"), tmp_path).returncode == 1
+    assert run_block(Block("python", "import clearway\nassert not clearway.__version__\n"), tmp_path).returncode == 1
+    assert run_block(Block("sh", "clearway --version\n"), tmp_path).stdout.startswith("clearway ")
+
+
+def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    pages = {page.parent.name for page in (tmp_path / "site").rglob("index.html")}
+    assert {"tutorial", "zones", "learning", "reference", "metrics", "results"} <= pages
+    assert "read_scene" in (tmp_path / "site/reference/index.html").read_text()  # from docstrings
+
+
+@pytest.mark.slow
+def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
+    blocks = code_blocks(ROOT / "docs/tutorial.md")
+    changes = {"--frames 320000": "--frames 4000", "demo --out demo": "demo --frames 4000 --out demo"}
+    whole = "\n".join(block.text for block in blocks)
+    assert all(old in whole for old in changes)
+    for block in blocks:
+        here = {old: new for old, new in changes.items() if old in block.text}
+        done = run_block(Block(block.language, shortened(block.text, here)), tmp_path)
+        assert done.returncode == 0, f"{block.text}\n{done.stderr}"
+    made = ("demo/index.html", "bathroom.png", "pictures", "episode.mp4", "scenes/office.h5", "runs/office")
+    assert all((tmp_path / name).exists() for name in made)
+
+
+@pytest.mark.slow
+def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
+    first, commands, program = code_blocks(ROOT / "README.md")
+    programs = [line.partition("#")[0].strip() for line in first.text.splitlines()]
+    assert programs == ["scripts/demo", "scripts/test"]  # CI runs the second, and with it this test
+    changes = {
+        ". .venv/bin/activate\n": "",
+        "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
+        "train scenes ": "train scenes --frames 4000 ",
+        "--scene kitchen": "--scene bathroom",
+        "reproduce all": "reproduce fig3 --rooms bathroom --frames 4000",
+    }
+    prepare_stand_ins(tmp_path)
+    done = run_block(Block("sh", shortened(commands.text, changes)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    done = run_block(program, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[0] in ("True", "False")
+    made = ("bathroom.png", "pictures", "episode.mp4", "scenes/plan.h5", "scenes/poses.h5", "scenes/dump.h5")
+    assert all((tmp_path / name).exists() for name in made)
+
+
+def prepare_stand_ins(folder: Path) -> None:
+    """What the README's commands take for given: a dump, a floor plan, photographs."""
+    (folder / "dumps").mkdir()
+    np.savez(folder / "plan.npz", plan=np.argwhere(np.ones((3, 4), bool)))
+    build = "clearway scenes build --room bathroom --out room.h5\n"
+    export = "clearway scenes export room.h5 --out dumps/dump.h5\n"
+    photographs = next(b for b in code_blocks(ROOT / "docs/tutorial.md") if b.language == "python")
+    here = Block("python", shortened(photographs.text, {"scenes/bathroom.h5": "room.h5"}))
+    for block in (Block("sh", build + export), here):
+        done = run_block(block, folder)
+        assert done.returncode == 0, done.stderr
