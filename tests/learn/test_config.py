@@ -64,7 +64,7 @@ def test_the_default_is_the_recipe() -> None:
         "entropy_start": 0.02,
         "entropy_end": 0.002,
         "log_barrier": 1e-3,
-        "lookahead": 0.02,
+        "lookahead": 0.04,
         "lookahead_temperature": 0.005,
         "optimiser": "adam",
         "clip_norm": 0.5,

@@ -58,7 +58,7 @@ class Learner:
     """Lambda of generalised advantage estimation; 1 gives n-step returns."""
     hindsight: bool = True
     """Learn also from passing other targets of the scene by, with truncated importance ratios."""
-    lookahead: float = 0.02
+    lookahead: float = 0.04
     """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better, at the start;
     falls linearly to 0. 0: none."""
     lookahead_temperature: float = 0.005
