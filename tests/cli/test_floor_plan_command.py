@@ -11,6 +11,27 @@ def plans(tmp_path: Path) -> Path:
     return path
 
 
+def test_a_plan_becomes_a_furnished_room(clearway, tmp_path, monkeypatch):
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "nook.txt").write_text(".#\n..\n")
+    words = ("--cell-size", 0.5, "--encoder", "random-resnet50", "--out", tmp_path / "scenes")
+    answer = clearway("scenes", "import", "floor-plan", tmp_path / "nook.txt", *words)
+    assert answer.code == 0, answer
+    assert "nook.h5: 12 states, 3 cells" in answer.err
+    found = clearway("scenes", "inspect", tmp_path / "scenes" / "nook.h5", "--json").json
+    assert (found["states"], found["encoder"], found["source"]) == (12, "random-resnet50", "floor_plan")
+    assert found["picture_size"] == [300, 400]
+    assert found["closest_cosine_distance"] > 0.001
+
+
+def test_a_plan_too_large_to_render_is_refused_before_any_is_rendered(clearway, tmp_path):
+    path = tmp_path / "plans.npz"
+    np.savez(path, hall=np.array([[0, 0]]), street=np.array([[0, 0], [500, 0]]))
+    answer = clearway("scenes", "import", "floor-plan", path, "--out", tmp_path / "scenes")
+    assert answer.refusal("plans.npz", "'street'", "spans 125.2 x 0.2 m", "made-up features")
+    assert not (tmp_path / "scenes").exists()
+
+
 def test_every_plan_becomes_a_scene_that_can_be_trained(clearway, plans, tmp_path, small):
     answer = clearway("scenes", "import", "floor-plan", plans, "--out", tmp_path / "scenes", "--features", 24)
     assert answer.code == 0, answer
@@ -43,6 +64,7 @@ def test_a_map_can_be_drawn_without_a_picture_from_above(clearway, tmp_path):
         (("--name", "attic"), ("plans.npz", "attic", "Name one of hall, ell")),
         (("--features", "0"), ("plans.npz", "0 features", "Ask for")),
         (("--seed", "-1"), ("the seed must be 0 or more",)),
+        (("--seed", "-1", "--features", "8"), ("the seed must be 0 or more",)),
         (("--cell-size", "0"), ("plans.npz", "'hall'", "cell size of 0.0 m")),
     ],
 )

@@ -5,8 +5,10 @@ import pytest
 
 from clearway.errors import RenderError, SceneError
 from clearway.scenes import build, rooms
-from clearway.scenes.build import build_scene
+from clearway.scenes.build import build_floor_plan, build_scene
+from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.scene import Provenance
+from clearway.scenes.validate import check_scene
 from clearway.version import __version__
 from small_rooms import SmallRoom
 
@@ -58,6 +60,25 @@ def test_a_mujoco_that_does_not_import_is_one_clear_error(monkeypatch, error):
     monkeypatch.setattr(build, "import_module", fail)
     with pytest.raises(RenderError, match=r"MUJOCO_GL=egl .*eglQueryString.*apt-get install libegl1"):
         build_scene("bathroom")
+
+
+def test_a_floor_plan_becomes_a_furnished_scene():
+    plan = FloorPlan("nook", np.array([[4, -2], [5, -2], [4, -1]]), np.array([[[4, -2], [5, -2]]]), cell_size_m=0.5)
+    scene = build_floor_plan(plan, 3, workers=1)
+    bare = floor_plan_scene(plan, feature_count=1)
+    assert np.array_equal(scene.locations_m, bare.locations_m) and np.array_equal(scene.graph, bare.graph)
+    assert scene.headings_deg.tolist() == [0, 90, 180, 270] * 3
+    assert (scene.name, scene.cell_size_m, scene.features, scene.encoder) == ("nook", 0.5, None, None)
+    assert scene.observations.shape == (12, 300, 400, 3)
+    assert len({picture.tobytes() for picture in scene.observations}) == 12
+    assert 50 < scene.observations.mean() < 180
+    check_scene(scene)
+    top = scene.top_view
+    # the middles of the outermost cells lie 0.35 m from the walls, or another 0.5 m of furniture away
+    for near, far in ((2.0 - top.x_min_m, top.x_max_m - 2.5), (-1.0 - top.z_min_m, top.z_max_m + 0.5)):
+        assert sorted((round(near, 2), round(far, 2))) in ([0.35, 0.85], [0.85, 0.85])
+    assert (scene.made_by.source, scene.made_by.room, scene.made_by.seed) == ("floor_plan", None, 3)
+    assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy"}
 
 
 @pytest.mark.slow

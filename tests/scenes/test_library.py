@@ -4,13 +4,15 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clearway.scenes import library
-from clearway.scenes.library import cached_room_scene, scene_path
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.library import cached_plan_scene, cached_room_scene, plan_path, scene_path
 from clearway.scenes.scene import Scene
 from made import grid_scene
 
@@ -149,3 +151,31 @@ def test_a_damaged_file_is_built_again(cache):
 
 def test_names_cannot_lead_out_of_the_cache(cache):
     assert scene_path("../../etc/kitchen", 0).parent == cache
+
+
+def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
+    built = []
+
+    def build(plan, seed, *, workers, progress):
+        built.append((plan.name, seed))
+        return replace(grid_scene(seed), name=plan.name)
+
+    monkeypatch.setattr(library, "build_floor_plan", build)
+    plan = FloorPlan("hall", np.array([[0, 0], [1, 0]]))
+    first, again = cached_plan_scene(plan, 2), cached_plan_scene(plan, 2)
+    assert built == [("hall", 2)] and first.name == again.name == "hall"
+    assert np.array_equal(first.observations[:], again.observations[:])
+    assert [path.name for path in cache.glob("*.h5")] == [plan_path(plan, 2).name]
+
+
+def test_another_plan_has_another_file(cache):
+    plan = FloorPlan("hall", np.array([[0, 0], [1, 0]]))
+    others = (
+        replace(plan, name="den"),
+        replace(plan, cells=np.array([[0, 0], [0, 1]])),
+        replace(plan, cells=np.array([[1, 0], [0, 0]])),
+        replace(plan, cell_size_m=0.5),
+        replace(plan, blocked_edges=np.array([[[0, 0], [1, 0]]])),
+    )
+    paths = {plan_path(plan, 0), plan_path(plan, 1), *(plan_path(other, 0) for other in others)}
+    assert len(paths) == 7

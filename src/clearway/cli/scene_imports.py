@@ -14,6 +14,7 @@ from clearway.cli.console import stderr_console
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
+    from clearway.scenes.floor_plans import FloorPlan
     from clearway.scenes.scene import Scene
 
 
@@ -61,7 +62,7 @@ class ImportDumps:
 
 @dataclass(frozen=True)
 class ImportFloorPlan:
-    """Make scenes of floor plans: four headings a cell, made-up features, no pictures.
+    """Make furnished rooms of floor plans: blocked cells become furniture and walls, four views a cell are rendered.
 
     Example: clearway scenes import floor-plan hall.txt --out scenes
     """
@@ -73,12 +74,14 @@ class ImportFloorPlan:
     """Folder for the scene files."""
     name: tuple[str, ...] = ()
     """Which plans of a .npz file; by default all."""
-    features: int = 2048
-    """Features a pose: smooth random functions of it. Scenes of one number and seed can be trained together."""
+    features: int | None = None
+    """Render nothing, and give each pose so many made-up features, 2048 for example: smooth random functions of it.
+    Scenes of one number and seed can be trained together."""
     seed: int = 0
-    """Of the features."""
+    """With the plan's name: of the furniture, colours and textures, or of the made-up features."""
     cell_size: float = 0.25
     """Side of a cell, metres."""
+    encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
         """Make and write."""
@@ -87,8 +90,22 @@ class ImportFloorPlan:
 
         names = self.name or floor_plan_names(self.file)
         plans = [read_floor_plan(self.file, name, cell_size_m=self.cell_size) for name in names]
+        if self.features is None:
+            self._render(plans)
+            return
         for plan in plans:
             write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
+
+    def _render(self, plans: Sequence[FloorPlan]) -> None:
+        """Make rooms, encode their pictures and write."""
+        from clearway.scenes.library import cached_plan_scene
+        from clearway.scenes.rooms.plans.limits import check_can_be_rendered
+
+        check_seeds(encoder_seed=self.encoding.encoder_seed)
+        for plan in plans:  # all of them before anything that takes minutes
+            check_can_be_rendered(plan, self.seed)
+        scenes = [cached_plan_scene(plan, self.seed, progress=True) for plan in plans]
+        encode_and_write(scenes, self.out, self.encoding)
 
 
 @dataclass(frozen=True)

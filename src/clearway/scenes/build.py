@@ -1,12 +1,17 @@
-"""Build a room as a `Scene`: furniture and light, the navigation grid, and a picture of every pose."""
+"""Build a room as a `Scene`: furniture and light, the graph of poses, and a picture of every pose."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib import import_module
 from importlib.metadata import version
 
+import numpy as np
+
+from clearway.scenes import floor_plans
+from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Provenance, Scene
 from clearway.version import __version__
 
@@ -50,6 +55,54 @@ def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progres
         made_by=Provenance(source="room", room=name, seed=seed, versions=shaping_versions()),
         cell_size_m=agent.step_m,
         top_view=top_view,
+    )
+
+
+def build_floor_plan(plan: FloorPlan, seed: int = 0, *, workers: int | None = None, progress: bool = False) -> Scene:
+    """A floor plan as a furnished room: its cells and edges exactly, with pictures, and without features.
+
+    The pictures are held in memory, 1.4 MB a cell.
+
+    Args:
+        plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
+        seed: with the plan's name chooses furniture, colours and textures.
+        workers: number of renderer processes; None: one a core.
+        progress: show what is going on, if standard error is a terminal.
+
+    Raises:
+        SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
+        RenderError: MuJoCo cannot render on this machine.
+    """
+    _check_mujoco()
+    from clearway.scenes.rooms.camera import first_person_view
+    from clearway.scenes.rooms.plans.plan_room import build_plan_room
+    from clearway.scenes.rooms.render import render
+    from clearway.scenes.rooms.topview import render_top_view
+
+    with _status(f"furnishing and lighting {plan.name}", progress):
+        room, layout = build_plan_room(plan, seed)
+        model = room.spec.compile()
+    locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
+    top_view = render_top_view(model, room.width_m, room.depth_m)
+    x_m, z_m = layout.origin_m
+    view = first_person_view(locations_m - np.array(layout.origin_m), headings_deg)
+    pictures = render(model, view, workers=workers, progress=progress, label=f"rendering {plan.name}")
+    return Scene(
+        name=plan.name,
+        observations=pictures,
+        features=None,
+        locations_m=locations_m,
+        headings_deg=headings_deg,
+        graph=graph,
+        made_by=Provenance(floor_plans.SOURCE, seed=seed, versions=shaping_versions()),
+        cell_size_m=plan.cell_size_m,
+        top_view=replace(
+            top_view,
+            x_min_m=top_view.x_min_m + x_m,
+            x_max_m=top_view.x_max_m + x_m,
+            z_min_m=top_view.z_min_m + z_m,
+            z_max_m=top_view.z_max_m + z_m,
+        ),
     )
 
 

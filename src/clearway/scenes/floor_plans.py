@@ -1,5 +1,7 @@
 """Floor plans: which cells of a grid can be entered. `floor_plan_scene` makes one a scene, with made-up features.
 
+`clearway.scenes.build.build_floor_plan` makes one a furnished room, with pictures.
+
 Axis letters: C cells, E edges, S = 4 C states.
 """
 
@@ -107,6 +109,20 @@ class FloorPlan:
         raise SceneError(self.source or self.name, problem, remedy, self.dataset)
 
 
+def plan_poses(plan: FloorPlan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The poses of a plan, four headings a cell, in the order of its cells.
+
+    Returns:
+        locations_m: (S, 2) float64, x and z.
+        headings_deg: (S,) int64.
+        graph: (S, A) int32, next state by action; -1 where the move is blocked.
+    """
+    cells = plan.cells.astype(np.int64)
+    locations_m = np.repeat(cells, HEADING_COUNT, axis=0) * plan.cell_size_m
+    headings_deg = np.tile(np.arange(HEADING_COUNT) * 360 // HEADING_COUNT, len(cells))
+    return locations_m, headings_deg, pose_graph(cells, plan.edges)
+
+
 def floor_plan_scene(plan: FloorPlan, feature_count: int = 2048, seed: int = 0) -> Scene:
     """A plan as a scene without pictures: its cells and edges exactly, four headings, made-up features.
 
@@ -122,9 +138,7 @@ def floor_plan_scene(plan: FloorPlan, feature_count: int = 2048, seed: int = 0) 
     """
     state_count = HEADING_COUNT * len(plan.cells)
     check_made_up(feature_count, seed, state_count, plan.source or plan.name)
-    cells = plan.cells.astype(np.int64)
-    locations_m = np.repeat(cells, HEADING_COUNT, axis=0) * plan.cell_size_m
-    headings_deg = np.tile(np.arange(HEADING_COUNT) * 360 // HEADING_COUNT, len(cells))
+    locations_m, headings_deg, graph = plan_poses(plan)
     own_seed = (seed, zlib.crc32(plan.name.encode()))
     return Scene(
         name=plan.name,
@@ -132,7 +146,7 @@ def floor_plan_scene(plan: FloorPlan, feature_count: int = 2048, seed: int = 0) 
         features=made_up_features(locations_m, headings_deg, feature_count, own_seed),
         locations_m=locations_m,
         headings_deg=headings_deg,
-        graph=pose_graph(cells, plan.edges),
+        graph=graph,
         made_by=Provenance(
             SOURCE,
             seed=seed,

@@ -5,13 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
 from clearway import files
 from clearway.errors import SceneError
-from clearway.scenes import grid, rooms
-from clearway.scenes.build import build_scene, scene_name, shaping_versions
+from clearway.scenes import floor_plans, grid, rooms
+from clearway.scenes.build import build_floor_plan, build_scene, scene_name, shaping_versions
+from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
@@ -50,7 +53,41 @@ def cached_room_scene(
         SceneError: there is no such room, or the agent fits nowhere in it.
         RenderError: MuJoCo cannot render on this machine.
     """
-    path, title = scene_path(name, seed), scene_name(name, seed)
+    make = partial(build, name, seed, workers=workers, progress=progress)
+    return _cached(scene_path(name, seed), scene_name(name, seed), make)
+
+
+def cached_plan_scene(plan: FloorPlan, seed: int = 0, *, workers: int | None = None, progress: bool = False) -> Scene:
+    """A floor plan's furnished room from the user's cache, kept like those of `cached_room_scene`.
+
+    Args and errors: those of `build_floor_plan`.
+    """
+    return _cached(
+        plan_path(plan, seed), plan.name, partial(build_floor_plan, plan, seed, workers=workers, progress=progress)
+    )
+
+
+def scene_path(name: str, seed: int) -> Path:
+    """Where the cache keeps the scene of a room."""
+    return _path_of(scene_name(name, seed), {"room": name, "seed": seed})
+
+
+def plan_path(plan: FloorPlan, seed: int) -> Path:
+    """Where the cache keeps the furnished room of a floor plan."""
+    shape = {"cells": plan.cells.tolist(), "blocked": plan.blocked_edges.tolist(), "cell_size_m": plan.cell_size_m}
+    return _path_of(plan.name, {"plan": plan.name, "seed": seed, **shape})
+
+
+def _path_of(title: str, shaped_by: Mapping[str, object]) -> Path:
+    """A file whose name holds a hash of all that shapes the pictures: what was asked for, and what makes it."""
+    all_of_it = {**shaped_by, "versions": shaping_versions(), "sources": _sources_hash()}
+    key = hashlib.sha256(json.dumps(all_of_it, sort_keys=True).encode()).hexdigest()[:KEY_LENGTH]
+    readable = re.sub(r"[^\w-]", "_", title)
+    return files.cache_dir() / "scenes" / f"{readable}-{key}.h5"
+
+
+def _cached(path: Path, title: str, make: Callable[[], Scene]) -> Scene:
+    """The scene of a cache file, made and written there by the first process that finds none."""
     scene = _readable_scene(path, title)
     if scene is not None:
         return scene
@@ -59,24 +96,17 @@ def cached_room_scene(
         if scene is not None:
             return scene
         _remove_leftovers(path)
-        write_scene(build(name, seed, workers=workers, progress=progress), path)
+        write_scene(make(), path)
     return read_scene(path, name=title)
 
 
-def scene_path(name: str, seed: int) -> Path:
-    """Where the cache keeps the scene of a room: the name holds a hash of all that shapes its pictures."""
-    shaped_by = {"room": name, "seed": seed, "versions": shaping_versions(), "sources": _sources_hash()}
-    key = hashlib.sha256(json.dumps(shaped_by, sort_keys=True).encode()).hexdigest()[:KEY_LENGTH]
-    readable = re.sub(r"[^\w-]", "_", scene_name(name, seed))
-    return files.cache_dir() / "scenes" / f"{readable}-{key}.h5"
-
-
 def _sources_hash() -> str:
-    """Hash of the source files of the room builder and of its graph, so that a change of them makes a new scene."""
+    """Hash of the source files of the room builder and of its graphs, so that a change of them makes a new scene."""
     folder = Path(rooms.__file__).parent
     sources = {source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
     digest = hashlib.sha256()
-    for name, source in {**sources, "grid": Path(grid.__file__)}.items():
+    graphs = {"grid": Path(grid.__file__), "floor_plans": Path(floor_plans.__file__)}
+    for name, source in {**sources, **graphs}.items():
         content = source.read_bytes()
         digest.update(f"{name} {len(content)}\n".encode())
         digest.update(content)

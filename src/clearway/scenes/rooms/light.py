@@ -56,12 +56,22 @@ class _Scene:
     floor_tint: np.ndarray
 
 
-def bake(room: Room) -> None:
-    """Light the room: draw its surfaces with light maps and set the brightness of every furniture part."""
+def bake(room: Room, *, count_hidden: bool = True) -> None:
+    """Light the room: draw its surfaces with light maps and set the brightness of every furniture part.
+
+    Args:
+        room: to be lit.
+        count_hidden: set the exposure by all of the surfaces; False leaves out what lies within solid parts, for
+            rooms with much floor and wall under thick walls.
+    """
     scene = _scene_of(room)
     maps = [_light_map(scene, surface, room.rng) for surface in room.surfaces]
-    shown = [light for light, surface in zip(maps, room.surfaces, strict=True) if surface.name != "ceiling"]
-    exposure = MEAN_EXPOSURE / float(np.concatenate([light.reshape(-1, 3) for light in shown]).mean())
+    shown = []
+    for light, surface in zip(maps, room.surfaces, strict=True):
+        if surface.name != "ceiling":
+            texels = light.reshape(-1, 3)
+            shown.append(texels if count_hidden else texels[~scene.solid.is_solid(_texel_points(surface))])
+    exposure = MEAN_EXPOSURE / float(np.concatenate(shown).mean())
     for surface, light in zip(room.surfaces, maps, strict=True):
         draw_surface(room.spec, surface, light * exposure)
     shown_parts = [part for part in room.parts if part.material]
@@ -114,18 +124,28 @@ def _sun_direction(windows: Sequence[Window]) -> np.ndarray | None:
 
 def _light_map(scene: _Scene, surface: Surface, rng: np.random.Generator) -> np.ndarray:
     """Light on a grid of texels of about TEXEL_M, (rows, columns, 3), row 0 at the bottom."""
-    columns = max(4, round(surface.width_m / TEXEL_M))
-    rows = max(4, round(surface.height_m / TEXEL_M))
-    u = (np.arange(columns) + 0.5) / columns
-    v = (np.arange(rows) + 0.5) / rows
-    v, u = np.meshgrid(v, u, indexing="ij")
-    points = surface.origin_m + u[..., None] * surface.right_m + v[..., None] * surface.up_m
-    points = (points + surface.normal * OFF_SURFACE_M).reshape(-1, 3)
+    rows, columns = _texel_counts(surface)
+    points = _texel_points(surface)
     normals = np.broadcast_to(surface.normal, points.shape)
     light = _irradiance(scene, points, normals, rng)
     if scene.sun is not None:
         light += _sunlight(scene, surface, points, rng)
     return ndimage.gaussian_filter(light.reshape(rows, columns, 3), (0.7, 0.7, 0), mode="nearest")
+
+
+def _texel_counts(surface: Surface) -> tuple[int, int]:
+    """Rows and columns of a surface's light map."""
+    return max(4, round(surface.height_m / TEXEL_M)), max(4, round(surface.width_m / TEXEL_M))
+
+
+def _texel_points(surface: Surface) -> np.ndarray:
+    """The middles of a light map's texels, a little before the surface, (rows x columns, 3), row 0 at the bottom."""
+    rows, columns = _texel_counts(surface)
+    u = (np.arange(columns) + 0.5) / columns
+    v = (np.arange(rows) + 0.5) / rows
+    v, u = np.meshgrid(v, u, indexing="ij")
+    points = surface.origin_m + u[..., None] * surface.right_m + v[..., None] * surface.up_m
+    return (points + surface.normal * OFF_SURFACE_M).reshape(-1, 3)
 
 
 def _irradiance(scene: _Scene, points_m: np.ndarray, normals: np.ndarray, rng: np.random.Generator) -> np.ndarray:
