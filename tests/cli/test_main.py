@@ -30,6 +30,7 @@ COMMANDS = {
     "scenes import savn",
     "scenes import avd",
     "scenes import ai2thor",
+    "scenes import mjcf",
     "scenes inspect",
     "scenes export",
     "train",

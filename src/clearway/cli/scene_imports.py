@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.cli.arguments import SCENE_SUFFIXES, check_at_least, check_positive, check_seeds, scene_files
+from clearway.cli.arguments import (
+    SCENE_SUFFIXES,
+    check_at_least,
+    check_finite,
+    check_positive,
+    check_seeds,
+    scene_files,
+)
 from clearway.cli.console import stderr_console
 from clearway.errors import ClearwayError
 
@@ -211,6 +218,66 @@ class ImportAi2Thor:
 
 
 @dataclass(frozen=True)
+class ImportMjcf:
+    """Make a scene of a MuJoCo model: free cells found by its geometry, pictures by MuJoCo's renderer.
+
+    Example: clearway scenes import mjcf office/scene.xml --spawn 1.0 2.0 --out scenes
+    """
+
+    file: Annotated[Path, tyro.conf.Positional]
+    """MJCF file (.xml); meshes, textures and included files lie where it says. Its x and y are the floor's x and z."""
+    out: Path
+    """Folder for the scene file."""
+    step: float = 0.5
+    """Length of a move and side of a cell, metres."""
+    spawn: tuple[float, float] | None = None
+    """A free place, x and z: the grid runs through it, and what cannot be reached from it is left out. By default the
+    grid runs through the model's origin, and the largest connected part stays."""
+    extent: tuple[float, float, float, float] | None = None
+    """Smallest and largest x, smallest and largest z of the floor, metres; by default what the finite geoms span."""
+    floor_height: float = 0.0
+    """Of the floor in the model, metres."""
+    agent_radius: float = 0.2
+    """Of the agent's body, a standing capsule, metres."""
+    agent_height: float = 1.5
+    """Of the agent's body, metres."""
+    camera_height: float = 1.0
+    """Of the camera above the floor, metres."""
+    all_geoms: bool = False
+    """Geoms that collide with nothing (contype and conaffinity 0) block the way too; by default they are only seen."""
+    name: str | None = None
+    """Of the scene; by default the file's."""
+    width: int = 400
+    """Of the pictures, pixels."""
+    height: int = 300
+    """Of the pictures, pixels."""
+    encoding: Encoding = field(default_factory=Encoding)
+
+    def run(self) -> None:
+        """Compile, find the free cells, render, encode and write."""
+        from clearway.scenes.build import check_mujoco
+
+        check_positive(step=self.step, agent_radius=self.agent_radius, agent_height=self.agent_height)
+        check_finite(floor_height=self.floor_height, camera_height=self.camera_height)
+        check_seeds(encoder_seed=self.encoding.encoder_seed)
+        check_mujoco()
+        from clearway.scenes.importers.mjcf import read_mjcf
+        from clearway.scenes.importers.mjcf_floor import World
+        from clearway.scenes.rooms.obstacles import AgentShape
+
+        scene = read_mjcf(
+            self.file,
+            World(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
+            AgentShape(self.agent_radius, self.agent_height, self.step),
+            name=self.name,
+            height_px=self.height,
+            width_px=self.width,
+            progress=True,
+        )
+        encode_and_write([scene], self.out, self.encoding)
+
+
+@dataclass(frozen=True)
 class ImportScenes:
     """Make scene files of dumps, floor plans or photographs.
 
@@ -224,6 +291,7 @@ class ImportScenes:
         | Annotated[ImportSavn, tyro.conf.subcommand("savn")]
         | Annotated[ImportAvd, tyro.conf.subcommand("avd")]
         | Annotated[ImportAi2Thor, tyro.conf.subcommand("ai2thor")]
+        | Annotated[ImportMjcf, tyro.conf.subcommand("mjcf")]
     )
 
     def run(self) -> None:
