@@ -31,6 +31,7 @@ COMMANDS = {
     "scenes import avd",
     "scenes import ai2thor",
     "scenes import mjcf",
+    "scenes import miniworld",
     "scenes inspect",
     "scenes export",
     "train",

@@ -278,8 +278,53 @@ class ImportMjcf:
 
 
 @dataclass(frozen=True)
+class ImportMiniWorld:
+    """Photograph environments of MiniWorld through the package miniworld, without a screen.
+
+    Example: clearway scenes import miniworld MiniWorld-FourRooms-v0 --step 1 --out scenes
+    """
+
+    environments: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Names registered with Gymnasium; of a module of your own, module:Name-v0."""
+    out: Path
+    """Folder for the scene files."""
+    step: float = 1.0
+    """Length of a move and side of a cell, metres."""
+    seed: int = 0
+    """Of the worlds: where objects, and walls in mazes, are put."""
+    width: int = 400
+    """Of the pictures, pixels."""
+    height: int = 300
+    """Of the pictures, pixels."""
+    encoding: Encoding = field(default_factory=Encoding)
+
+    def run(self) -> None:
+        """Photograph, encode and write."""
+        from clearway.scenes.build import scene_name
+        from clearway.scenes.importers.miniworld import photographed, started
+
+        check_positive(step=self.step)
+        check_seeds(seed=self.seed, encoder_seed=self.encoding.encoder_seed)
+        scenes = []
+        for environment in self.environments:
+            name = scene_name(environment.rpartition(":")[2], self.seed)
+            with started(environment, self.seed) as env:
+                scene = photographed(
+                    env,
+                    name,
+                    step_m=self.step,
+                    seed=self.seed,
+                    height_px=self.height,
+                    width_px=self.width,
+                    progress=True,
+                )
+            scenes.append(scene)
+        encode_and_write(scenes, self.out, self.encoding)
+
+
+@dataclass(frozen=True)
 class ImportScenes:
-    """Make scene files of dumps, floor plans or photographs.
+    """Make scene files of dumps, floor plans, photographs or simulators.
 
     Example: clearway scenes import images office/poses.csv --out scenes
     """
@@ -292,6 +337,7 @@ class ImportScenes:
         | Annotated[ImportAvd, tyro.conf.subcommand("avd")]
         | Annotated[ImportAi2Thor, tyro.conf.subcommand("ai2thor")]
         | Annotated[ImportMjcf, tyro.conf.subcommand("mjcf")]
+        | Annotated[ImportMiniWorld, tyro.conf.subcommand("miniworld")]
     )
 
     def run(self) -> None:

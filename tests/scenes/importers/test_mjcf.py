@@ -7,6 +7,7 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import Action
+from clearway.scenes.importers import limits
 from clearway.scenes.importers import mjcf as importer
 from clearway.scenes.importers.mjcf import read_mjcf
 from clearway.scenes.importers.mjcf_floor import World
@@ -66,12 +67,12 @@ def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
 
 def test_more_than_fits_is_refused_before_any_picture_is_taken(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importer, "render", lambda *_, **__: pytest.fail("rendered"))
-    monkeypatch.setattr(importer, "MAX_PICTURE_BYTES", 20 << 20)
+    monkeypatch.setattr(limits, "MAX_PICTURE_BYTES", 20 << 20)
     problem = r"\d+ pictures of 400 x 300 pixels take \d+ MiB of memory, expected at most 20\. .*--step"
     with pytest.raises(SceneError, match=problem):
         read_mjcf(path, World(floor_m=2.0))
-    monkeypatch.setattr(importer, "MAX_STATES", 8)
-    with pytest.raises(SceneError, match=r"has \d+ free cells, expected at most 2\. .*--step"):
+    monkeypatch.setattr(limits, "MAX_STATES", 8)
+    with pytest.raises(SceneError, match=r"has \d+ poses on free cells, expected at most 8\. .*--step"):
         read_mjcf(path, World(floor_m=2.0), height_px=30, width_px=40)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.build import shaping_versions
-from clearway.scenes.grid import HEADING_COUNT
+from clearway.scenes.importers.limits import check_picture_count, check_picture_size
 from clearway.scenes.importers.mjcf_compile import compiled
 from clearway.scenes.importers.mjcf_floor import World, find_cells, floor_of, span_of
 from clearway.scenes.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, first_person_view
@@ -23,12 +23,11 @@ from clearway.scenes.rooms.obstacles import AgentShape, bounding_boxes
 from clearway.scenes.rooms.render import render
 from clearway.scenes.rooms.topview import PIXELS_PER_M, render_from_above
 from clearway.scenes.scene import Provenance, Scene, TopView
-from clearway.scenes.validate import MAX_PICTURE_SIDE, MAX_STATES, check_scene
+from clearway.scenes.validate import check_scene
 
 SOURCE = "mjcf"
 SHOWN_GROUPS = (0, 1, 2)  # as MuJoCo's own viewer starts
 HIDDEN_GROUP = 5
-MAX_PICTURE_BYTES = 4 << 30  # of all pictures, which are held in memory
 TOP_VIEW_SIDE_PX = 1_024  # at most
 NEAR_M = 0.05  # nothing nearer is drawn
 MARGIN_M = 1.0  # of the view from above, around the free cells
@@ -64,13 +63,14 @@ def read_mjcf(
     """
     world, agent = world or World(), agent or AgentShape()
     title = path.stem if name is None else name
-    _check_asked(path, agent, height_px, width_px)
+    _check_body(path, agent)
+    check_picture_size(path, height_px, width_px)
     model = compiled(path, agent)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     floor = floor_of(path, model, data, world, agent.step_m)
     grid = find_cells(path, model, data, floor, world, agent)
-    _check_pictures(path, len(grid.graph), height_px, width_px)
+    check_picture_count(path, len(grid.graph), height_px, width_px, SMALLER)
     top_m = _set_lens(model, data, floor, world.floor_m)
     view = first_person_view(
         grid.state_locations_m,
@@ -99,26 +99,11 @@ def read_mjcf(
     return scene
 
 
-def _check_asked(path: Path, agent: AgentShape, height_px: int, width_px: int) -> None:
-    """Refuse a body and pictures that cannot be. Raises SceneError."""
+def _check_body(path: Path, agent: AgentShape) -> None:
+    """Refuse a body that cannot be. Raises SceneError."""
     if agent.height_m <= 2 * agent.radius_m:
         problem = f"an agent {agent.height_m:g} m high and {2 * agent.radius_m:g} m wide is no standing capsule"
         raise SceneError(path, problem, "Make it higher or thinner")
-    if not all(1 <= side <= MAX_PICTURE_SIDE for side in (height_px, width_px)):
-        problem = f"pictures of {width_px} x {height_px} pixels, expected sides of 1 to {MAX_PICTURE_SIDE}"
-        raise SceneError(path, problem, "Give another --height and --width")
-
-
-def _check_pictures(path: Path, states: int, height_px: int, width_px: int) -> None:
-    """Refuse more poses or pictures than fit, before any is taken. Raises SceneError."""
-    if states > MAX_STATES:
-        cells, most = states // HEADING_COUNT, MAX_STATES // HEADING_COUNT
-        raise SceneError(path, f"has {cells} free cells, expected at most {most}", SMALLER)
-    size = states * height_px * width_px * 3
-    if size > MAX_PICTURE_BYTES:
-        problem = f"{states} pictures of {width_px} x {height_px} pixels take {size >> 20} MiB of memory"
-        remedy = f"{SMALLER}, or a smaller --height and --width"
-        raise SceneError(path, f"{problem}, expected at most {MAX_PICTURE_BYTES >> 20}", remedy)
 
 
 def _set_lens(model: mujoco.MjModel, data: mujoco.MjData, floor: Floor, floor_m: float) -> float:

@@ -9,13 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.graph import distances
-from clearway.scenes.grid import HEADING_COUNT, neighbour_pairs, pose_graph
+from clearway.scenes.grid import HEADING_COUNT, connected_parts, edges_among, neighbour_pairs, pose_graph
 from clearway.scenes.rooms.obstacles import MARGIN_REACH_M, AgentShape, CollisionRoom, Obstacles, collision_model
 
 SAME_PLACE_M = 1e-6
@@ -115,12 +113,11 @@ def grid_on_floor(
         passable[passable] = carries(middles_m[passable])
     edges = pairs[passable]
 
-    component, sizes = _components(len(cells), edges)
+    component, sizes = connected_parts(len(cells), edges)
     kept = component == (_component_at(floor.origin_m, locations_m, component) if from_origin else 0)
     if not kept.any():
         return None
-    number = np.cumsum(kept) - 1
-    edges = number[edges[kept[edges[:, 0]]]]
+    edges = edges_among(kept, edges)
     margins_m = np.abs(np.concatenate([gaps_m, move_gaps_m]) - agent.clearance_m)
     return NavigationGrid(
         cells=cells[kept],
@@ -180,14 +177,3 @@ def _component_at(place_m: tuple[float, float], locations_m: np.ndarray, compone
     """The connected part that holds the cell at a place; -1 where no cell lies there."""
     here = np.abs(locations_m - place_m).max(axis=1) < SAME_PLACE_M
     return int(component[here][0]) if here.any() else -1
-
-
-def _components(count: int, edges: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Connected part of each cell, (count,) with 0 the largest, and the sizes of the parts, descending."""
-    links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    _, labels = connected_components(links, directed=False)
-    sizes = np.bincount(labels)
-    by_size = np.argsort(-sizes, kind="stable")
-    rank = np.empty_like(by_size)
-    rank[by_size] = np.arange(len(by_size))
-    return rank[labels], tuple(int(size) for size in sizes[by_size])
