@@ -30,6 +30,8 @@ COMMANDS = {
     "scenes import savn",
     "scenes import avd",
     "scenes import ai2thor",
+    "scenes import mjcf",
+    "scenes import miniworld",
     "scenes inspect",
     "scenes export",
     "train",

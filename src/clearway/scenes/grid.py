@@ -6,6 +6,8 @@ Axis letters: C cells, E edges, S = 4 C states, A actions.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 
@@ -28,6 +30,23 @@ def neighbour_pairs(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                 pairs.append((index, number[neighbour]))
                 axes.append(axis)
     return np.array(pairs, np.int64).reshape(-1, 2), np.array(axes, np.int64)
+
+
+def connected_parts(count: int, edges: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Connected part of each of `count` cells, (C,) with 0 the largest, and the sizes of the parts, descending."""
+    links = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    _, labels = connected_components(links, directed=False)
+    sizes = np.bincount(labels)
+    by_size = np.argsort(-sizes, kind="stable")
+    rank = np.empty_like(by_size)
+    rank[by_size] = np.arange(len(by_size))
+    return rank[labels], tuple(int(size) for size in sizes[by_size])
+
+
+def edges_among(kept: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """The edges among kept cells, (C,) bool, by the cells' numbers among these; whole connected parts are kept."""
+    number = np.cumsum(kept) - 1
+    return number[edges[kept[edges[:, 0]]]]
 
 
 def pose_graph(cells: np.ndarray, edges: np.ndarray) -> np.ndarray:

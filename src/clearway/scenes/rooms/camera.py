@@ -56,25 +56,42 @@ class View:
     groups: tuple[int, ...]
 
 
-def first_person_view(locations_m: np.ndarray, headings_deg: np.ndarray) -> View:
-    """What the agent sees at each pose: (S, 2) x and z in metres, (S,) headings in degrees."""
+def first_person_view(
+    locations_m: np.ndarray,
+    headings_deg: np.ndarray,
+    *,
+    camera_m: float = CAMERA_HEIGHT_M,
+    height_px: int = PICTURE_HEIGHT_PX,
+    width_px: int = PICTURE_WIDTH_PX,
+    groups: tuple[int, ...] = (SEEN_GROUP, CEILING_GROUP),
+) -> View:
+    """What the agent sees at each pose.
+
+    Args:
+        locations_m: (S, 2) x and z.
+        headings_deg: (S,).
+        camera_m: height of the camera in the world.
+        height_px: of a picture.
+        width_px: of a picture.
+        groups: the geom groups that show.
+    """
     return View(
         shots=tuple(
-            _level_shot(float(x_m), float(z_m), float(heading_deg))
+            _level_shot(float(x_m), float(z_m), camera_m, float(heading_deg))
             for (x_m, z_m), heading_deg in zip(locations_m, headings_deg, strict=True)
         ),
-        height_px=PICTURE_HEIGHT_PX,
-        width_px=PICTURE_WIDTH_PX,
+        height_px=height_px,
+        width_px=width_px,
         vertical_extent=VERTICAL_FOV_DEG,
         orthographic=False,
-        groups=(SEEN_GROUP, CEILING_GROUP),
+        groups=groups,
     )
 
 
-def _level_shot(x_m: float, z_m: float, heading_deg: float) -> Shot:
+def _level_shot(x_m: float, z_m: float, camera_m: float, heading_deg: float) -> Shot:
     azimuth_deg = 90.0 - heading_deg
     azimuth = np.radians(azimuth_deg)
-    ahead_m = (x_m + float(np.cos(azimuth)), z_m + float(np.sin(azimuth)), CAMERA_HEIGHT_M)
+    ahead_m = (x_m + float(np.cos(azimuth)), z_m + float(np.sin(azimuth)), camera_m)
     return Shot(ahead_m, distance_m=1.0, azimuth_deg=azimuth_deg, elevation_deg=0.0)
 
 
@@ -93,7 +110,7 @@ def take_pictures(model: mujoco.MjModel, view: View) -> Iterator[np.ndarray]:
     shown.geomgroup[:] = 0
     shown.geomgroup[list(view.groups)] = 1
     picture = np.empty((view.height_px, view.width_px, 3), np.uint8)
-    max_geom = model.ngeom + SPARE_GEOMS
+    max_geom = model.ngeom + model.nsite + SPARE_GEOMS
     with mujoco.Renderer(model, view.height_px, view.width_px, max_geom=max_geom) as renderer:
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # the rooms' light is baked
         for shot in view.shots:

@@ -22,16 +22,40 @@ def render_top_view(model: mujoco.MjModel, width_m: float, depth_m: float) -> To
     Raises:
         RenderError: this machine has no OpenGL backend that works.
     """
-    width_px, height_px = round(width_m * PIXELS_PER_M), round(depth_m * PIXELS_PER_M)
-    middle_x_m, middle_z_m = width_m / 2, depth_m / 2
-    half_x_m, half_z_m = width_px / PIXELS_PER_M / 2, height_px / PIXELS_PER_M / 2
+    return render_from_above(model, (0.0, 0.0), (width_m, depth_m), ABOVE_M, PIXELS_PER_M, (SEEN_GROUP,))
+
+
+def render_from_above(
+    model: mujoco.MjModel,
+    low_m: tuple[float, float],
+    high_m: tuple[float, float],
+    camera_m: float,
+    pixels_per_m: float,
+    groups: tuple[int, ...],
+) -> TopView:
+    """A rectangle of floor, rounded to whole pixels, seen from straight above.
+
+    Args:
+        model: the world.
+        low_m: smallest x and z.
+        high_m: largest x and z.
+        camera_m: height of the camera, above all that is to be seen.
+        pixels_per_m: scale.
+        groups: the geom groups that show.
+
+    Raises:
+        RenderError: this machine has no OpenGL backend that works.
+    """
+    width_px, height_px = (max(1, round((high - low) * pixels_per_m)) for low, high in zip(low_m, high_m, strict=True))
+    middle_x_m, middle_z_m = ((low + high) / 2 for low, high in zip(low_m, high_m, strict=True))
+    half_x_m, half_z_m = width_px / pixels_per_m / 2, height_px / pixels_per_m / 2
     view = View(
-        shots=(Shot((middle_x_m, middle_z_m, 0.0), ABOVE_M, azimuth_deg=90.0, elevation_deg=-90.0),),
+        shots=(Shot((middle_x_m, middle_z_m, 0.0), camera_m, azimuth_deg=90.0, elevation_deg=-90.0),),
         height_px=height_px,
         width_px=width_px,
         vertical_extent=2 * half_z_m,
         orthographic=True,
-        groups=(SEEN_GROUP,),
+        groups=groups,
     )
     return TopView(
         image=render(model, view, workers=1)[0],
