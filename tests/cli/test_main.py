@@ -38,6 +38,7 @@ COMMANDS = {
     "reproduce",
     "report",
     "video",
+    "export",
 }
 
 
