@@ -43,3 +43,7 @@ class EnvError(ClearwayError, ValueError):
 
 class RunError(ClearwayError):
     """A run folder, checkpoint or training configuration that cannot be used."""
+
+
+class DeployError(ClearwayError, ValueError):
+    """An exported agent that cannot be used, or a picture that an agent cannot take."""

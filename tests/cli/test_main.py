@@ -40,6 +40,7 @@ COMMANDS = {
     "reproduce",
     "report",
     "video",
+    "export",
 }
 
 

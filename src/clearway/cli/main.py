@@ -15,6 +15,7 @@ import tyro
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
+from clearway.cli.export import ExportAgent
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.reproduce import Report, Reproduce
@@ -58,6 +59,7 @@ Command = (
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Video, tyro.conf.subcommand("video")]
+    | Annotated[ExportAgent, tyro.conf.subcommand("export")]
 )
 
 

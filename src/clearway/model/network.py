@@ -76,15 +76,23 @@ class SiameseActorCritic(nn.Module):
             target: (B, F) features of the target pose, prepared likewise; tiled K times here.
             scene: (B,) int64, whose head to use.
         """
-        seen = self._siamese(history)
-        wanted = self._siamese(target[:, None].expand_as(history))
-        fused = relu(linear(seen, self.fusion_weight[0]) + linear(wanted, self.fusion_weight[1]) + self.fusion_bias)
+        fused = self.fused(history, target)
         output = fused.new_empty(len(fused), OUTPUTS)
         for head in scene.unique().tolist():
             rows = scene == head
-            special = relu(linear(fused[rows], self.scene_weight[head], self.scene_bias[head]))
-            output[rows] = linear(special, self.output_weight[head], self.output_bias[head])
+            output[rows] = self.head(fused[rows], head)
         return output[:, :ACTION_COUNT], output[:, ACTION_COUNT]
+
+    def fused(self, history: Tensor, target: Tensor) -> Tensor:
+        """What all scenes share, (B, H); arguments as in `forward`."""
+        seen = self._siamese(history)
+        wanted = self._siamese(target[:, None].expand_as(history))
+        return relu(linear(seen, self.fusion_weight[0]) + linear(wanted, self.fusion_weight[1]) + self.fusion_bias)
+
+    def head(self, fused: Tensor, scene: int) -> Tensor:
+        """Action scores and value (B, A + 1) by one scene's own layers."""
+        special = relu(linear(fused, self.scene_weight[scene], self.scene_bias[scene]))
+        return linear(special, self.output_weight[scene], self.output_bias[scene])
 
     def layer_gradients(self) -> list[Tensor]:
         """Gradients of the published network's tensors, as views; the siamese weight's comes first.

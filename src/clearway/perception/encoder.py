@@ -50,13 +50,15 @@ class NetworkEncoder:
     Attributes:
         record: what the encoder is.
         preprocessing: how a picture becomes the network's input.
-        features_of: pooled features (B, F) of pixels (B, 3, height, width).
+        network: what holds the parameters, frozen.
+        features_of: pooled features (B, F) of pixels (B, 3, height, width), by the network.
         feature_count: F.
         mean, std: (F,) float32 statistics by which features are standardised; None leaves them as they are.
     """
 
     record: EncoderRecord
     preprocessing: Preprocessing
+    network: torch.nn.Module
     features_of: Callable[[torch.Tensor], torch.Tensor]
     feature_count: int
     mean: np.ndarray | None = None

@@ -56,11 +56,11 @@ def from_record(record: EncoderRecord) -> NetworkEncoder:
     kept = found.settings["preprocessing"]
     assert isinstance(kept, dict)
     preprocessing = preprocessing_from_json(kept, f"encoder '{model}'")
-    features_of = _load(find_model(model), model)
+    network, features_of = _load(find_model(model), model)
     gray = np.full((1, preprocessing.height, preprocessing.width, 3), 128, np.uint8)
     with _faults_named(model):
         feature_count = features_of(to_pixels(gray, preprocessing)).shape[1]
-    return NetworkEncoder(found, preprocessing, features_of, feature_count)
+    return NetworkEncoder(found, preprocessing, network, features_of, feature_count)
 
 
 def _folder_identity(folder: Path, settings: dict[str, object]) -> str:
@@ -80,8 +80,8 @@ def _parts(path: Path) -> Iterator[bytes]:
             yield part
 
 
-def _load(folder: Path, model: str) -> Callable[[torch.Tensor], torch.Tensor]:
-    """The model in `folder` as a function from pixels (B, 3, h, w) to features (B, F)."""
+def _load(folder: Path, model: str) -> tuple[torch.nn.Module, Callable[[torch.Tensor], torch.Tensor]]:
+    """The model in `folder`, and it as a function from pixels (B, 3, h, w) to features (B, F)."""
     import torch
     from transformers import AutoModel
 
@@ -108,7 +108,7 @@ def _load(folder: Path, model: str) -> Callable[[torch.Tensor], torch.Tensor]:
     if getattr(network, "main_input_name", "pixel_values") != "pixel_values":
         raise EncoderError(f"encoder '{model}': does not take pictures. Choose a vision model")
     network = network.eval().requires_grad_(False).to(memory_format=torch.channels_last)
-    return lambda pixels: _pooled(network(pixel_values=pixels), has_pooler)
+    return network, lambda pixels: _pooled(network(pixel_values=pixels), has_pooler)
 
 
 def _pooled(output: Any, has_pooler: bool) -> torch.Tensor:

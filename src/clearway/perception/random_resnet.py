@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -109,7 +110,8 @@ def from_record(record: EncoderRecord) -> NetworkEncoder:
     _set_statistics(network, record)
     preprocessing = preprocessing_from_json(_object(settings["preprocessing"]), f"encoder {record.name}")
     mean, std = record.arrays["feature_mean"], record.arrays["feature_std"]
-    return NetworkEncoder(record, preprocessing, lambda pixels: _pooled(network, pixels), len(mean), mean, std)
+    features_of = partial(_pooled, network)
+    return NetworkEncoder(record, preprocessing, network, features_of, len(mean), mean, std)
 
 
 def _identity(settings: Mapping[str, object], arrays: Mapping[str, np.ndarray]) -> str:

@@ -1,0 +1,54 @@
+"""`clearway export`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from clearway.cli.arguments import scene_files
+from clearway.cli.console import stderr_console
+from clearway.errors import EncoderError
+
+
+@dataclass(frozen=True)
+class ExportAgent:
+    """Write a trained agent as one file that runs without clearway: pictures in, action probabilities out.
+
+    Example: clearway export runs/bathroom --format onnx --out bathroom.onnx
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    """The run folder."""
+    out: Path = Path("agent.onnx")
+    """The file."""
+    format: Literal["onnx"] = "onnx"
+    """Its format."""
+    encoder: bool = True
+    """Put the encoder in, so that the agent takes pictures; without it, it takes feature vectors."""
+    scene: str | None = None
+    """Name of the scene that the agent is for; by default the run's first."""
+    checkpoint: Path | None = None
+    """A checkpoint folder of the run; by default the newest."""
+    scenes: tuple[Path, ...] = ()
+    """Scene files or folders, where they are no longer where they were at training."""
+
+    def run(self) -> None:
+        """Load the agent, write the file and say what is in it."""
+        from clearway.deploy.export import export_onnx
+        from clearway.deploy.from_run import load_scene_agent
+
+        files = scene_files(self.scenes) if self.scenes else None
+        chosen = load_scene_agent(self.folder, self.scene, checkpoint=self.checkpoint, files=files)
+        try:
+            export_onnx(chosen, self.out, with_encoder=self.encoder)
+        except EncoderError as fault:
+            raise EncoderError(f"{fault}, or export the policy alone with --no-encoder") from fault
+        others = [name for name in chosen.scene_names if name != chosen.scene.name]
+        what = f"policy with encoder {chosen.encoder_record.name}" if self.encoder else "policy"
+        said = f"{what}: {self.out}, {self.out.stat().st_size / 1e6:.1f} MB, for scene {chosen.scene.name}"
+        if others:
+            said += f" (--scene chooses another: {', '.join(others)})"
+        stderr_console().print(said, highlight=False, soft_wrap=True)

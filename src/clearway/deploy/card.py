@@ -1,0 +1,63 @@
+"""`Card`: what a deployed agent is, as its file says it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+from clearway.errors import DeployError
+
+FORMAT_VERSION = 1
+EXPORT_AGAIN = "Export it again with clearway export"
+
+
+@dataclass(frozen=True)
+class Card:
+    """What an agent acts in and what it has to be given.
+
+    Attributes:
+        scene: name of the scene whose layers of the network decide.
+        actions: names of the actions, in the order of the probabilities.
+        history_length: K, feature vectors that the agent decides by, the newest included.
+        feature_count: F, numbers in a feature vector.
+        takes_pictures: the encoder is inside: the agent takes pictures; else it takes feature vectors.
+        encoder: name, identity and settings (JSON values) of what makes the features.
+        normalisation: what is done to pictures and features, all of it inside the agent (JSON values).
+        picture_size: (height, width) in pixels of the pictures that it was trained on, or None where that is unknown.
+        training: what the agent was trained with, for the record (JSON values).
+    """
+
+    scene: str
+    actions: tuple[str, ...]
+    history_length: int
+    feature_count: int
+    takes_pictures: bool
+    encoder: Mapping[str, object]
+    normalisation: Mapping[str, object]
+    picture_size: tuple[int, int] | None
+    training: Mapping[str, object]
+
+    def to_json(self) -> str:
+        """As JSON text, for `card_from_json`."""
+        return json.dumps({"format_version": FORMAT_VERSION, **asdict(self)})
+
+
+def card_from_json(text: str, source: str) -> Card:
+    """The card in a file's metadata.
+
+    Raises:
+        DeployError: it is no such card, or a newer clearway wrote it.
+    """
+    try:
+        kept = json.loads(text)
+        version = int(kept.pop("format_version"))
+        if version > FORMAT_VERSION:
+            raise DeployError(f"{source}: written by a newer clearway (format {version}). Upgrade clearway")
+        size = kept["picture_size"]
+        sizes = {"picture_size": None if size is None else (int(size[0]), int(size[1]))}
+        return Card(**{**kept, **sizes, "actions": tuple(kept["actions"])})
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as fault:
+        if isinstance(fault, DeployError):
+            raise
+        raise DeployError(f"{source}: its metadata cannot be read ({fault}). {EXPORT_AGAIN}") from fault

@@ -1,0 +1,86 @@
+"""A trained agent for one scene as PyTorch modules: what is exported, and what exported files are held against.
+
+Axis letters: B batch, K history (newest last), F features, A actions.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from clearway.learn.load import Agent
+from clearway.perception.encoder import NetworkEncoder
+from clearway.scenes.actions import ACTION_COUNT
+
+
+class PolicyGraph(nn.Module):
+    """Features to probabilities and value, by one scene's layers.
+
+    Args:
+        agent: the trained agent.
+        scene: index of the scene among the run's.
+    """
+
+    def __init__(self, agent: Agent, scene: int) -> None:
+        super().__init__()
+        self.network, self.feature_map, self.scene = agent.network, agent.feature_map, scene
+
+    def forward(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+        """Probabilities (B, A) and value (B, 1) for features of the last K pictures (B, K, F) and the target (B, F)."""
+        fused = self.network.fused(self.feature_map(history), self.feature_map(target))
+        output = self.network.head(fused, self.scene)
+        return torch.softmax(output[:, :ACTION_COUNT], 1), output[:, ACTION_COUNT:]
+
+
+class AgentGraph(nn.Module):
+    """Pictures to probabilities, value and the history for the next step.
+
+    Args:
+        policy: decides.
+        encoder: makes features of pictures.
+    """
+
+    pixel_mean: Tensor
+    pixel_std: Tensor
+    feature_mean: Tensor
+    feature_std: Tensor
+
+    def __init__(self, policy: PolicyGraph, encoder: NetworkEncoder) -> None:
+        super().__init__()
+        self.policy, self.encoder_network, self.features_of = policy, encoder.network, encoder.features_of
+        size = encoder.preprocessing
+        self.height, self.width = size.height, size.width
+        self.register_buffer("pixel_mean", torch.tensor(size.mean).view(1, 3, 1, 1))
+        self.register_buffer("pixel_std", torch.tensor(size.std).view(1, 3, 1, 1))
+        standardised = encoder.mean is not None and encoder.std is not None
+        count = encoder.feature_count
+        self.register_buffer("feature_mean", torch.from_numpy(encoder.mean) if standardised else torch.zeros(count))
+        self.register_buffer("feature_std", torch.from_numpy(encoder.std) if standardised else torch.ones(count))
+
+    def forward(self, picture: Tensor, start: Tensor, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Probabilities (B, A), value (B, 1), history (B, K, F) after a picture; see `AgentModel.step`."""
+        features = self.features(picture)
+        older = torch.where(start[:, None, None], features[:, None].expand_as(history), history)
+        after = torch.cat([older[:, 1:], features[:, None]], 1)
+        return *self.policy(after, target), after
+
+    def features(self, picture: Tensor) -> Tensor:
+        """Features (B, F) of pictures (B, height, width, 3) uint8."""
+        planes = picture.permute(0, 3, 1, 2).float()
+        rows = resize_weights(planes.shape[2], self.height)
+        columns = resize_weights(planes.shape[3], self.width)
+        pixels = (rows @ (planes @ columns.T) / 255 - self.pixel_mean) / self.pixel_std
+        return (self.features_of(pixels) - self.feature_mean) / self.feature_std
+
+
+def resize_weights(given: int, wanted: int) -> Tensor:
+    """The matrix (wanted, given) that resizes a row of pixels bilinearly with antialiasing, as PyTorch does.
+
+    Written out because onnxruntime computes ONNX's own Resize otherwise: up to 11 grey levels away from PyTorch on
+    noise of 640 x 480 pixels, 0.1 on a rendered picture, against 0.0001 here.
+    """
+    scale = given / wanted
+    centre = (torch.arange(wanted) + 0.5) * scale
+    place = torch.arange(given) + 0.5
+    tent = (1 - (place - centre[:, None]).abs() / torch.sym_max(scale, 1.0)).clamp_min(0)
+    return tent / tent.sum(1, keepdim=True)

@@ -1,0 +1,123 @@
+"""Exported files compute what the trained network computes."""
+
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+from torch.nn.functional import interpolate
+
+from clearway.deploy.from_run import load_scene_agent
+from clearway.deploy.graph import resize_weights
+from clearway.deploy.onnx_file import OnnxModel
+from clearway.errors import DeployError, RunError
+from clearway.learn.load import run_world
+from clearway.perception import encoder_from_record
+
+CLOSE = {"rtol": 0, "atol": 1e-5}
+
+
+def histories(rows: int, states: int) -> tuple[np.ndarray, np.ndarray]:
+    """Histories (B, 4) and targets (B,) of any states."""
+    rng = np.random.default_rng(rows)
+    return rng.integers(0, states, (rows, 4)), rng.integers(0, states, rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [1, 2, 7, 64])
+def test_the_policy_alone_equals_the_network_in_pytorch(deployed, policy_file, rows) -> None:
+    """The whole network with its scene switch is the reference, not the module that was exported."""
+    features = deployed.scenes[1].features
+    history, target = histories(rows, len(features))
+    agent = deployed.chosen.agent
+    prepared = agent.feature_map(torch.from_numpy(features))
+    with torch.inference_mode():
+        scores, value = agent.network(prepared[history], prepared[target], torch.ones(rows, dtype=torch.int64))
+    session = onnxruntime.InferenceSession(policy_file)
+    found = session.run(["probabilities", "value"], {"history": features[history], "target": features[target]})
+    np.testing.assert_allclose(found[0], torch.softmax(scores, 1).numpy(), **CLOSE)
+    np.testing.assert_allclose(found[1], value[:, None].numpy(), **CLOSE)
+    assert np.ptp(found[0], axis=1).max() > 0.02  # trained enough that the actions differ
+
+
+@pytest.mark.parametrize("rows", [1, 3, 32])
+def test_policy_with_encoder_equals_the_evaluated_policy(deployed, rows) -> None:
+    """Walked from pictures, step by step, against the policy from tables that `clearway evaluate` judges."""
+    chosen, scenes = deployed.chosen, deployed.scenes
+    world = run_world(chosen.agent.record, scenes)
+    rng = np.random.default_rng(rows)
+    states = rng.integers(0, len(deployed.pictures), (6, rows))
+    targets = rng.integers(0, 2, rows)
+    features = scenes[1].features[np.array([3, 9])[targets]]
+    model = OnnxModel(deployed.agent)
+    history = np.full((rows, 4, model.card.feature_count), np.nan, np.float32)  # a start must not look at it
+    first = int(world.scene_offset[1])
+    for step in range(6):
+        start = np.full(rows, step == 0)
+        found = model.step(deployed.pictures[states[step]], start, history, features)
+        known = states[np.clip(np.arange(step - 3, step + 1), 0, None)].T  # (B, 4), the first repeated
+        expected = chosen.agent.policy(world)(torch.from_numpy(known) + first, torch.from_numpy(targets) + 2)
+        np.testing.assert_allclose(found.probabilities, expected.numpy(), **CLOSE)
+        history = found.history
+
+
+@pytest.mark.parametrize("size", [(12, 16), (16, 20), (37, 21), (240, 320), (1, 1)])
+def test_pictures_of_any_size_are_prepared_as_the_encoder_does(deployed, size) -> None:
+    pictures = np.random.default_rng(0).integers(0, 256, (3, *size, 3), np.uint8)
+    model = OnnxModel(deployed.agent)
+    history = np.zeros((3, 4, model.card.feature_count), np.float32)
+    found = model.step(pictures, np.ones(3, bool), history, history[:, 0]).history
+    expected = encoder_from_record(deployed.scenes[1].encoder).encode(pictures)
+    np.testing.assert_allclose(found, np.repeat(expected[:, None], 4, axis=1), rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize(("given", "wanted"), [(300, 128), (400, 128), (5, 5), (3, 8), (1, 4), (9, 1)])
+def test_resizing_is_pytorch_s(given, wanted) -> None:
+    row = torch.rand(1, 1, 1, given, generator=torch.Generator().manual_seed(0))
+    expected = interpolate(row, (1, wanted), mode="bilinear", antialias=True, align_corners=False)
+    torch.testing.assert_close(row[0, 0] @ resize_weights(given, wanted).T, expected[0, 0], rtol=1e-5, atol=1e-6)
+
+
+def test_only_where_an_episode_starts_is_the_history_filled(deployed) -> None:
+    model = OnnxModel(deployed.agent)
+    history = np.arange(2 * 4 * 16, dtype=np.float32).reshape(2, 4, 16)
+    after = model.step(deployed.pictures[:2], np.array([True, False]), history, history[:, 0]).history
+    np.testing.assert_allclose(after[0], np.repeat(after[0, -1:], 4, axis=0))
+    np.testing.assert_array_equal(after[1, :3], history[1, 1:])
+    assert not np.isin(after[:, -1], history).any()
+
+
+def test_the_card_says_what_the_agent_is(deployed) -> None:
+    card = OnnxModel(deployed.agent).card
+    assert (card.scene, card.takes_pictures, card.history_length, card.feature_count) == ("cellar", True, 4, 16)
+    assert card.actions == ("move forward", "turn right", "turn left", "move backward")
+    assert card.picture_size == (12, 16)
+    assert card.encoder["identity"] == deployed.scenes[1].encoder.identity
+    assert card.normalisation["pixels"]["height"] == 16 and card.normalisation["pixels"]["width"] == 20
+    assert card.normalisation["features"]["directions"] == 12
+    assert card.training["seed"] == 3
+
+
+@pytest.mark.slow
+def test_the_card_of_a_policy_alone(deployed, policy_file) -> None:
+    alone = OnnxModel(policy_file).card
+    assert alone.encoder["identity"] == deployed.scenes[1].encoder.identity
+    assert (alone.takes_pictures, alone.normalisation["pixels"]) == (False, None)
+
+
+def test_a_file_is_a_sound_model_that_names_no_place_on_this_machine(deployed) -> None:
+    onnx.checker.check_model(onnx.load(deployed.agent), full_check=True)
+    content = deployed.agent.read_bytes()
+    assert b".py" not in content
+    assert str(Path.home()).encode() not in content and str(deployed.run.parent).encode() not in content
+
+
+def test_the_scene_is_chosen_by_name_and_is_the_first_otherwise(deployed) -> None:
+    assert load_scene_agent(deployed.run).scene.name == "attic"
+    assert load_scene_agent(deployed.run, "cellar").index == 1
+    with pytest.raises(DeployError, match=r"not trained on a scene den\. Name one of attic, cellar"):
+        load_scene_agent(deployed.run, "den")
+    with pytest.raises(RunError, match="no run here"):
+        load_scene_agent(deployed.run.parent)

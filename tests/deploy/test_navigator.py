@@ -1,0 +1,194 @@
+"""A robot's ten lines: pictures in, actions out."""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import clearway
+from clearway.deploy.card import Card
+from clearway.deploy.model import Step
+from clearway.deploy.navigator import choose, open_model
+from clearway.deploy.onnx_file import shifted
+from clearway.envs.navigation import Navigation
+from clearway.errors import DeployError
+from clearway.learn.load import run_world
+from clearway.reward import COLLISION_AWARE
+from imported import imported_by
+
+CARD = Card("attic", ("f", "r", "l", "b"), 4, 2, True, {"name": "sums"}, {}, None, {})
+
+
+class Sums:
+    """An agent whose features are the picture's mean and 1, and whose value is the sum of its history's means."""
+
+    card = CARD
+
+    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> Step:
+        features = np.stack([seen.mean(axis=(1, 2, 3)), np.ones(len(seen))], axis=1).astype(np.float32)
+        after = shifted(history, features, start)
+        probabilities = np.array([[0.1, 0.2, 0.3, 0.4]], np.float32).repeat(len(seen), axis=0)
+        return Step(probabilities, after[:, :, :1].sum(1) + 1000 * target[:, :1], after)
+
+
+def plain(level: int) -> np.ndarray:
+    """A picture of one grey level."""
+    return np.full((3, 4, 3), level, np.uint8)
+
+
+def values(navigator: clearway.Navigator, levels: list[int]) -> list[float]:
+    return [navigator.act(plain(level)).value for level in levels]
+
+
+def test_the_first_picture_fills_the_history_and_later_ones_push_it_out() -> None:
+    navigator = clearway.Navigator(Sums())
+    navigator.set_target(plain(2))
+    assert values(navigator, [1, 10, 20, 30, 40]) == [2000 + total for total in (4, 13, 32, 61, 100)]
+    navigator.set_target(plain(3))  # begins an episode
+    assert values(navigator, [5, 6]) == [3020.0, 3021.0]
+
+
+@pytest.mark.parametrize("source", ["run", "agent"])
+def test_decisions_are_the_evaluated_agent_s_along_an_episode(deployed, source) -> None:
+    """Through the environment that trained it: the histories are the environment's own."""
+    import torch
+
+    world = run_world(deployed.chosen.agent.record, deployed.scenes)
+    policy, first = deployed.chosen.agent.policy(world), int(world.scene_offset[1])
+    navigation = Navigation(world, COLLISION_AWARE, torch.zeros(1, dtype=torch.int64))
+    navigation.reset(target=torch.tensor([2]), start=torch.tensor([first + 30]))
+    navigator = clearway.Navigator(getattr(deployed, source), scene="cellar", seed=1)
+    navigator.set_target(deployed.pictures[3])
+    for _ in range(12):
+        action, probabilities, value = navigator.act(deployed.pictures[int(navigation.state) - first])
+        expected = policy(navigation.history, navigation.target)[0].numpy()
+        np.testing.assert_allclose(probabilities, expected, atol=1e-5)
+        assert isinstance(value, float)
+        navigation.step(torch.tensor([int(action)]))
+
+
+@pytest.mark.slow
+def test_a_file_without_encoder_takes_features(deployed, policy_file) -> None:
+    """And agrees with the one that holds the encoder."""
+    alone, whole = (clearway.Navigator(path, seed=0) for path in (policy_file, deployed.agent))
+    alone.set_target(deployed.scenes[1].features[3])
+    whole.set_target(deployed.pictures[3])
+    for state in (7, 8, 30):
+        found, expected = alone.act(deployed.scenes[1].features[state]), whole.act(deployed.pictures[state])
+        np.testing.assert_allclose(found.probabilities, expected.probabilities, atol=1e-5)
+        assert found.action == expected.action
+    with pytest.raises(DeployError, match=r"given uint8 \(12, 16, 3\), expected features, float32 \(16,\)"):
+        alone.act(deployed.pictures[0])
+    with pytest.raises(DeployError, match="NaN or Inf"):
+        alone.act(np.full(16, np.nan, np.float32))
+
+
+def test_actions_are_drawn_by_their_probabilities_and_a_seed_repeats() -> None:
+    def drawn(seed: int, count: int = 40) -> list[int]:
+        navigator = clearway.Navigator(Sums(), seed=seed)
+        navigator.set_target(plain(0))
+        return [int(navigator.act(plain(0)).action) for _ in range(count)]
+
+    assert drawn(4) == drawn(4) != drawn(5)
+    shares = np.bincount(drawn(4, 2000), minlength=4) / 2000
+    np.testing.assert_allclose(shares, [0.1, 0.2, 0.3, 0.4], atol=0.04)
+    certain = clearway.Navigator(Sums(), selection="argmax")
+    certain.set_target(plain(0))
+    assert {certain.act(plain(0)).action.name for _ in range(9)} == {"MOVE_BACKWARD"}
+
+
+def test_choosing_an_action() -> None:
+    probabilities = np.array([0.25, 0.25, 0.0, 0.5], np.float32)
+    numbers = (0.0, 0.2499, 0.25, 0.4999, 0.5, 0.9999999999)
+    assert [int(choose(probabilities, number)) for number in numbers] == [0, 0, 1, 1, 3, 3]
+    assert int(choose(probabilities, None)) == 3
+
+
+def test_threads_may_share_a_navigator() -> None:
+    """Every call sees the history that the call before it left: no picture is lost, none is counted twice."""
+    navigator = clearway.Navigator(Sums())
+    navigator.set_target(plain(0))
+    navigator.act(plain(1))
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda level: navigator.act(plain(level)).value, [1] * 400))
+    assert found == [4.0] * 400
+
+    history = []
+    step = Sums.step
+
+    class Watched(Sums):
+        def step(self, seen, start, before, target):
+            result = step(self, seen, start, before, target)
+            history.append((before.copy(), result.history.copy()))
+            return result
+
+    watched = clearway.Navigator(Watched())
+    watched.set_target(plain(0))
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda level: watched.act(plain(level)), range(1, 101)))
+    steps = history[1:]  # the first is the target's
+    assert len(steps) == 100
+    assert all(np.array_equal(later[0], earlier[1]) for earlier, later in pairwise(steps))
+
+
+PICTURE = np.zeros((4, 4, 3), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("picture", "part"),
+    [
+        (PICTURE.astype(np.float32), r"float32 \(4, 4, 3\), expected uint8"),
+        (PICTURE[..., 0], r"uint8 \(4, 4\), expected uint8 \(height, width, 3\)"),
+        (np.zeros((4, 4, 4), np.uint8), r"\(4, 4, 4\)"),
+        (np.zeros((0, 4, 3), np.uint8), r"\(0, 4, 3\)"),
+        (PICTURE[None], r"\(1, 4, 4, 3\)"),
+        ("picture.png", "Give an RGB picture"),
+        (None, "Give an RGB picture"),
+        (np.zeros((1, 4097, 3), np.uint8), "4097 x 1 pixels, expected at most 4096"),
+        (Image.new("L", (5, 5)), r"uint8 \(5, 5\)"),
+    ],
+    ids=str,
+)
+def test_what_is_no_picture_is_refused(picture, part) -> None:
+    navigator = clearway.Navigator(Sums())
+    for give in (navigator.set_target, navigator.act):
+        with pytest.raises(DeployError, match=part):
+            give(picture)
+
+
+def test_a_pillow_picture_is_taken() -> None:
+    navigator = clearway.Navigator(Sums())
+    navigator.set_target(Image.new("RGB", (5, 6)))
+    assert navigator.act(Image.new("RGB", (5, 6), (9, 9, 9))).value == 36
+
+
+def test_without_a_target_there_is_nothing_to_do() -> None:
+    with pytest.raises(DeployError, match=r"no target yet\. Call set_target first"):
+        clearway.Navigator(Sums()).act(PICTURE)
+
+
+def test_sources_that_cannot_be_used(deployed, tmp_path) -> None:
+    with pytest.raises(DeployError, match=r"nothing\.onnx: cannot be read"):
+        clearway.Navigator(tmp_path / "nothing.onnx")
+    with pytest.raises(DeployError, match=r"is for scene cellar, not attic\. Export the run with --scene attic"):
+        clearway.Navigator(deployed.agent, scene="attic")
+    with pytest.raises(DeployError, match=r"selection is 'best'\. Choose one of sampled, argmax"):
+        clearway.Navigator(Sums(), selection="best")
+    assert open_model(str(deployed.agent), "cellar").card.scene == "cellar"
+
+
+def test_a_robot_needs_neither_pytorch_nor_the_learner(deployed) -> None:
+    statement = f"""
+import clearway, numpy
+navigator = clearway.Navigator({str(deployed.agent)!r})
+navigator.set_target(numpy.zeros((6, 8, 3), numpy.uint8))
+navigator.act(numpy.zeros((6, 8, 3), numpy.uint8))
+"""
+    loaded = imported_by(statement)
+    assert {"onnxruntime", "clearway.deploy.navigator"} <= loaded
+    assert not loaded & {"torch", "gymnasium", "onnx", "h5py", "scipy", "transformers", "clearway.model"}
+    ours = {name for name in loaded if name.startswith("clearway.")}
+    assert not [name for name in ours if name.split(".")[1] in ("learn", "envs", "perception", "evaluate")]
+    assert imported_by("import clearway") & {"numpy", "clearway.deploy"} == set()

@@ -1,0 +1,86 @@
+"""Exported files that were changed, cut off or are something else are refused."""
+
+import json
+from pathlib import Path
+
+import onnx
+import pytest
+
+from clearway.deploy.card import Card, card_from_json
+from clearway.deploy.onnx_file import MAX_BYTES, OnnxModel
+from clearway.errors import DeployError
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(DeployError) as caught:
+        OnnxModel(path)
+    assert str(caught.value).startswith(str(path))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
+def test_a_changed_byte_is_noticed_wherever_it_is(deployed, tmp_path, share) -> None:
+    content = bytearray(deployed.agent.read_bytes())
+    content[int(share * (len(content) - 1))] ^= 1
+    path = tmp_path / "changed.onnx"
+    path.write_bytes(content)
+    assert "has changed since it was exported" in refusal(path)
+
+
+def test_a_changed_checksum_is_noticed(deployed, tmp_path) -> None:
+    model = onnx.load(deployed.agent)
+    (entry,) = [entry for entry in model.metadata_props if entry.key == "clearway.sha256"]
+    assert len(entry.value) == 64
+    entry.value = entry.value[::-1]
+    path = tmp_path / "changed.onnx"
+    onnx.save(model, path)
+    assert "has changed since it was exported" in refusal(path)
+
+
+def test_a_card_cannot_be_exchanged(deployed, tmp_path) -> None:
+    path = tmp_path / "changed.onnx"
+    path.write_bytes(deployed.agent.read_bytes().replace(b"cellar", b"bunker"))
+    assert "has changed since it was exported" in refusal(path)
+
+
+def test_cut_off_foreign_empty_and_missing_files(deployed, tmp_path) -> None:
+    content = deployed.agent.read_bytes()
+    path = tmp_path / "x.onnx"
+    for part in (content[: len(content) // 2], b"", b"GIF89a"):
+        path.write_bytes(part)
+        assert "not an agent's ONNX file, or cut off" in refusal(path)
+    path.write_bytes(content[:-1])
+    assert "has changed since it was exported" in refusal(path)
+    path.unlink()
+    assert "No such file" in refusal(path)
+
+
+def test_a_file_larger_than_onnx_allows_is_not_read(tmp_path) -> None:
+    path = tmp_path / "large.onnx"
+    with path.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)  # a hole: takes no space
+    assert "larger than an ONNX file can be" in refusal(path)
+
+
+CARD = Card("attic", ("a", "b"), 4, 32, True, {"name": "x"}, {"pixels": None}, (3, 4), {"seed": 0})
+
+
+def test_a_card_round_trip() -> None:
+    assert card_from_json(CARD.to_json(), "x") == CARD
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("", "metadata cannot be read"),
+        ("[]", "metadata cannot be read"),
+        ('{"format_version": 1}', "metadata cannot be read"),
+        (json.dumps({**json.loads(CARD.to_json()), "picture_size": [1]}), "metadata cannot be read"),
+        (json.dumps({**json.loads(CARD.to_json()), "colour": 1}), "metadata cannot be read"),
+        (json.dumps({**json.loads(CARD.to_json()), "format_version": 2}), "written by a newer clearway (format 2)"),
+    ],
+)
+def test_cards_that_cannot_be_read(text, part) -> None:
+    with pytest.raises(DeployError) as caught:
+        card_from_json(text, "x.onnx")
+    assert str(caught.value).startswith("x.onnx: ") and part in str(caught.value)
