@@ -107,7 +107,7 @@ class SiamesePolicy(ActorCriticPolicy):
 
     def _build(self, lr_schedule: Callable[[float], float]) -> None:
         shape = self.shape
-        self.network = PlainNetwork(shape.scene_count, shape.width, shape.history_length, shape.feature_count)
+        self.network = PlainNetwork(shape.head_count, shape.width, shape.history_length, shape.feature_count)
         settings = {"lr": lr_schedule(1), **self.optimizer_kwargs}
         self.optimizer = self.optimizer_class(self.network.parameters(), **settings)
 
@@ -118,7 +118,7 @@ class SiamesePolicy(ActorCriticPolicy):
         fused = self.network.trunk(seen["observation"].flatten(1), wanted)
         scene = seen["scene"][:, 0].long()
         order = torch.argsort(scene)
-        rows_per_scene = torch.bincount(scene, minlength=self.shape.scene_count).tolist()
+        rows_per_scene = torch.bincount(scene, minlength=self.shape.head_count).tolist()
         output = self.network.heads(fused[order], rows_per_scene)[torch.argsort(order)]
         return output[:, :ACTION_COUNT], output[:, ACTION_COUNT:]
 
@@ -178,7 +178,7 @@ def check_same_network(policy: SiamesePolicy) -> None:
     network = SiameseActorCritic(shape)
     policy.copy_to(network)
     history = torch.randn(rows, shape.history_length, shape.feature_count)
-    target, scene = torch.randn(rows, shape.feature_count), torch.randint(shape.scene_count, (rows,))
+    target, scene = torch.randn(rows, shape.feature_count), torch.randint(shape.head_count, (rows,))
     seen = {"observation": history, "target": target, "scene": scene[:, None].float()}
     with torch.no_grad():
         scores, value = network(history, target, scene)

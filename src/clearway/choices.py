@@ -19,3 +19,6 @@ BudgetName = Literal["smoke", "paper"]
 
 LearnerName = Literal["published", "published-a3c", "default"]
 """See `clearway.experiments.setting`."""
+
+FeatureStore = Literal["memory", "float16", "mapped"]
+"""See `clearway.envs.feature_store`."""

@@ -39,6 +39,7 @@ def test_the_paper_s_settings() -> None:
         "clip_each_tensor": True,
         "width": 512,
         "history_length": 4,
+        "heads": "scene",
         "frames": 10_000_000,
         "envs": 100,
         "envs_by": "scenes",

@@ -56,7 +56,7 @@ def test_against_one_row_and_action_at_a_time(trainer: Trainer) -> None:
     log_pi = torch.log_softmax(kept.scores, 1)
     found = better(trainer, history, target, log_pi, kept.value)
     world, table = trainer.world, trainer.navigation.reward_table
-    features = trainer.lookup.features
+    features = trainer.lookup.first_layer.features
     known_at_goal = 0
     for row in range(len(history)):
         here, goal = int(history[row, -1]), int(target[row])

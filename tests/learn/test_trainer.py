@@ -77,7 +77,7 @@ def published_step(network: SiameseActorCritic, clip_norm: float, lr: float) -> 
     """The first step of the published RMSProp after clipping layer by layer and head by head."""
     for parameter in network.parameters():
         parts = [parameter.grad]
-        if len(parameter) == network.shape.scene_count and parameter is not network.fusion_weight:
+        if len(parameter) == network.shape.head_count and parameter is not network.fusion_weight:
             parts = [part for head in parameter.grad for part in ((head[:4], head[4:]) if len(head) == 5 else (head,))]
         for part in parts:
             part *= min(1.0, clip_norm / part.norm().item())

@@ -1,10 +1,16 @@
 """The map from features to the network's input."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 import torch
 from torch import Tensor
 
-from clearway.model.feature_map import FeatureMap, principal_directions
+from clearway.choices import FeatureStore
+from clearway.model import feature_map
+from clearway.model.feature_map import FeatureMap, prepared_features, principal_directions
+from small_runs import small_world
 
 
 def drawn(states: int, count: int, seed: int = 0) -> Tensor:
@@ -99,3 +105,20 @@ def test_the_map_survives_its_tensors() -> None:
         again = FeatureMap.from_tensors(fitted.tensors())
         assert torch.equal(again(features), fitted(features))
         assert (again.feature_count, again.input_count) == (9, directions or 9)
+
+
+@pytest.mark.parametrize("store", ["memory", "float16", "mapped"])
+def test_features_of_many_states_are_prepared_block_by_block(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, store: FeatureStore
+) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path))
+    world = replace(small_world(), feature_store=store)
+    fitted = FeatureMap.fitted(world.features, centre=True, directions=5)
+    whole = prepared_features(world, fitted)
+    assert torch.equal(whole, fitted(world.features))
+    monkeypatch.setattr(feature_map, "FEW_STATES", 3)
+    monkeypatch.setattr(feature_map, "BLOCK_ROWS", 7)
+    blocks = prepared_features(world, fitted)
+    assert blocks.dtype == (torch.float16 if store == "float16" else torch.float32)
+    tolerance = 2e-3 if store == "float16" else 1e-5
+    assert torch.allclose(blocks.float(), whole, atol=tolerance, rtol=tolerance)

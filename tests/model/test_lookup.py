@@ -1,4 +1,7 @@
-"""`LookupNetwork` against plain autograd on `SiameseActorCritic`, which defines what it computes."""
+"""`LookupNetwork` against plain autograd on `SiameseActorCritic`, which defines what it computes.
+
+Everything holds for both ways to compute the first layer, see `first_layer`.
+"""
 
 from collections.abc import Iterator
 
@@ -6,6 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from clearway.model import lookup as lookup_module
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 
@@ -15,6 +19,11 @@ TARGET_STATE = (3, 9, 15, 25, 25)  # two targets are the same pose
 TARGET_SCENE = (0, 0, 1, 2, 2)
 
 
+@pytest.fixture(autouse=True, params=[STATES, STATES - 1], ids=["all states", "visited states"])
+def few_states(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lookup_module, "FEW_STATES", request.param)
+
+
 @pytest.fixture
 def float64() -> Iterator[None]:
     torch.set_default_dtype(torch.float64)
@@ -22,8 +31,8 @@ def float64() -> Iterator[None]:
     torch.set_default_dtype(torch.float32)
 
 
-def made_network(seed: int = 0) -> tuple[SiameseActorCritic, LookupNetwork]:
-    network = SiameseActorCritic(NetworkShape(3, FEATURES, WIDTH, HISTORY), seed)
+def made_network(seed: int = 0, heads: int = 3) -> tuple[SiameseActorCritic, LookupNetwork]:
+    network = SiameseActorCritic(NetworkShape(heads, FEATURES, WIDTH, HISTORY), seed)
     with torch.no_grad():  # larger weights, so that ReLUs cut and every path carries a gradient
         for parameter in network.parameters():
             parameter.mul_(2)
@@ -50,9 +59,9 @@ def made_rows(rows_per_scene: tuple[int, ...], any_target: bool, seed: int = 0) 
 CASES = [((17, 9, 23), False), ((17, 0, 9), False), ((0, 0, 1), False), ((12, 12, 12), True)]
 
 
-def largest_difference_from_autograd(rows_per_scene: tuple[int, ...], any_target: bool) -> float:
+def largest_difference_from_autograd(rows_per_scene: tuple[int, ...], any_target: bool, heads: int = 3) -> float:
     """Of scores, values and, as a share of their largest, every parameter's gradient."""
-    network, lookup = made_network()
+    network, lookup = made_network(heads=heads)
     history, target, scene = made_rows(rows_per_scene, any_target)
     kept = lookup.forward(history, target, rows_per_scene)
     grad_output = torch.randn(len(history), 5, generator=torch.Generator().manual_seed(5))
@@ -62,7 +71,7 @@ def largest_difference_from_autograd(rows_per_scene: tuple[int, ...], any_target
     lookup.siamese_gradient()
     found = {name: parameter.grad.clone() for name, parameter in network.named_parameters()}
 
-    features = lookup.features
+    features = lookup.first_layer.features
     scores, value = network(features[history], features[lookup.target_state][target], scene)
     differences = [(kept.scores - scores).abs().max(), (kept.value - value).abs().max()]
     network.zero_grad()
@@ -78,6 +87,11 @@ def test_outputs_and_every_gradient_equal_autograd_s(rows_per_scene: tuple[int, 
     assert largest_difference_from_autograd(rows_per_scene, any_target) < 1e-5
 
 
+@pytest.mark.parametrize(("rows_per_scene", "any_target"), CASES)
+def test_so_they_do_where_all_scenes_share_a_head(rows_per_scene: tuple[int, ...], any_target: bool) -> None:
+    assert largest_difference_from_autograd(rows_per_scene, any_target, heads=1) < 1e-5
+
+
 @pytest.mark.usefixtures("float64")
 @pytest.mark.parametrize(("rows_per_scene", "any_target"), CASES)
 def test_in_float64_they_agree_to_rounding(rows_per_scene: tuple[int, ...], any_target: bool) -> None:
@@ -91,7 +105,9 @@ def test_forward_follows_the_parameters_after_refresh() -> None:
         for parameter in network.parameters():
             parameter.mul_(0.5)
         lookup.refresh()
-        scores, value = network(lookup.features[history], lookup.features[lookup.target_state][target], scene)
+        scores, value = network(
+            lookup.first_layer.features[history], lookup.first_layer.features[lookup.target_state][target], scene
+        )
     kept = lookup.forward(history, target, (5, 5, 5))
     torch.testing.assert_close(kept.scores, scores, rtol=1e-5, atol=1e-6)
     torch.testing.assert_close(kept.value, value, rtol=1e-5, atol=1e-6)
@@ -141,7 +157,7 @@ def test_the_siamese_gradient_is_the_mean_over_the_batches_since_the_last_one() 
 
 def test_without_the_siamese_weight_refresh_follows_all_other_parameters() -> None:
     network, lookup = made_network()
-    before = lookup.projected.clone()
+    before = lookup.first_layer.projected.clone()
     with torch.no_grad():
         for name, parameter in network.named_parameters():
             parameter.mul_(1 if name == "siamese_weight" else 0.5)
@@ -149,7 +165,7 @@ def test_without_the_siamese_weight_refresh_follows_all_other_parameters() -> No
     lookup.refresh(siamese_weight=False)
     partly = lookup.wanted, lookup.target_term
     lookup.refresh()
-    assert torch.equal(before, lookup.projected)
+    assert torch.equal(before, lookup.first_layer.projected)
     assert all(torch.equal(a, b) for a, b in zip(partly, (lookup.wanted, lookup.target_term), strict=True))
     assert not torch.equal(wanted, lookup.wanted) and not torch.equal(term, lookup.target_term)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from clearway.choices import RewardName, ZoneLevel
+from clearway.choices import FeatureStore, RewardName, ZoneLevel
 from clearway.cli.arguments import check_at_least, check_seeds, chosen_reward, chosen_targets, scene_files
 from clearway.cli.console import stderr_console
 from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
@@ -55,6 +55,9 @@ class Train:
     """Threads of torch, or processes of a3c. Results repeat bit for bit at one number of threads, and a3c's with 1."""
     device: str = "cpu"
     """cpu or cuda."""
+    feature_store: FeatureStore = "memory"
+    """Where features are kept: memory; float16, in half the memory, rounded; mapped, in a file in the cache folder that
+    is gone afterwards, for sets that memory cannot hold. The last two also open large sets faster."""
     resume: bool = False
     """Go on with the run in --out from its newest checkpoint."""
 
@@ -67,7 +70,7 @@ class Train:
         check_seeds(seed=self.seed)
         set_threads(self.threads)
         files = scene_files(self.files)
-        scenes = [read_scene(path) for path in files]
+        scenes = [read_scene(path, features_in_file=self.feature_store != "memory") for path in files]
         request = RunRequest(
             scenes=scenes,
             targets=chosen_targets(scenes, self.targets, self.seed),
@@ -77,6 +80,7 @@ class Train:
             zone_level=self.zones,
             paths={scene.name: path for scene, path in zip(scenes, files, strict=True)},
             device=self.device,
+            feature_store=self.feature_store,
         )
         train(request, self.out, resume=self.resume, show_progress=True)
         stderr_console().print(f"{self.out}: trained. Next: clearway evaluate {self.out}", highlight=False)

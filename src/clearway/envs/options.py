@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import torch
 
-from clearway.envs.world import World
+from clearway.envs.world import DistanceTable, World
 from clearway.errors import EnvError
 
 RESET_MASK = "reset_mask"
@@ -44,7 +45,7 @@ def environments_to_reset(options: Mapping[str, Any], env_count: int) -> np.ndar
 
 
 def episode_choice(
-    options: Mapping[str, Any], world: World, distances: np.ndarray, index: np.ndarray, env_count: int
+    options: Mapping[str, Any], world: World, distances: DistanceTable, index: np.ndarray, env_count: int
 ) -> EpisodeChoice | None:
     """What the options ask of the new episodes of the environments in index (B,); None where they ask nothing.
 
@@ -52,7 +53,7 @@ def episode_choice(
         options: `scene` (a name), `target` and `start` (state ids in the scene's own numbering), each one value for
             all environments or one an environment (N,).
         world: the tables.
-        distances: (M, S) steps to each target, -1 where there is no path.
+        distances: steps to the world's targets.
         index: (B,) int64, the environments that begin anew.
         env_count: N.
 
@@ -76,7 +77,7 @@ def episode_choice(
     start = _states("start", asked["start"], env_count)[index]
     _check_range(start, scene, world)
     start = start + first[scene]
-    allowed &= distances[:, start].T > 0
+    allowed &= (distances[torch.arange(world.target_count), torch.from_numpy(start)[:, None]] > 0).numpy()
     _check_rows(allowed, start - first[scene], scene, world, "as start reaches no (other) target of", "Targets: ")
     return EpisodeChoice(allowed, start)
 

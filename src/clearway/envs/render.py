@@ -37,7 +37,7 @@ class Renderer:
         self._scenes, self._first = list(scenes), world.scene_offset.numpy()
         self._zones, self._target_scene = world.zone.numpy(), world.target_scene.numpy()
         self._target_state = world.target_state.numpy()
-        self._steps_to = world.distance_table().numpy()
+        self._steps_to = world.distance_table()
         self._maps: dict[int, FloorMap] = {}
 
     def rgb(self, episode: Episode, target: int) -> np.ndarray:

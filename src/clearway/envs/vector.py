@@ -107,7 +107,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
 
         self._world = make_world(loaded, chosen, zone_level)
-        self._distances = self._world.distance_table().numpy()
+        self._distances = self._world.distance_table()
         self._source = observation_source(loaded, observations)
         self.single_observation_space = observation_space(self._source, history_length)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -237,7 +237,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             "collision": collision,
             "cost": collision.astype(np.float64),
             "zone": world.zone[state].numpy(),
-            "distance_to_go": self._distances[target.numpy(), state.numpy()],
+            "distance_to_go": self._distances[target, state].numpy(),
             "scene": scene.numpy(),
             "state": (state - first).numpy(),
             "target": (world.target_state[target] - first).numpy(),

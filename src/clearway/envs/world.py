@@ -5,6 +5,7 @@ Axis letters: S states of all scenes, A actions, F features, M targets, C scenes
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -12,7 +13,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.choices import ZoneLevel
+from clearway.choices import FeatureStore, ZoneLevel
+from clearway.envs.feature_store import LARGEST_FLOAT16, empty_store
 from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
@@ -32,12 +34,13 @@ class World:
         next_state: (S, A) int64; a blocked move leads back to its own state.
         blocked: (S, A) bool.
         zone: (S,) int64 (`zones.Zone`).
-        features: (S, F) float32, or None where the scenes have none.
+        features: (S, F) float32, or as `feature_store` says; None where the scenes have none.
         target_state: (M,) int64, in the numbering of all scenes.
         target_scene: (M,) int64, ascending.
         start_state: (K,) int64, for target after target all states from which it can be reached, itself excluded.
         start_steps: (K,) int64, the shortest-path distance of each of those starts.
         start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
+        feature_store: where features are kept, see there.
     """
 
     scene_names: tuple[str, ...]
@@ -52,6 +55,7 @@ class World:
     start_steps: Tensor
     start_offset: Tensor
     start_count: Tensor
+    feature_store: FeatureStore = "memory"
 
     @property
     def scene_count(self) -> int:
@@ -79,13 +83,9 @@ class World:
         total = torch.zeros(self.target_count, dtype=torch.float64)
         return total.index_add_(0, target, self.start_steps.cpu().double()) / self.start_count.cpu()
 
-    def distance_table(self) -> Tensor:
-        """Steps from every state to every target, (M, S) int64; 0 at the target, -1 where there is no path."""
-        table = torch.full((self.target_count, self.state_count), UNREACHABLE, dtype=torch.int64)
-        target = torch.repeat_interleave(torch.arange(self.target_count), self.start_count.cpu())
-        table[target, self.start_state.cpu()] = self.start_steps.cpu()
-        table[torch.arange(self.target_count), self.target_state.cpu()] = 0
-        return table.to(self.device)
+    def distance_table(self) -> DistanceTable:
+        """Steps from states to targets, to be looked up."""
+        return DistanceTable(self)
 
     def scene_state(self, target: int) -> int:
         """The target's state in its own scene's numbering."""
@@ -98,17 +98,49 @@ class World:
         return replace(self, **moved)
 
 
-def make_world(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zone_level: ZoneLevel = "pose") -> World:
+class DistanceTable:
+    """Steps from states to targets. Only a target's own scene is kept, not all S states for each of the M targets.
+
+    Args:
+        world: the tables.
+    """
+
+    def __init__(self, world: World) -> None:
+        states = torch.diff(world.scene_offset)[world.target_scene]  # (M,) of the target's scene
+        self._first, self._states = world.scene_offset[world.target_scene], states
+        self._offset = states.cumsum(0) - states
+        self._steps = torch.full((int(states.sum()),), UNREACHABLE, dtype=torch.int32, device=world.device)
+        target = torch.repeat_interleave(torch.arange(world.target_count, device=world.device), world.start_count)
+        self._steps[(self._offset - self._first)[target] + world.start_state] = world.start_steps.int()
+        self._steps[self._offset + world.target_state - self._first] = 0
+
+    def __getitem__(self, index: tuple[Tensor | int, Tensor | int]) -> Tensor:
+        """Steps (...) int64 to targets (...) from states (...), int64 both: 0 at the target, -1 without a path."""
+        target, state = index
+        place = state - self._first[target]
+        inside = (place >= 0) & (place < self._states[target])
+        steps = self._steps[torch.where(inside, self._offset[target] + place, 0)]
+        return torch.where(inside, steps, UNREACHABLE).long()
+
+
+def make_world(
+    scenes: Sequence[Scene],
+    targets: Mapping[str, Sequence[int]],
+    zone_level: ZoneLevel = "pose",
+    feature_store: FeatureStore = "memory",
+) -> World:
     """The tables of some scenes with their targets.
 
     Args:
         scenes: scenes with distinct names.
         targets: state ids of each scene's targets by scene name, in the scene's own numbering.
         zone_level: whether zones are those of poses or of cells.
+        feature_store: where to keep the features; features that lie in files are read scene by scene.
 
     Raises:
         SceneError: names repeat, a scene has no target, targets are given for a scene that is not there, a target is
-            out of range, repeated or out of reach, or the scenes' features do not belong together.
+            out of range, repeated or out of reach, or the scenes' features do not belong together or fit the store.
+        RunError: there is no room for the features.
     """
     _check_set(scenes, targets)
     offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
@@ -122,13 +154,14 @@ def make_world(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zo
         next_state=torch.from_numpy(next_states(graph)),
         blocked=torch.from_numpy(graph == BLOCKED),
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
-        features=_joined_features(scenes),
+        features=_joined_features(scenes, feature_store),
         target_state=_joined([np.asarray(targets[s.name]) + o for s, o in zip(scenes, offset, strict=False)]),
         target_scene=torch.from_numpy(np.repeat(np.arange(len(scenes)), per_scene)),
         start_state=_joined([state + o for st, o in zip(starts, offset, strict=False) for state, _ in st]),
         start_steps=_joined([steps for scene_starts in starts for _, steps in scene_starts]),
         start_offset=torch.from_numpy(np.cumsum(counts) - counts),
         start_count=torch.from_numpy(counts),
+        feature_store=feature_store,
     )
 
 
@@ -155,8 +188,8 @@ def _starts(scene: Scene, targets: Sequence[int]) -> list[tuple[np.ndarray, np.n
 
 def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) -> None:
     names = [scene.name for scene in scenes]
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(names).items():
+        if count > 1:
             raise SceneError(name, "two scenes have this name", "Rename one of the files")
     for name in targets:
         if name not in names:
@@ -174,7 +207,8 @@ def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) ->
             raise SceneError(scene.name, "a target is named twice", "Name every target once")
 
 
-def _joined_features(scenes: Sequence[Scene]) -> Tensor | None:
+def _joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | None:
+    """The scenes' features one after the other, (S, F), or None where they have none."""
     if all(scene.features is None for scene in scenes):
         return None
     first = scenes[0]
@@ -187,7 +221,15 @@ def _joined_features(scenes: Sequence[Scene]) -> Tensor | None:
         if _identity(scene) != _identity(first):
             problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
             raise SceneError(scene.name, problem, "Encode all scenes together with one encoder", "resnet_feature")
-    return torch.from_numpy(np.concatenate([np.asarray(s.features, np.float32) for s in scenes]))
+    assert first.features is not None
+    joined = empty_store(sum(scene.state_count for scene in scenes), first.features.shape[1], store)
+    for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
+        features = np.asarray(scene.features, np.float32)
+        if store == "float16" and np.abs(features).max() > LARGEST_FLOAT16:
+            problem = f"holds features beyond {LARGEST_FLOAT16:,.0f}, the largest of float16"
+            raise SceneError(scene.name, problem, "Keep features in another store, mapped", "resnet_feature")
+        rows.numpy()[:] = features
+    return joined
 
 
 def _identity(scene: Scene) -> str:

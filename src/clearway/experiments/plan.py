@@ -52,7 +52,7 @@ class PlannedRun:
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
-        content = [scenes, self.targets, asdict(self.reward), asdict(self.learner), self.seed]
+        content = [scenes, self.targets, asdict(self.reward), self.learner.told_apart_by(), self.seed]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
         targets = sum(len(own) for own in self.targets)
         frames = f"{self.learner.frames / 1e6:g}M"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from clearway.errors import RunError
@@ -11,7 +11,8 @@ Algorithm = Literal["ppo", "a2c", "a3c"]
 PresetName = Literal["default", "paper", "paper-a3c"]
 
 
-_A3C_NEEDS = {
+_A3C_NEEDS: dict[str, object] = {
+    "heads": "scene",
     "epochs": 1,
     "minibatches": 1,
     "siamese_lr": 1,
@@ -21,6 +22,9 @@ _A3C_NEEDS = {
     "lookahead": 0,
     "optimiser": "rmsprop",
 }
+
+ADDED_LATER: dict[str, object] = {"heads": "scene"}
+"""Settings that runs may have been made without, and what holds for those."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,9 @@ class Learner:
     # The network
     width: int = 512
     history_length: int = 4
+    heads: Literal["scene", "shared"] = "scene"
+    """Whether every scene has a last hidden layer and outputs of its own, as published, or all share one. Of 1,000
+    scenes they would be 263 million parameters, stepped with every minibatch."""
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot work.
@@ -141,6 +148,14 @@ class Learner:
                         f"a3c with {name} {getattr(self, name)}, expected {needed}. Set {name} to {needed}, "
                         "or take the preset paper-a3c"
                     )
+
+    def told_apart_by(self) -> dict[str, object]:
+        """The settings by name, without those in `ADDED_LATER` that are as they always were."""
+        return {name: value for name, value in asdict(self).items() if ADDED_LATER.get(name) != value}
+
+    def head_count(self, scenes: int) -> int:
+        """Heads of a network for so many scenes."""
+        return scenes if self.heads == "scene" else 1
 
     @property
     def siamese_minibatches(self) -> int:

@@ -12,7 +12,7 @@ from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
-from clearway.model.feature_map import FeatureMap
+from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import Policy, network_policy
@@ -38,7 +38,7 @@ class Agent:
         """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
-        lookup = LookupNetwork(self.network, self.feature_map(world.features), world.target_state)
+        lookup = LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state)
         return network_policy(lookup, world)
 
 
@@ -55,7 +55,8 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     try:
         feature_map = FeatureMap.from_tensors(_part(tensors, "features."))
         learner = record.learner
-        shape = NetworkShape(len(record.scenes), feature_map.input_count, learner.width, learner.history_length)
+        heads = learner.head_count(len(record.scenes))
+        shape = NetworkShape(heads, feature_map.input_count, learner.width, learner.history_length)
         network = SiameseActorCritic(shape)
         network.load_state_dict(_part(tensors, "network."))
     except (KeyError, RuntimeError) as error:

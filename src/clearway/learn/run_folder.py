@@ -25,7 +25,7 @@ import numpy as np
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.files import written_whole
-from clearway.learn.config import Learner
+from clearway.learn.config import ADDED_LATER, Learner
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
@@ -251,7 +251,7 @@ class RunFolder:
 
 def _record_from(content: Mapping[str, Any]) -> RunRecord:
     return RunRecord(
-        learner=_settings(Learner, content["learner"]),
+        learner=_settings(Learner, {**ADDED_LATER, **content["learner"]}),
         reward=_settings(Reward, content["reward"]),
         seed=content["seed"],
         zone_level=content["zone_level"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from clearway.envs.feature_store import all_finite, evenly_spaced
 from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.config import Learner
@@ -12,6 +13,7 @@ from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp
 from clearway.model.feature_map import FeatureMap
 from clearway.model.network import SiameseActorCritic
 
+FITTED_STATES = 32_768  # states that a feature map is fitted to: evenly spaced ones, where there are more
 SEED_LIMIT = 1 << 31  # seeds of environments are seed * 2**32 + number, in 64 bits
 
 
@@ -33,15 +35,16 @@ def checked_features(world: World) -> Tensor:
     """
     if world.features is None:
         raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
-    if not torch.isfinite(world.features).all():
+    if not all_finite(world.features):
         raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
     return world.features
 
 
 def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
-    """The network's input for the features (S, F), as the settings have it."""
+    """The network's input for the features (S, F), as the settings have it; fitted to `FITTED_STATES` at most."""
+    sample = evenly_spaced(features, FITTED_STATES)
     return FeatureMap.fitted(
-        features, centre=learner.centre_features, directions=learner.feature_basis, whiten=learner.whiten_features
+        sample, centre=learner.centre_features, directions=learner.feature_basis, whiten=learner.whiten_features
     )
 
 

@@ -14,7 +14,7 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
-from clearway.choices import ZoneLevel
+from clearway.choices import FeatureStore, ZoneLevel
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.a3c.trainer import AsyncTrainer
@@ -78,6 +78,7 @@ class RunRequest:
         learner, reward, seed, zone_level: see there.
         paths: file of each scene by name, where it has one.
         device: torch device, for example "cpu" or "cuda".
+        feature_store: where features are kept, see `clearway.envs.feature_store`.
     """
 
     scenes: Sequence[Scene]
@@ -88,6 +89,7 @@ class RunRequest:
     zone_level: ZoneLevel = "pose"
     paths: Mapping[str, Path] | None = None
     device: str = "cpu"
+    feature_store: FeatureStore = "memory"
 
     def record(self) -> RunRecord:
         """The record to be written to the run folder."""
@@ -97,7 +99,8 @@ class RunRequest:
 
     def trainer(self) -> Learning:
         """A trainer at its first frame. A3C runs in as many processes as torch has threads."""
-        world = make_world(self.scenes, self.targets, self.zone_level).to(usable_device(self.device))
+        device = usable_device(self.device)
+        world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store).to(device)
         if self.learner.algorithm == "a3c":
             return AsyncTrainer(world, self.learner, self.reward, self.seed, torch.get_num_threads())
         return Trainer(world, self.learner, self.reward, self.seed)

@@ -25,6 +25,7 @@ from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.setup import check_seed, checked_features, divided_envs, fitted_features, optimisers
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
@@ -73,16 +74,16 @@ class Trainer:
 
     def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
         check_seed(seed)
-        features = checked_features(world)
+        self.feature_map = fitted_features(checked_features(world), learner)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
         envs_per_scene = divided_envs(world, learner)
         self.env_count = sum(envs_per_scene)
         device = world.device
-        self.feature_map = fitted_features(features, learner)
-        shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
+        heads = learner.head_count(world.scene_count)
+        shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
-        self.lookup = LookupNetwork(self.network, self.feature_map(features), world.target_state)
+        self.lookup = LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state)
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         counts = torch.tensor(envs_per_scene, device=device)

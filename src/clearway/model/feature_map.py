@@ -11,6 +11,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from clearway.envs.feature_store import BLOCK_ROWS, FEW_STATES, empty_store
+from clearway.envs.world import World
+
 SPANNED = 1e-5  # a direction counts where its singular value is at least this share of the largest
 
 
@@ -74,6 +77,21 @@ class FeatureMap:
     def from_tensors(cls, tensors: Mapping[str, Tensor]) -> FeatureMap:
         """The map that `tensors` was called of."""
         return cls(tensors["mean"], tensors["factor"], tensors.get("basis"))
+
+
+def prepared_features(world: World, feature_map: FeatureMap) -> Tensor:
+    """The network's input for all states of a world with features, (S, F) or (S, R).
+
+    Float32 for few states; with more than `FEW_STATES` in the world's own kind of store, block by block.
+    """
+    features = world.features
+    assert features is not None
+    if len(features) <= FEW_STATES:
+        return feature_map(features.float())
+    prepared = empty_store(len(features), feature_map.input_count, world.feature_store).to(world.device)
+    for rows, block in zip(prepared.split(BLOCK_ROWS), features.split(BLOCK_ROWS), strict=True):
+        rows.copy_(feature_map(block.float()))
+    return prepared
 
 
 def _basis(features: Tensor, directions: int, whiten: bool) -> Tensor | None:

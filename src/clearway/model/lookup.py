@@ -2,10 +2,12 @@
 
 Features are frozen and states finite, so the first layer needs no picture twice:
 
-    W_k f(s)             one matrix product of all S states' features an update, then K rows are summed per sample;
+    W_k f(s)             one matrix product of the states' features an update, then K rows are summed per sample;
     target branch        one row a target (M of them), not one a sample;
     dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once; several
                          batches may be added up before that, as long as W_k stays what it is.
+
+The first layer is computed of all states, or in large worlds of those that occur: `first_layer`.
 
 Nothing is approximated. Gradients are written by hand into `.grad`; the tests hold them against autograd on `network`.
 
@@ -21,6 +23,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import embedding_bag
 
+from clearway.envs.feature_store import FEW_STATES
+from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
 from clearway.scenes.actions import ACTION_COUNT
 
@@ -77,7 +81,7 @@ class LookupNetwork:
 
     Args:
         network: the parameters; shared, not copied. Call `refresh` after every change of them.
-        features: (S, F) float32, prepared features of all states.
+        features: (S, F) float32, prepared features of all states; with more than `FEW_STATES` in any store.
         target_state: (M,) int64.
 
     Attributes:
@@ -87,13 +91,11 @@ class LookupNetwork:
     def __init__(self, network: SiameseActorCritic, features: Tensor, target_state: Tensor) -> None:
         shape = network.shape
         assert features.shape[1] == shape.feature_count, "features do not fit the network"
-        self.network, self.features, self.target_state = network, features.contiguous(), target_state
+        self.network, self.target_state = network, target_state
         self.width, self.history_length = shape.width, shape.history_length
-        self.slot = torch.arange(shape.history_length, device=features.device)
-        columns = shape.history_length * shape.width
-        self.projected = torch.empty(len(features), columns, device=features.device)
-        self.workspace = torch.empty(0, self.width, device=features.device)
-        self.by_state, self.batches = torch.empty(0, columns, device=features.device), 0
+        layer = AllStates if len(features) <= FEW_STATES else VisitedStates
+        self.first_layer: FirstLayer = layer(network.siamese_weight.data, features, target_state)
+        self.workspace, self.batches = torch.empty(0, self.width, device=features.device), 0
         for parameter in network.parameters():
             parameter.grad = torch.zeros_like(parameter)
         self.refresh()
@@ -108,12 +110,11 @@ class LookupNetwork:
         """
         net = self.network
         if siamese_weight:
-            torch.mm(self.features, net.siamese_weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
+            self.first_layer.refresh()
         self.fusion_in, self.scene_in = net.fusion_weight[0].T, net.scene_weight.transpose(1, 2)
         if few_rows:
             self.fusion_in, self.scene_in = self.fusion_in.contiguous(), self.scene_in.contiguous()
-        slots = self.projected[self.target_state].view(-1, self.history_length, self.width)
-        self.wanted = slots.sum(1).add_(net.siamese_bias).relu_()  # (M, H)
+        self.wanted = self.first_layer.wanted().add_(net.siamese_bias).relu_()  # (M, H)
         self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
 
     @torch.no_grad()
@@ -130,8 +131,7 @@ class LookupNetwork:
         """
         net = self.network
         out = out or Activations.empty(len(history), self.width, history.device)
-        rows = self.projected.view(-1, self.width)
-        torch.add(embedding_bag(self._table_row(history), rows, mode="sum"), net.siamese_bias, out=out.seen).relu_()
+        torch.add(self.first_layer.seen(history), net.siamese_bias, out=out.seen).relu_()
         torch.addmm(self.target_term[target], out.seen, self.fusion_in, out=out.fused).relu_()
         self._forward_scenes(rows_per_scene, out)
         return out
@@ -143,19 +143,20 @@ class LookupNetwork:
         A start's history is one pose, so the observation branch is computed once a state, not once a row.
         """
         out = Activations.empty(len(state), self.width, state.device)
-        seen = self.projected.view(-1, self.history_length, self.width).sum(1).add_(self.network.siamese_bias).relu_()
-        torch.add((seen @ self.fusion_in)[state], self.target_term[target], out=out.fused).relu_()
+        sums, row = self.first_layer.starts(state)
+        seen = sums.add_(self.network.siamese_bias).relu_()
+        torch.add((seen @ self.fusion_in)[row], self.target_term[target], out=out.fused).relu_()
         self._forward_scenes(rows_per_scene, out)
         return out.value
 
     def _forward_scenes(self, rows_per_scene: Sequence[int], out: Activations) -> None:
         """The scenes' own layers, from `fused` on."""
         net, first = self.network, 0
-        for scene, count in enumerate(rows_per_scene):
+        for head, count in enumerate(self._rows_per_head(rows_per_scene)):
             if count:
                 part = out.rows(first, first + count)
-                torch.addmm(net.scene_bias[scene], part.fused, self.scene_in[scene], out=part.special).relu_()
-                torch.addmm(net.output_bias[scene], part.special, net.output_weight[scene].T, out=part.output)
+                torch.addmm(net.scene_bias[head], part.fused, self.scene_in[head], out=part.special).relu_()
+                torch.addmm(net.output_bias[head], part.special, net.output_weight[head].T, out=part.output)
             first += count
 
     @torch.no_grad()
@@ -183,14 +184,14 @@ class LookupNetwork:
         torch.mm(grad_fused, net.fusion_weight[0], out=grad_seen)
         _relu_backward_(grad_seen, kept.seen)
         torch.sum(grad_seen, 0, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
-        self._add_by_state(history, grad_seen, grad_wanted)
+        self.first_layer.add(history, grad_seen, grad_wanted, begin=not self.batches)
         self.batches += 1
 
     @torch.no_grad()
     def siamese_gradient(self) -> None:
         """Set siamese_weight's `.grad` to the mean over the backward passes since the last call."""
         gradient = grad_of(self.network.siamese_weight)
-        torch.mm(self.by_state.T, self.features, out=gradient.flatten(0, 1))
+        self.first_layer.gradient(gradient)
         if self.batches > 1:
             gradient.div_(self.batches)
         self.batches = 0
@@ -198,7 +199,7 @@ class LookupNetwork:
     def _work(self, blocks: int, rows: int) -> list[Tensor]:
         """Memory for some (rows, H) blocks, kept between calls: fresh pages cost more than the arithmetic."""
         if len(self.workspace) < blocks * rows:
-            self.workspace = torch.empty(blocks * rows, self.width, device=self.features.device)
+            self.workspace = torch.empty(blocks * rows, self.width, device=self.target_state.device)
         return list(self.workspace[: blocks * rows].view(blocks, rows, self.width))
 
     def _backward_scenes(
@@ -212,33 +213,23 @@ class LookupNetwork:
         """Gradients of the scenes' own layers; writes dL/d(special), dL/d(fused after ReLU), both (B, H)."""
         net = self.network
         first = 0
-        for scene, count in enumerate(rows_per_scene):
+        for head, count in enumerate(self._rows_per_head(rows_per_scene)):
             rows = slice(first, first + count)
             grad_out = grad_output[rows]
-            torch.mm(grad_out.T, kept.special[rows], out=grad_of(net.output_weight)[scene])
-            torch.sum(grad_out, 0, out=grad_of(net.output_bias)[scene])
-            torch.mm(grad_out, net.output_weight[scene], out=grad_special[rows])
+            torch.mm(grad_out.T, kept.special[rows], out=grad_of(net.output_weight)[head])
+            torch.sum(grad_out, 0, out=grad_of(net.output_bias)[head])
+            torch.mm(grad_out, net.output_weight[head], out=grad_special[rows])
             _relu_backward_(grad_special[rows], kept.special[rows])
-            torch.mm(grad_special[rows].T, kept.fused[rows], out=grad_of(net.scene_weight)[scene])
-            torch.sum(grad_special[rows], 0, out=grad_of(net.scene_bias)[scene])
-            torch.mm(grad_special[rows], net.scene_weight[scene], out=grad_fused[rows])
+            torch.mm(grad_special[rows].T, kept.fused[rows], out=grad_of(net.scene_weight)[head])
+            torch.sum(grad_special[rows], 0, out=grad_of(net.scene_bias)[head])
+            torch.mm(grad_special[rows], net.scene_weight[head], out=grad_fused[rows])
             first += count
+
+    def _rows_per_head(self, rows_per_scene: Sequence[int]) -> Sequence[int]:
+        """Number of rows of each head: of its scene, or all of them."""
+        return rows_per_scene if self.network.shape.head_count > 1 else (sum(rows_per_scene),)
 
     def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:
         """Rows (B, H) added up by target, (M, H)."""
         count = torch.bincount(target, minlength=len(self.target_state))
         return embedding_bag(torch.argsort(target), rows, count.cumsum(0) - count, mode="sum")
-
-    def _add_by_state(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor) -> None:
-        """Add gradients up by state and slot, (S, K * H)."""
-        bag = self._table_row(history).flatten()
-        count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
-        sample = torch.argsort(bag) // self.history_length
-        by_state = embedding_bag(sample, grad_seen, count.cumsum(0) - count, mode="sum")  # (S * K, H)
-        columns = by_state.view(len(self.features), -1)
-        self.by_state = self.by_state.add_(columns) if self.batches else columns
-        self.by_state.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
-
-    def _table_row(self, states: Tensor) -> Tensor:
-        """Row of `projected`, seen as (S * K, H), for states (B, K) in their slots."""
-        return states * self.history_length + self.slot

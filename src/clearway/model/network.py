@@ -4,10 +4,10 @@
                                                  +--fusion--> H --scene--> H --> 4 action scores, 1 value
     target, tiled K times (K x F) --siamese--> H -+
 
-ReLU after every hidden layer; the scene layer and the outputs belong to a scene. `lookup` computes the same
+ReLU after every hidden layer; the scene layer and the outputs, the head, belong to a scene. `lookup` computes the same
 function much faster where states are few; this is the definition that it is checked against, and the one to deploy.
 
-Axis letters: B batch, K history (newest last), F features, H hidden width, C scenes, A actions.
+Axis letters: B batch, K history (newest last), F features, H hidden width, C heads, A actions.
 """
 
 from __future__ import annotations
@@ -26,9 +26,14 @@ OUTPUTS = ACTION_COUNT + 1  # action scores, then the value
 
 @dataclass(frozen=True)
 class NetworkShape:
-    """Sizes that determine the parameters."""
+    """Sizes that determine the parameters.
 
-    scene_count: int
+    Attributes:
+        head_count: C, as many as scenes; a single head serves however many scenes.
+        feature_count, width, history_length: F, H, K.
+    """
+
+    head_count: int
     feature_count: int
     width: int = 512
     history_length: int = 4
@@ -48,7 +53,7 @@ class SiameseActorCritic(nn.Module):
         super().__init__()
         self.shape = shape
         scenes, features, width, history = (
-            shape.scene_count,
+            shape.head_count,
             shape.feature_count,
             shape.width,
             shape.history_length,
@@ -74,12 +79,13 @@ class SiameseActorCritic(nn.Module):
         Args:
             history: (B, K, F) features of the last K poses, newest last, prepared by `FeatureMap`.
             target: (B, F) features of the target pose, prepared likewise; tiled K times here.
-            scene: (B,) int64, whose head to use.
+            scene: (B,) int64, whose head to use; a single head is used for all.
         """
         fused = self.fused(history, target)
         output = fused.new_empty(len(fused), OUTPUTS)
-        for head in scene.unique().tolist():
-            rows = scene == head
+        heads = scene if self.shape.head_count > 1 else torch.zeros_like(scene)
+        for head in heads.unique().tolist():
+            rows = heads == head
             output[rows] = self.head(fused[rows], head)
         return output[:, :ACTION_COUNT], output[:, ACTION_COUNT]
 

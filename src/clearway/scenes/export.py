@@ -37,7 +37,7 @@ def export_thor_v1(scene: Scene, path: Path) -> None:
         file["location"] = scene.locations_m
         file["rotation"] = scene.headings_deg
         file["shortest_path_distance"] = scene.distances.astype(np.int64)
-        file["resnet_feature"] = scene.features[:, None]
+        file["resnet_feature"] = np.asarray(scene.features)[:, None]
         pictures = file.create_dataset("observation", scene.observations.shape, np.uint8)
         for start in range(0, scene.state_count, BLOCK_PICTURES):
             pictures[start : start + BLOCK_PICTURES] = scene.observations[start : start + BLOCK_PICTURES]

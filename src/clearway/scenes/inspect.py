@@ -79,7 +79,7 @@ def summary(scene: Scene) -> SceneSummary:
         encoder=None if encoder is None else encoder.name,
         encoder_identity=None if encoder is None else encoder.identity,
         feature_count=None if features is None else features.shape[1],
-        spread=None if features is None else feature_spread(features),
+        spread=None if features is None else feature_spread(np.asarray(features)),
         picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
         source=scene.made_by.source,
         room=scene.made_by.room,

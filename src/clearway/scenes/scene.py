@@ -26,6 +26,21 @@ class Observations(Protocol):
         """The pictures asked for, uint8 RGB."""
 
 
+class Features(Protocol):
+    """The features of a scene: an array, or a file read when `numpy.asarray` makes an array of it."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(S, F)."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """A float type."""
+
+    def __array__(self) -> np.ndarray:
+        """All features."""
+
+
 @dataclass(frozen=True)
 class TopView:
     """A picture of the room from above, for maps.
@@ -85,7 +100,7 @@ class Scene:
     Attributes:
         name: for example "bathroom" or "bathroom_02".
         observations: (S, height, width, 3) uint8 RGB first-person pictures, read lazily; None if the file has none.
-        features: (S, F) float32 frozen features of the pictures; None until they are encoded.
+        features: (S, F) float32 frozen features of the pictures, may be read lazily; None until they are encoded.
         locations_m: (S, 2) float64, x and z of the agent on the floor, metres.
         headings_deg: (S,) int64, 0 looks along +z, 90 along +x (a right turn adds `turn_deg`).
         graph: (S, A) int32, next state by action (`actions.Action`); -1 where the move is blocked.
@@ -97,7 +112,7 @@ class Scene:
 
     name: str
     observations: Observations | None
-    features: np.ndarray | None
+    features: Features | None
     locations_m: np.ndarray
     headings_deg: np.ndarray
     graph: np.ndarray

@@ -18,6 +18,8 @@ from clearway.errors import SceneError
 from clearway.files import written_whole
 from clearway.scenes import hdf5
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
+from clearway.scenes.features import DATASET as FEATURES
+from clearway.scenes.features import FileFeatures, find_features, read_features
 from clearway.scenes.pictures import BLOCK_PICTURES, FilePictures, file_stamp
 from clearway.scenes.records import (
     read_encoder,
@@ -27,10 +29,9 @@ from clearway.scenes.records import (
     write_provenance,
     write_top_view,
 )
-from clearway.scenes.scene import Observations, Scene
+from clearway.scenes.scene import Features, Observations, Scene
 from clearway.scenes.validate import (
     MAX_COORDINATE_M,
-    MAX_FEATURES,
     MAX_STATES,
     SceneWarning,
     check_graph,
@@ -47,12 +48,14 @@ HDF5_VERSION = ("v110", "v110")  # before 1.10 (2016) the index of chunks has no
 PICTURE_GZIP_LEVEL = 2  # 0.42 of the raw size in 8 ms a 400x300 picture; level 4 saves 2 % more, lzf needs 0.58
 
 
-def read_scene(path: str | Path, *, name: str | None = None) -> Scene:
+def read_scene(path: str | Path, *, name: str | None = None, features_in_file: bool = False) -> Scene:
     """The scene in a `thor_v1` file; its pictures stay in the file until they are looked at.
 
     Args:
         path: the HDF5 file.
         name: name of the scene; the file's stem where it is not given.
+        features_in_file: for large sets, which this opens in milliseconds a scene: leave features in the file until
+            they are looked at, and check them then; do not look at the file's distances, which nothing uses.
 
     Raises:
         SceneError: the file is not HDF5, damaged, incomplete, inconsistent, too large or of a newer format.
@@ -67,7 +70,7 @@ def read_scene(path: str | Path, *, name: str | None = None) -> Scene:
         count = len(graph)
         locations_m, headings_deg = _read_locations(file, path, count), _read_headings(file, path, count)
         check_poses(locations_m, headings_deg, count, path)
-        features = _read_features(file, path, count)
+        features = _find_features(file, path, count, features_in_file)
         scene = Scene(
             name=name or path.stem,
             observations=_find_pictures(file, path, count),
@@ -84,7 +87,7 @@ def read_scene(path: str | Path, *, name: str | None = None) -> Scene:
         check_scene(scene, path)
         if scene.observations is None and features is None:
             raise SceneError(path, "has neither pictures nor features", "Give a complete scene file")
-        quirks = pose_quirks(scene) + _distance_quirks(file, path, scene)
+        quirks = pose_quirks(scene) + ([] if features_in_file else _distance_quirks(file, path, scene))
     for quirk in quirks:
         warnings.warn(f"{path}: {quirk}", SceneWarning, stacklevel=2)
     return scene
@@ -149,23 +152,14 @@ def _read_headings(file: h5py.File, path: Path, count: int) -> np.ndarray:
     return np.round(values).astype(np.int64) % 360
 
 
-def _read_features(file: h5py.File, path: Path, count: int) -> np.ndarray | None:
-    """Features (S, F) float32, index 0 of the second axis where there are three; None where the file has none."""
-    dataset = hdf5.find_dataset(file, "resnet_feature", path)
+def _find_features(file: h5py.File, path: Path, count: int, in_file: bool) -> Features | None:
+    """The features of a file, or where they are to be found in it; None where it has none."""
+    dataset = find_features(file, path, count)
     if dataset is None:
         return None
-    axes = len(dataset.shape or ())
-    shape = (count, None) if axes == 2 else (count, None, None)
-    hdf5.check_layout(dataset, path, shape=shape, kinds="f")
-    if 0 in dataset.shape or dataset.shape[-1] > MAX_FEATURES:
-        problem = f"has shape {dataset.shape}, expected 1 to {MAX_FEATURES} features"
-        raise SceneError(path, problem, hdf5.MAKE_AGAIN, "resnet_feature")
-    if count * dataset.shape[-1] * dataset.dtype.itemsize > hdf5.MAX_ARRAY_BYTES:
-        problem = f"would take more than {hdf5.MAX_ARRAY_BYTES >> 30} GiB of memory"
-        raise SceneError(path, problem, "Give a smaller scene", "resnet_feature")
-    values = hdf5.read_values(dataset, path, () if axes == 2 else np.s_[:, 0])
-    with np.errstate(over="ignore"):  # a float64 beyond float32 becomes Inf, which `check_scene` names
-        return np.ascontiguousarray(values, dtype=np.float32)
+    if in_file:
+        return FileFeatures(path.resolve(), (count, dataset.shape[-1]), file_stamp(path))
+    return read_features(dataset, path)
 
 
 def _find_pictures(file: h5py.File, path: Path, count: int) -> FilePictures | None:
@@ -206,7 +200,7 @@ def _write_all(file: h5py.File, scene: Scene) -> None:
     if scene.state_count <= DISTANCE_TABLE_STATES:
         hdf5.write_array(file, "shortest_path_distance", scene.distances)
     if scene.features is not None:
-        hdf5.write_array(file, "resnet_feature", scene.features.astype(np.float32)[:, None])
+        hdf5.write_array(file, FEATURES, np.asarray(scene.features, np.float32)[:, None])
     if scene.encoder is not None:
         write_encoder(file, scene.encoder)
     if scene.top_view is not None:

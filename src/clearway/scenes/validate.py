@@ -37,7 +37,8 @@ def check_scene(scene: Scene, source: str | Path | None = None) -> None:
     check_turns(scene.graph, source)
     check_poses(scene.locations_m, scene.headings_deg, scene.state_count, source)
     if scene.features is not None:
-        check_features(scene.features, scene.state_count, source)
+        if isinstance(scene.features, np.ndarray):  # features in a file are checked whenever they are read
+            check_features(scene.features, scene.state_count, source)
         if scene.encoder is None:
             raise SceneError(source, "has features but no record of their encoder", "Encode the scene again")
     if scene.observations is not None:

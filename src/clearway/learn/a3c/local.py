@@ -47,7 +47,7 @@ class LocalNetwork:
 
     Args:
         shape: of the network.
-        features: (S, F) float32, prepared features of all states.
+        features: (S, F), prepared features of all states, in any store.
         target_state: (R,) int64, every worker's target.
         rows_per_scene: number of workers in each scene, in order.
         steps: T.
@@ -95,7 +95,7 @@ class LocalNetwork:
 
     def arrive(self, step: int, state: Tensor) -> None:
         """Add the poses (R,) int64 that step number `step` (1 to T) led to."""
-        features = self.features[state]
+        features = self.features[state].float()
         self.trail_features[:, self.history_length + step - 1] = features
         count = min(self.history_length, self.steps + 1 - step)  # histories of the segment that show it
         projected = _projected(features, self.siamese[:count].flatten(0, 1))

@@ -28,6 +28,7 @@ from clearway.learn.config import Learner
 from clearway.learn.setup import check_seed, checked_features, fitted_features
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.trainer import Update, check_finite
+from clearway.model.feature_map import prepared_features
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
@@ -63,15 +64,15 @@ class AsyncTrainer:
         self.feature_map = fitted_features(features, learner)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
         self.process_count = min(processes, learner.envs)
-        self.shared = self._new_shared(features)
+        self.shared = self._new_shared()
         self._processes: list[SpawnProcess] = []
         self._connections: list[Connection] = []
         self._paused = False
         self._figures: list[Update] = []
 
-    def _new_shared(self, features: Tensor) -> SharedTensors:
+    def _new_shared(self) -> SharedTensors:
         """Shared memory with everything at its start."""
-        learner, world = self.learner, replace(self.world, features=self.feature_map(features))
+        learner, world = self.learner, replace(self.world, features=prepared_features(self.world, self.feature_map))
         shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
         parameters = {name: p.data for name, p in SiameseActorCritic(shape, self.seed).named_parameters()}
         squares = {name: torch.full_like(tensor, 1 + EPSILON) for name, tensor in parameters.items()}

@@ -1,0 +1,201 @@
+"""The siamese layer on a world's states, without its bias and ReLU: rows are projected once and then looked up.
+
+Two ways to the same numbers, up to rounding. `AllStates` projects every state whenever the weight moves: the less work
+the fewer states there are. `VisitedStates` projects the states that occur: memory and work follow the batch, not the
+world. `LookupNetwork` takes the second for worlds of more than `FEW_STATES` states.
+
+Axis letters: B rows, K history, S states, F features, H width, M targets, U states that occur.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import torch
+from torch import Tensor
+from torch.nn.functional import embedding_bag
+
+MOST_ROWS = 131_072  # projected states kept while nothing is being learnt from them: 1 GiB at the published size
+
+
+class FirstLayer(Protocol):
+    """What both ways offer. All results are sums over the K slots, before bias and ReLU."""
+
+    def refresh(self) -> None:
+        """The weight has changed."""
+
+    def seen(self, history: Tensor) -> Tensor:
+        """(B, H) of histories (B, K) int64."""
+
+    def wanted(self) -> Tensor:
+        """(M, H) of all targets, each in every slot."""
+
+    def starts(self, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Sums (U, H) of states in every slot, and which of them is that of each state (B,) int64: (B,) int64."""
+
+    def add(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor, begin: bool) -> None:
+        """Add up what the weight's gradient needs, from those of `seen` (B, H) and `wanted` (M, H).
+
+        `begin`: forget what was added before.
+        """
+
+    def gradient(self, out: Tensor) -> None:
+        """Write the weight's gradient (K, H, F), of all that was added."""
+
+
+class AllStates:
+    """All states are projected, whenever the weight moves.
+
+    Args:
+        weight: (K, H, F), shared, not copied. Call `refresh` first, and after every change.
+        features: (S, F) in the weight's dtype.
+        target_state: (M,) int64.
+    """
+
+    def __init__(self, weight: Tensor, features: Tensor, target_state: Tensor) -> None:
+        self.weight, self.features, self.target_state = weight, features.contiguous(), target_state
+        self.history_length, self.width, _ = weight.shape
+        self.slot = torch.arange(self.history_length, device=features.device)
+        columns = self.history_length * self.width
+        self.projected = torch.empty(len(features), columns, device=features.device)
+        self.by_state = torch.empty(0, columns, device=features.device)
+
+    def refresh(self) -> None:
+        """The weight has changed."""
+        torch.mm(self.features, self.weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
+
+    def seen(self, history: Tensor) -> Tensor:
+        """(B, H) of histories (B, K) int64."""
+        return embedding_bag(self._table_row(history), self.projected.view(-1, self.width), mode="sum")
+
+    def wanted(self) -> Tensor:
+        """(M, H) of all targets, each in every slot."""
+        return self.projected[self.target_state].view(-1, self.history_length, self.width).sum(1)
+
+    def starts(self, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Sums (S, H) of all states in every slot, and `state` (B,) int64 as it is."""
+        return self.projected.view(-1, self.history_length, self.width).sum(1), state
+
+    def add(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor, begin: bool) -> None:
+        """Add gradients up by state and slot, (S, K * H)."""
+        bag = self._table_row(history).flatten()
+        count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
+        sample = torch.argsort(bag) // self.history_length
+        by_state = embedding_bag(sample, grad_seen, count.cumsum(0) - count, mode="sum")  # (S * K, H)
+        columns = by_state.view(len(self.features), -1)
+        self.by_state = columns if begin else self.by_state.add_(columns)
+        self.by_state.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
+
+    def gradient(self, out: Tensor) -> None:
+        """Write the weight's gradient (K, H, F), of all that was added."""
+        torch.mm(self.by_state.T, self.features, out=out.flatten(0, 1))
+
+    def _table_row(self, states: Tensor) -> Tensor:
+        """Row of `projected`, seen as (S * K, H), for states (B, K) in their slots."""
+        return states * self.history_length + self.slot
+
+
+class VisitedStates:
+    """States are projected when they occur, and forgotten when the weight moves.
+
+    A target stands in every slot, so that the sum of the slots' weights serves it, and likewise a start.
+
+    Args:
+        weight: (K, H, F), shared, not copied. Call `refresh` first, and after every change.
+        features: (S, F) in any store and float dtype; rows are read as they are needed.
+        target_state: (M,) int64.
+
+    Attributes:
+        known: number of states projected at present.
+        row_of: (S,) int64, their rows; -1 of all other states.
+    """
+
+    def __init__(self, weight: Tensor, features: Tensor, target_state: Tensor) -> None:
+        self.weight, self.features = weight, features
+        self.history_length, self.width, count = weight.shape
+        columns, device = self.history_length * self.width, features.device
+        self.slot = torch.arange(self.history_length, device=device)
+        self.row_of = torch.full((len(features),), -1, device=device)
+        self.known = 0
+        self.rows = torch.empty(0, count, dtype=weight.dtype, device=device)  # features of the known states
+        self.projected = torch.empty(0, columns, dtype=weight.dtype, device=device)
+        self.targets = self._read(target_state)  # (M, F)
+        self.by_state, self.by_target = self.projected, torch.empty(0, self.width, device=device)
+
+    def refresh(self) -> None:
+        """The weight has changed."""
+        self._forget()
+        self.slots_together = self.weight.sum(0)  # (H, F)
+        self.wanted_rows = self.targets @ self.slots_together.T
+
+    def seen(self, history: Tensor) -> Tensor:
+        """(B, H) of histories (B, K) int64."""
+        row = self._table_row(history)
+        return embedding_bag(row, self.projected[: self.known].view(-1, self.width), mode="sum")
+
+    def wanted(self) -> Tensor:
+        """(M, H) of all targets, each in every slot."""
+        return self.wanted_rows.clone()
+
+    def starts(self, state: Tensor) -> tuple[Tensor, Tensor]:
+        """Sums (U, H) of the states that occur, in every slot, and the row of each state (B,) int64 among them."""
+        states, row = torch.unique(state, return_inverse=True)
+        return self._read(states) @ self.slots_together.T, row
+
+    def add(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor, begin: bool) -> None:
+        """Add gradients up by known state and slot, (U, K * H), and by target."""
+        bag = self._table_row(history).flatten()
+        order = torch.argsort(bag)
+        occupied, count = torch.unique_consecutive(bag[order], return_counts=True)
+        sums = embedding_bag(order // self.history_length, grad_seen, count.cumsum(0) - count, mode="sum")
+        before = 0 if begin else len(self.by_state)
+        if before < self.known:
+            grown = torch.zeros(self.known, self.projected.shape[1], dtype=grad_seen.dtype, device=bag.device)
+            grown[:before] = self.by_state[:before]
+            self.by_state = grown
+        self.by_state.view(-1, self.width).index_add_(0, occupied, sums)
+        self.by_target = grad_wanted if begin else self.by_target + grad_wanted
+
+    def gradient(self, out: Tensor) -> None:
+        """Write the weight's gradient (K, H, F), of all that was added."""
+        torch.mm(self.by_state.T, self.rows[: len(self.by_state)], out=out.flatten(0, 1))
+        out.add_(self.by_target.T @ self.targets)
+
+    def _table_row(self, states: Tensor) -> Tensor:
+        """Row of `projected`, seen as (U * K, H), for states (B, K) in their slots; projects what is missing."""
+        row = self.row_of[states]
+        missing = states[row < 0].unique()
+        if len(missing):
+            if self.known + len(missing) > MOST_ROWS and not len(self.by_state):
+                self._forget()
+                missing = states.unique()
+            self._project(missing)
+            row = self.row_of[states]
+        return row * self.history_length + self.slot
+
+    def _project(self, states: Tensor) -> None:
+        """Make states (U,) known."""
+        first, last = self.known, self.known + len(states)
+        self.rows, self.projected = _with_room(self.rows, first, last), _with_room(self.projected, first, last)
+        self.rows[first:last] = self._read(states)
+        torch.mm(self.rows[first:last], self.weight.flatten(0, 1).T, out=self.projected[first:last])
+        self.row_of[states] = torch.arange(first, last, device=states.device)
+        self.known = last
+
+    def _forget(self) -> None:
+        self.row_of.fill_(-1)
+        self.known = 0
+        self.by_state = self.by_state[:0]
+
+    def _read(self, states: Tensor) -> Tensor:
+        """Features (U, F) of states (U,)."""
+        return self.features[states].to(self.weight.dtype)
+
+
+def _with_room(table: Tensor, used: int, rows: int) -> Tensor:
+    """The table, or a larger one with its first `used` rows, so that it has so many rows; doubled when it grows."""
+    if rows <= len(table):
+        return table
+    larger = table.new_empty(max(rows, 2 * len(table)), table.shape[1])
+    larger[:used] = table[:used]
+    return larger
