@@ -96,9 +96,10 @@ class SiameseActorCritic(nn.Module):
         return relu(linear(seen, self.fusion_weight[0]) + linear(wanted, self.fusion_weight[1]) + self.fusion_bias)
 
     def head(self, fused: Tensor, scene: int) -> Tensor:
-        """Action scores and value (B, A + 1) by one scene's own layers."""
-        special = relu(linear(fused, self.scene_weight[scene], self.scene_bias[scene]))
-        return linear(special, self.output_weight[scene], self.output_bias[scene])
+        """Action scores and value (B, A + 1) by one scene's own layers, or by the single head."""
+        own = scene if self.shape.head_count > 1 else 0
+        special = relu(linear(fused, self.scene_weight[own], self.scene_bias[own]))
+        return linear(special, self.output_weight[own], self.output_bias[own])
 
     def layer_gradients(self) -> list[Tensor]:
         """Gradients of the published network's tensors, as views; the siamese weight's comes first.
