@@ -1,14 +1,17 @@
-"""Files written whole or not at all, and the user's cache folder."""
+"""Files written whole or not at all, JSON read with a limit, and the user's cache folder."""
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 CACHE_VARIABLE = "CLEARWAY_CACHE"
+MAX_JSON_BYTES = 64 * 1024**2
 
 
 @contextmanager
@@ -35,6 +38,26 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def read_json(path: Path, most_bytes: int = MAX_JSON_BYTES) -> Any:
+    """What a JSON file in UTF-8 holds.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is larger than `most_bytes`, or not JSON.
+    """
+    if path.stat().st_size > most_bytes:
+        raise ValueError(f"it is larger than {most_bytes >> 20} MiB")
+    return parse_json(path.read_text(encoding="utf-8"))
+
+
+def parse_json(text: str) -> Any:
+    """What a text of JSON says. Raises ValueError where it says nothing, or is nested too deep."""
+    try:
+        return json.loads(text)
+    except RecursionError as fault:
+        raise ValueError("it is nested too deep") from fault
 
 
 def cache_dir() -> Path:
