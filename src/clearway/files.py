@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+import platform
+import re
 import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 CACHE_VARIABLE = "CLEARWAY_CACHE"
+PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
 MAX_JSON_BYTES = 64 * 1024**2
 
 
@@ -18,10 +22,12 @@ MAX_JSON_BYTES = 64 * 1024**2
 def written_whole(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; renamed to `path` on success, removed on any failure.
 
-    The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one.
+    The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one. What
+    processes that were killed left unfinished in the folder is removed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    _remove_leftovers(path.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=path.parent)
     os.close(handle)
     part = Path(name)
     try:
@@ -32,6 +38,30 @@ def written_whole(path: Path) -> Iterator[Path]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of processes of this machine that are no more; others may still be written to."""
+    for part in folder.glob(".*.part"):
+        maker = PART_NAME.fullmatch(part.name)
+        if maker and maker["host"] == _host() and not _is_alive(int(maker["process"])):
+            part.unlink(missing_ok=True)
+
+
+def _host() -> str:
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # elsewhere the question could end it
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _umask() -> int:
