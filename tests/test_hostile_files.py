@@ -1,8 +1,12 @@
 """Every hostile file is refused in one good line, or read without harm: `hostile` is the corpus and what reads it."""
 
+import sys
+
 import pytest
 
 from hostile.summary import results, table
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="a process's peak of memory is told by /proc")
 
 
 def summed_up(flips: int) -> str:
