@@ -6,7 +6,14 @@ from pathlib import Path
 
 
 class ClearwayError(Exception):
-    """Bad input or a missing requirement. The message says what, where and the remedy, in one line."""
+    """Bad input or a missing requirement. The message says what, where and the remedy, in one line.
+
+    Names out of a file may stand in it: what is no printable character is shown by its code, so that a file can neither
+    break the line nor speak to the terminal.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__("".join(c if c.isprintable() else repr(c)[1:-1] for c in message))
 
 
 class SceneError(ClearwayError):

@@ -1,24 +1,33 @@
-"""Files written whole or not at all, and the user's cache folder."""
+"""Files written whole or not at all, JSON read with a limit, and the user's cache folder."""
 
 from __future__ import annotations
 
+import json
 import os
+import platform
+import re
 import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 CACHE_VARIABLE = "CLEARWAY_CACHE"
+PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
+MAX_JSON_BYTES = 64 * 1024**2
 
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; renamed to `path` on success, removed on any failure.
 
-    The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one.
+    The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one. What
+    processes that were killed left unfinished in the folder is removed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    _remove_leftovers(path.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=path.parent)
     os.close(handle)
     part = Path(name)
     try:
@@ -31,10 +40,54 @@ def written_whole(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of processes of this machine that are no more; others may still be written to."""
+    for part in folder.glob(".*.part"):
+        maker = PART_NAME.fullmatch(part.name)
+        if maker and maker["host"] == _host() and not _is_alive(int(maker["process"])):
+            part.unlink(missing_ok=True)
+
+
+def _host() -> str:
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # elsewhere the question could end it
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
 def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def read_json(path: Path, most_bytes: int = MAX_JSON_BYTES) -> Any:
+    """What a JSON file in UTF-8 holds.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is larger than `most_bytes`, or not JSON.
+    """
+    if path.stat().st_size > most_bytes:
+        raise ValueError(f"it is larger than {most_bytes >> 20} MiB")
+    return parse_json(path.read_text(encoding="utf-8"))
+
+
+def parse_json(text: str) -> Any:
+    """What a text of JSON says. Raises ValueError where it says nothing, or is nested too deep."""
+    try:
+        return json.loads(text)
+    except RecursionError as fault:
+        raise ValueError("it is nested too deep") from fault
 
 
 def cache_dir() -> Path:

@@ -125,8 +125,14 @@ def test_ray_s_registry_gets_what_makes_the_environment(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "ray.tune.registry", registry)
     monkeypatch.setitem(sys.modules, "ray.tune", ModuleType("ray.tune"))
     name = register_rllib()
-    env = registered[name]({"scenes": corridor_scene(4), "reward": "shortest", "targets": {"corridor": [8]}})
-    assert env.reset(seed=0)[1]["target"] == 8
+    scene = corridor_scene(4)
+    env = registered[name]({"scenes": scene, "reward": "shortest", "targets": {"corridor": [8]}})
+    seen, info = env.reset(seed=0)
+    assert info["target"] == 8
+    assert env.observation_space.contains(seen)
+    np.testing.assert_array_equal(seen, np.concatenate([*[scene.features[info["state"]]] * 4, scene.features[8]]))
+    pictures = registered[name]({"scenes": scene, "observations": "pictures"})
+    assert pictures.observation_space["observation"].shape == (4, 12, 16, 3)
 
 
 def test_without_rllib_its_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

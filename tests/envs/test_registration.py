@@ -1,5 +1,8 @@
+import pickle
+
 import gymnasium
 import numpy as np
+import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import TimeLimit
 
@@ -78,6 +81,52 @@ def test_make_vec_sync_lives_the_same_episodes() -> None:
         assert np.array_equal(left[2] | left[3], right[2] | right[3])  # TimeLimit truncates terminated episodes too
         assert np.array_equal(left[0]["observation"], right[0]["observation"])
         assert np.array_equal(left[4]["state"], right[4]["state"])
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode), ids=lambda mode: mode.value)
+@pytest.mark.parametrize("vectorization", ["vector_entry_point", "sync"])
+def test_make_vec_in_every_autoreset_mode(mode: AutoresetMode, vectorization: str) -> None:
+    ours = vectorization == "vector_entry_point"
+    modes = {"autoreset_mode": mode} if ours else {"vector_kwargs": {"autoreset_mode": mode}}
+    arguments = {"num_envs": 2, "vectorization_mode": vectorization, "scenes": corridor_scene(5)}
+    envs = gymnasium.make_vec(ENV_ID, targets={"corridor": [16]}, **arguments, **modes)
+    assert envs.metadata["autoreset_mode"] is mode
+    envs.reset(seed=0, options={"start": 12})
+    _, reward, terminated, _, info = envs.step(np.array([0, 3]))
+    assert reward.tolist() == [10.0, -0.01] and terminated.tolist() == [True, False]
+    assert ("final_info" in info) == (mode is AutoresetMode.SAME_STEP)
+    if mode is AutoresetMode.DISABLED:
+        _, info = envs.reset(options={"reset_mask": terminated})
+    if mode is AutoresetMode.NEXT_STEP:
+        *_, info = envs.step(np.array([0, 0]))
+    assert info["state"][0] != 16  # a new episode has begun
+    envs.close()
+
+
+def test_make_vec_in_processes_lives_the_same_episodes() -> None:
+    arguments = {"num_envs": 2, "scenes": grid_scene(0), "max_episode_steps": 9}
+    native = gymnasium.make_vec(ENV_ID, **arguments)
+    context = {"context": "forkserver"}
+    apart = gymnasium.make_vec(ENV_ID, vectorization_mode="async", vector_kwargs=context, **arguments)
+    try:
+        native.reset(seed=0)
+        apart.reset(seed=0)
+        for action in np.random.default_rng(0).integers(4, size=(20, 2)):
+            left, right = native.step(action), apart.step(action)
+            assert np.array_equal(left[0]["observation"], right[0]["observation"])
+            assert np.array_equal(left[4]["cost"], right[4]["cost"])
+    finally:
+        apart.close()
+
+
+def test_what_make_gives_goes_on_after_pickling() -> None:
+    env = gymnasium.make(ENV_ID, scenes=grid_scene(0))
+    env.reset(seed=0)
+    copy = pickle.loads(pickle.dumps(env))
+    for action in (0, 1, 0, 2, 3):
+        left, right = env.step(action), copy.step(action)
+        assert left[1:] == right[1:]
+        assert left[4]["cost"] == float(left[4]["collision"])
 
 
 def test_importing_the_environments_is_light() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import random
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from clearway.scenes import library
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.library import cached_plan_scene, cached_room_scene, plan_path, scene_path
 from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene
 from made import grid_scene
 
 SLOW_BUILDER = """
@@ -108,11 +110,11 @@ def test_another_room_seed_version_or_source_is_another_scene(cache, monkeypatch
     assert build.built == 2
 
 
-def test_two_processes_that_ask_for_one_scene_build_it_once(cache, tmp_path):
+def test_three_processes_that_ask_for_one_scene_build_it_once(cache, tmp_path):
     log = tmp_path / "log"
-    builders = [start_builder(log, "built", seconds=1.0) for _ in range(2)]
+    builders = [start_builder(log, "built", seconds=1.0) for _ in range(3)]
     answers = [builder.communicate(timeout=60)[0].strip() for builder in builders]
-    assert answers == [str(grid_scene(7).state_count)] * 2
+    assert answers == [str(grid_scene(7).state_count)] * 3
     assert log.read_text().split().count("built") == 1
 
 
@@ -131,13 +133,27 @@ def test_a_killed_builder_leaves_no_scene_and_blocks_nobody(cache, tmp_path, kil
     assert files_in(cache) == [scene_path("kitchen", 7).name]
 
 
-def test_half_written_files_of_killed_builders_are_removed(cache):
-    path = scene_path("kitchen", 7)
-    cache.mkdir()
-    (cache / f".{path.name}.abc.part").write_bytes(b"half")
-    (cache / ".other.h5.abc.part").write_bytes(b"of another scene")
+@pytest.mark.parametrize("kills", [3, pytest.param(20, marks=pytest.mark.slow)])
+def test_builders_killed_at_random_moments_leave_nothing_and_the_next_builds(cache, tmp_path, kills):
+    log, moments, whole = tmp_path / "log", random.Random(kills), scene_path("kitchen", 7)
+    for _ in range(kills):
+        whole.unlink(missing_ok=True)
+        log.unlink(missing_ok=True)
+        builders = [start_builder(log, "none", seconds=0) for _ in range(2)]
+        deadline = time.monotonic() + 60
+        while not (log.exists() and "built" in log.read_text()):
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+        time.sleep(moments.uniform(0, 0.06))
+        for builder in builders:
+            builder.kill()
+            builder.communicate()
+        if whole.exists():
+            assert read_scene(whole).observations[:].shape == grid_scene(7).observations.shape
+        assert cached_room_scene("kitchen", 7, build=CountingBuilder()).state_count == grid_scene(7).state_count
+    whole.unlink()
     cached_room_scene("kitchen", 7, build=CountingBuilder())
-    assert files_in(cache) == [".other.h5.abc.part", path.name]
+    assert files_in(cache) == [whole.name]
 
 
 def test_a_damaged_file_is_built_again(cache):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
+from gymnasium.wrappers import FlattenObservation
 
 from clearway.envs.registration import ENV_ID, register_environments
 from clearway.errors import EnvError
@@ -15,7 +16,8 @@ def register_rllib() -> str:
     """Register the environment with Ray and give back its name.
 
     Use it as `AlgorithmConfig.environment(name, env_config={...})`; what stands in `env_config` goes to
-    `gymnasium.make`: scenes, targets, reward, observations, ...
+    `gymnasium.make`: scenes, targets, reward, observations, ... Features come as one vector, since RLlib's own models
+    read no others: the history's, (K * F,), then the target's, (F,). Pictures come as they are.
 
     Raises:
         EnvError: RLlib is not installed.
@@ -32,4 +34,5 @@ def register_rllib() -> str:
 def made(config: Mapping[str, Any]) -> gymnasium.Env:
     """One environment; RLlib makes it in each of its workers."""
     register_environments()
-    return gymnasium.make(ENV_ID, **config)
+    env = gymnasium.make(ENV_ID, **config)
+    return env if config.get("observations") == "pictures" else FlattenObservation(env)

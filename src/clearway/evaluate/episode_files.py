@@ -12,7 +12,7 @@ import numpy as np
 
 from clearway.errors import RunError
 from clearway.evaluate.episodes import EpisodeTable
-from clearway.files import written_whole
+from clearway.files import read_json, written_whole
 
 FORMAT_VERSION = 1
 _FLAGS = ("reached", "looped")
@@ -34,12 +34,12 @@ def read_episodes(path: Path) -> tuple[EpisodeTable, dict[str, Any]]:
         RunError: the file is missing, damaged or of a newer version.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         if int(content["format_version"]) > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway. Upgrade clearway")
         columns = {name: np.array(content["episodes"][name], np.int64) for name in _COLUMNS}
         about = dict(content["about"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise RunError(f"{path}: not readable ({error}). Remove it, and it is made again") from error
     for name in _FLAGS:
         columns[name] = columns[name].astype(bool)

@@ -26,6 +26,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from clearway.errors import RunError
+from clearway.files import read_json
 
 FORMAT_VERSION = 1
 NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE = "network.safetensors", "training.safetensors", "checkpoint.json"
@@ -101,19 +102,28 @@ def newest_checkpoint(folder: Path) -> Path:
 def read_progress(path: Path) -> Progress:
     """How far training had come when the checkpoint was written."""
     manifest = _checked_manifest(path)
-    return Progress(int(manifest["frames"]), int(manifest["updates"]), float(manifest["seconds"]))
+    try:
+        return Progress(int(manifest["frames"]), int(manifest["updates"]), float(manifest["seconds"]))
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
+        raise _Damaged(f"{path / MANIFEST_FILE}: lacks a number ({error}). Use another checkpoint") from error
 
 
 def read_network(path: Path) -> dict[str, Tensor]:
     """The tensors of `network.safetensors`, checked against the manifest."""
-    _checked_manifest(path)
-    return load_file(path / NETWORK_FILE)
+    return _read_tensors(path, NETWORK_FILE)
 
 
 def read_training(path: Path) -> dict[str, Tensor]:
     """The tensors of `training.safetensors`, checked against the manifest."""
+    return _read_tensors(path, TRAINING_FILE)
+
+
+def _read_tensors(path: Path, name: str) -> dict[str, Tensor]:
     _checked_manifest(path)
-    return load_file(path / TRAINING_FILE)
+    try:
+        return load_file(path / name)
+    except (OSError, SafetensorError) as error:
+        raise _Damaged(f"{path / name}: cannot be read ({error}). Use another checkpoint") from error
 
 
 def _found(folder: Path) -> list[Path]:
@@ -123,13 +133,13 @@ def _found(folder: Path) -> list[Path]:
 
 def _checked_manifest(path: Path) -> dict:
     try:
-        manifest = json.loads((path / MANIFEST_FILE).read_text())
+        manifest = read_json(path / MANIFEST_FILE)
         version = int(manifest["format_version"])
         if version > FORMAT_VERSION:  # it may hold other files, so this comes before looking for ours
             raise RunError(f"{path}: written by a newer clearway (format {version}). Upgrade clearway")
         sums = dict(manifest["sha256"])
         actual = {name: _sha256(path / name) for name in (NETWORK_FILE, TRAINING_FILE)}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise _Damaged(f"{path}: the checkpoint is incomplete ({error}). Use another one") from error
     for name, digest in actual.items():
         if sums.get(name) != digest:

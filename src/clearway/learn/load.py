@@ -52,16 +52,29 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     record = run.read_record()
     path = checkpoint or newest_checkpoint(run.checkpoints)
     tensors = read_network(path)
+    broken = [name for name, tensor in tensors.items() if not tensor.isfinite().all()]
+    if broken:
+        raise RunError(f"{path}: its {broken[0]} holds NaN or Inf. Use another checkpoint")
     try:
         feature_map = FeatureMap.from_tensors(_part(tensors, "features."))
-        learner = record.learner
-        heads = learner.head_count(len(record.scenes))
-        shape = NetworkShape(heads, feature_map.input_count, learner.width, learner.history_length)
-        network = SiameseActorCritic(shape)
-        network.load_state_dict(_part(tensors, "network."))
-    except (KeyError, RuntimeError) as error:
-        raise RunError(f"{path}: does not fit its run ({error}). Use another checkpoint") from error
+        network = _network(record, feature_map.input_count, _part(tensors, "network."))
+    except (LookupError, RuntimeError, ValueError) as error:
+        reason = " ".join(str(error).split())[:300]
+        raise RunError(f"{path}: does not fit its run ({reason}). Use another checkpoint") from error
     return Agent(record, network, feature_map)
+
+
+def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tensor]) -> SiameseActorCritic:
+    """The network of a run with these parameters; made only once its sizes are known to be theirs."""
+    learner = record.learner
+    wanted = (learner.history_length, learner.width, input_count)
+    found = tuple(parameters["siamese_weight"].shape)
+    if found != wanted:
+        raise RuntimeError(f"siamese_weight has shape {found}, expected {wanted}")
+    heads = learner.head_count(len(record.scenes))
+    network = SiameseActorCritic(NetworkShape(heads, input_count, learner.width, learner.history_length))
+    network.load_state_dict(parameters)
+    return network
 
 
 def _part(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

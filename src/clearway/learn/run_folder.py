@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import platform
 import sys
@@ -18,13 +19,14 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
-from clearway.files import written_whole
+from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.config import ADDED_LATER, Learner
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
@@ -208,20 +210,21 @@ class RunFolder:
         """
         path = self.path / RUN_FILE
         try:
-            content = json.loads(path.read_text())
+            content = read_json(path)
             found = int(content["format_version"])
         except FileNotFoundError as error:
             raise RunError(
                 f"{self.path}: no run here ({RUN_FILE} is missing). Name a folder that clearway train made"
             ) from error
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
             raise RunError(f"{path}: not readable ({error}). Restore it or train again") from error
         if found > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
             return _record_from(content)
-        except (KeyError, TypeError) as error:
-            raise RunError(f"{path}: a setting is missing or unknown ({error}). Restore it or train again") from error
+        except (KeyError, TypeError, AttributeError, RunError) as error:
+            reason = str(error).rstrip(".")[:300]
+            raise RunError(f"{path}: a setting is missing or unknown ({reason}). Restore it or train again") from error
 
     def metrics(self) -> list[dict[str, float]]:
         """All rows of metrics.jsonl; a last line that was cut off is left out.
@@ -235,10 +238,14 @@ class RunFolder:
         return [self._row(number, line) for number, line in enumerate(lines, 1) if line.endswith("\n")]
 
     def _row(self, number: int, line: str) -> dict[str, float]:
+        where = f"{self.metrics_path}, line {number}"
         try:
-            return json.loads(line)
+            row = parse_json(line)
         except ValueError as error:
-            raise RunError(f"{self.metrics_path}, line {number}: not JSON ({error}). Remove the line") from error
+            raise RunError(f"{where}: not JSON ({error}). Remove the line") from error
+        if not isinstance(row, dict) or not isinstance(row.get("frames"), int):
+            raise RunError(f"{where}: no row of figures with its frames. Remove the line")
+        return row
 
     def forget_metrics_after(self, frames: int) -> None:
         """Drop rows that training will write again when it resumes from a checkpoint at `frames`."""
@@ -250,12 +257,14 @@ class RunFolder:
 
 
 def _record_from(content: Mapping[str, Any]) -> RunRecord:
+    if not _fits(content["seed"], int) or not _fits(content["zone_level"], ZoneLevel):
+        raise TypeError(f"seed {content['seed']!r:.40}, zone_level {content['zone_level']!r:.40}")
     return RunRecord(
         learner=_settings(Learner, {**ADDED_LATER, **content["learner"]}),
         reward=_settings(Reward, content["reward"]),
         seed=content["seed"],
         zone_level=content["zone_level"],
-        scenes=tuple(SceneRecord(**{**s, "targets": tuple(s["targets"])}) for s in content["scenes"]),
+        scenes=tuple(_scene_record(scene) for scene in content["scenes"]),
         versions=content["versions"],
         hardware=content["hardware"],
         command=tuple(content["command"]),
@@ -267,4 +276,26 @@ def _settings(kind: type[Settings], content: Mapping[str, Any]) -> Settings:
     expected = {field.name for field in fields(kind)}
     if set(content) != expected:
         raise KeyError(", ".join(sorted(set(content) ^ expected)))
+    for name, wanted in get_type_hints(kind).items():
+        if not _fits(content[name], wanted):
+            raise TypeError(f"{name} is {content[name]!r:.40}")
     return kind(**content)
+
+
+def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
+    scene = SceneRecord(**{**content, "targets": tuple(content["targets"])})
+    texts = (scene.name, scene.digest, scene.encoder, scene.path or "")
+    if not all(_fits(text, str) for text in texts) or not all(_fits(target, int) for target in scene.targets):
+        raise TypeError(f"scene {scene.name!r:.40}")
+    return scene
+
+
+def _fits(value: object, wanted: Any) -> bool:
+    """Whether a JSON value is of a setting's type: bool, int, str, float (any finite number), a choice or a union."""
+    if get_origin(wanted) is Literal:
+        return value in get_args(wanted)
+    if get_origin(wanted) is UnionType:
+        return any(_fits(value, one) for one in get_args(wanted))
+    if wanted is float:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, wanted) and (wanted is bool or not isinstance(value, bool))

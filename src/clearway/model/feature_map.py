@@ -75,8 +75,13 @@ class FeatureMap:
 
     @classmethod
     def from_tensors(cls, tensors: Mapping[str, Tensor]) -> FeatureMap:
-        """The map that `tensors` was called of."""
-        return cls(tensors["mean"], tensors["factor"], tensors.get("basis"))
+        """The map that `tensors` was called of. Raises KeyError or ValueError where they are none's."""
+        mean, factor, basis = tensors["mean"], tensors["factor"], tensors.get("basis")
+        parts = (mean, factor) if basis is None else (mean, factor, basis)
+        fits = mean.ndim == 1 and factor.ndim == 0 and (basis is None or (basis.ndim == 2 and len(basis) == len(mean)))
+        if not fits or any(part.dtype != torch.float32 for part in parts):
+            raise ValueError(f"no map: {', '.join(f'{part.dtype} of shape {tuple(part.shape)}' for part in parts)}")
+        return cls(mean, factor, basis)
 
 
 def prepared_features(world: World, feature_map: FeatureMap) -> Tensor:

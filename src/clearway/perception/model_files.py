@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from clearway.errors import EncoderError
+from clearway.files import read_json
 from clearway.perception.preprocess import Preprocessing, preprocessing_from_json
 
 PROBE_TIMEOUT_S = 3.0  # for the one small request that decides whether the hub can be reached
@@ -98,8 +98,8 @@ def read_preprocessing(folder: Path, model: str) -> Preprocessing:
 
 def _read_json(path: Path, model: str) -> dict[str, object]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as fault:
+        content = read_json(path)
+    except (OSError, ValueError) as fault:
         raise EncoderError(f"encoder '{model}': {path} cannot be read ({fault}). Get the model again") from fault
     if not isinstance(content, dict):
         raise EncoderError(f"encoder '{model}': {path} is not a JSON object. Get the model again")

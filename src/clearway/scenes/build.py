@@ -73,7 +73,7 @@ def build_floor_plan(plan: FloorPlan, seed: int = 0, *, workers: int | None = No
         SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
         RenderError: MuJoCo cannot render on this machine.
     """
-    _check_mujoco()
+    check_mujoco()
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.plans.plan_room import build_plan_room
     from clearway.scenes.rooms.render import render

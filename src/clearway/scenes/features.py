@@ -63,14 +63,11 @@ def find_features(file: h5py.File, path: Path, count: int) -> h5py.Dataset | Non
     if 0 in dataset.shape or dataset.shape[-1] > MAX_FEATURES:
         problem = f"has shape {dataset.shape}, expected 1 to {MAX_FEATURES} features"
         raise SceneError(path, problem, hdf5.MAKE_AGAIN, DATASET)
-    if count * dataset.shape[-1] * dataset.dtype.itemsize > hdf5.MAX_ARRAY_BYTES:
-        problem = f"would take more than {hdf5.MAX_ARRAY_BYTES >> 30} GiB of memory"
-        raise SceneError(path, problem, "Give a smaller scene", DATASET)
     return dataset
 
 
 def read_features(dataset: h5py.Dataset, path: Path) -> np.ndarray:
     """Features (S, F) float32, index 0 of the second axis where there are three. Raises SceneError for damage."""
-    values = hdf5.read_values(dataset, path, () if len(dataset.shape) == 2 else np.s_[:, 0])
+    values = hdf5.read_values(dataset, path, ... if len(dataset.shape) == 2 else np.s_[:, 0])
     with np.errstate(over="ignore"):  # a float64 beyond float32 becomes Inf, which `check_features` names
         return np.ascontiguousarray(values, dtype=np.float32)

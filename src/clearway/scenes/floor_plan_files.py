@@ -10,7 +10,10 @@ smallest x; the last line is z = 0, the first column x = 0.
 
 from __future__ import annotations
 
+import io
+import math
 import re
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -28,6 +31,7 @@ MAX_BYTES = 8 * 1024**2  # of a text file, or of an unpacked array
 PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")  # of a plan, which becomes the name of a file
 WHOLE_NUMBER = re.compile(r"-?[0-9]{1,9}")
 NPY = ".npy"
+PACKING = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what `zipfile` unpacks piece by piece
 _FAULTS = (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, MemoryError, ArithmeticError)
 
 
@@ -96,7 +100,7 @@ def _faults_named(path: Path, dataset: str = "") -> Iterator[None]:
     """Turn whatever reading raises within into one `SceneError`."""
     try:
         yield
-    except (*_FAULTS, zipfile.BadZipFile, zlib.error) as fault:
+    except (*_FAULTS, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error) as fault:
         reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         remedy = "Make the file again or get another copy"
         raise SceneError(path, f"cannot be read ({reason})", remedy, dataset) from fault
@@ -108,8 +112,23 @@ def _read_array(path: Path, name: str) -> np.ndarray:
         member = archive.getinfo(name + NPY)
         if member.file_size > MAX_BYTES:
             raise ValueError(f"it would unpack to more than {MAX_BYTES >> 20} MiB")
-        with archive.open(member) as file:
-            return np.lib.format.read_array(file, allow_pickle=False)
+        if member.compress_type not in PACKING:
+            raise ValueError(f"it is packed by method {member.compress_type}, expected deflate")
+        content = io.BytesIO(archive.read(member))
+    with _faults_named(path, name):
+        _check_length(content)
+        return np.lib.format.read_array(content, allow_pickle=False)
+
+
+def _check_length(content: io.BytesIO) -> None:
+    """Check that an array's header claims no more than what follows it, and leave the reader at the start."""
+    version = np.lib.format.read_magic(content)
+    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read_header(content)
+    claimed, held = math.prod(shape) * dtype.itemsize, len(content.getvalue()) - content.tell()
+    if not dtype.hasobject and not 0 <= claimed <= held:
+        raise ValueError(f"it claims {claimed:,} bytes and holds {held:,}")
+    content.seek(0)
 
 
 def _read_text(path: Path) -> list[str]:

@@ -6,22 +6,28 @@ of the file, read no size before it is checked against a limit, and turn the lib
 
 from __future__ import annotations
 
-import json
 import math
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import EllipsisType
 
 import h5py
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.files import parse_json
+from clearway.scenes.limits import COPIES, MOST_BYTES, array_limit
+from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
-MAX_ARRAY_BYTES = 2 * 1024**3  # the largest array that is read into memory at once
-MAX_CHUNK_BYTES = 256 * 1024**2  # what the library unpacks to reach one element
+MAX_ARRAY_BYTES = MOST_BYTES // COPIES  # of the largest array, in the largest file
 MAX_JSON_BYTES = 4 * 1024**2
 MAX_GROUP_ARRAYS = 1000
 MAKE_AGAIN = "Make the file again or get another copy"
+
+Selection = int | slice | EllipsisType | np.ndarray | tuple[int | slice, ...]
+"""Of a dataset's values, as NumPy selects."""
 
 _FAULTS = (
     OSError,
@@ -32,6 +38,7 @@ _FAULTS = (
     AttributeError,
     ArithmeticError,
     MemoryError,
+    zlib.error,
 )
 
 
@@ -41,7 +48,7 @@ def faults_named(source: Path, dataset: str = "", problem: str = "cannot be read
     try:
         yield
     except _FAULTS as fault:
-        reason = " ".join(str(fault).split()) or type(fault).__name__
+        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         raise SceneError(source, f"{problem} ({reason})", MAKE_AGAIN, dataset) from fault
 
 
@@ -65,7 +72,7 @@ def find_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset | 
     """The dataset `name` of a file or group, or None where there is none.
 
     Raises:
-        SceneError: it is a link, not a dataset, or keeps its values in another file.
+        SceneError: it is a link, not a dataset, keeps its values in another file, or is packed in an unknown way.
     """
     with faults_named(source, name):
         link = parent.get(name, getlink=True)
@@ -76,9 +83,7 @@ def find_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset | 
         found = parent[name]
         if not isinstance(found, h5py.Dataset):
             raise SceneError(source, "is not a dataset", MAKE_AGAIN, name)
-        if found.is_virtual or found.external:
-            raise SceneError(source, "keeps its values in another file", "Copy the data into the file", name)
-        _check_chunks(found, source, name)
+        check_storage(found, source, name)
         return found
 
 
@@ -88,12 +93,6 @@ def need_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset:
     if found is None:
         raise SceneError(source, "is missing", "Give a complete scene file in the thor_v1 format", name)
     return found
-
-
-def _check_chunks(dataset: h5py.Dataset, source: Path, name: str) -> None:
-    if dataset.chunks and math.prod(dataset.chunks) * dataset.dtype.itemsize > MAX_CHUNK_BYTES:
-        problem = f"its chunks {dataset.chunks} hold more than {MAX_CHUNK_BYTES >> 20} MiB each"
-        raise SceneError(source, problem, "Store the file again with smaller chunks", name)
 
 
 def check_layout(
@@ -118,7 +117,7 @@ def check_layout(
         wanted = ", ".join("any" if length is None else str(length) for length in shape)
         raise SceneError(source, f"has shape {found}, expected ({wanted})", MAKE_AGAIN, name)
     if dtype.kind not in kinds or dtype.names or dtype.subdtype:
-        raise SceneError(source, f"holds {dtype}, expected numbers of kind '{kinds}'", MAKE_AGAIN, name)
+        raise SceneError(source, f"holds {str(dtype)[:80]}, expected numbers of kind '{kinds}'", MAKE_AGAIN, name)
     if limit is not None and math.prod(found) * dtype.itemsize > limit:
         problem = f"would take {math.prod(found) * dtype.itemsize:,} bytes, more than the limit of {limit:,}"
         raise SceneError(source, problem, "Give a smaller scene", name)
@@ -132,11 +131,33 @@ def _short_name(dataset: h5py.Dataset) -> str:
     return str(dataset.name or "").lstrip("/")
 
 
-def read_values(dataset: h5py.Dataset, source: Path, selection: object = ()) -> np.ndarray:
-    """The values of a dataset or of a part of it; a checksum that fails is a SceneError."""
-    with faults_named(source, _short_name(dataset), "is damaged"):
+def read_values(dataset: h5py.Dataset, source: Path, selection: Selection = ...) -> np.ndarray:
+    """The values of a dataset or of a part of it.
+
+    Raises:
+        SceneError: they are too many for a file of its size, were never written, or are damaged (a checksum fails).
+    """
+    name = _short_name(dataset)
+    with faults_named(source, name, "is damaged"):
+        rows, count = _selected(dataset.shape, selection)
+        size, limit = count * dataset.dtype.itemsize, array_limit(source)
+        if size > limit:
+            problem = f"would take {size:,} bytes, more than the limit of {limit:,} for a file of its size"
+            raise SceneError(source, problem, "Give a smaller scene", name)
+        check_written(dataset)
+        check_unpacking(dataset, rows)
         values = dataset[selection]
     return np.asarray(values)
+
+
+def _selected(shape: tuple[int, ...], selection: Selection) -> tuple[np.ndarray, int]:
+    """The indices along the first axis that a selection has, (R,), and how many values it has in all."""
+    if not shape:
+        return np.zeros(0, np.int64), 1
+    first, *others = selection if isinstance(selection, tuple) else (selection,)
+    rows = np.atleast_1d(np.arange(shape[0])[first])
+    kept = [np.arange(length)[part].size for length, part in zip(shape[1:], others, strict=False)]
+    return rows, len(rows) * math.prod(kept) * math.prod(shape[1 + len(kept) :])
 
 
 def read_attribute(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> str | int | float | None:
@@ -145,6 +166,8 @@ def read_attribute(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> 
         if name not in item.attrs:
             return None
         kept = item.attrs.get_id(name)
+        if kept.shape != () or kept.dtype.kind not in "iufbSO":
+            raise SceneError(source, f"attribute '{name}' is neither a number nor a text", MAKE_AGAIN)
         if kept.get_storage_size() > MAX_JSON_BYTES:
             raise SceneError(source, f"attribute '{name}' is too large", MAKE_AGAIN)
         value = item.attrs[name]
@@ -171,8 +194,8 @@ def read_record(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> dic
     if text is None:
         return None
     try:
-        record = json.loads(str(text))
-    except (ValueError, RecursionError) as fault:
+        record = parse_json(str(text))
+    except ValueError as fault:
         raise SceneError(source, f"attribute '{name}' is not JSON ({fault})", MAKE_AGAIN) from fault
     if not isinstance(record, dict):
         raise SceneError(source, f"attribute '{name}' is not a JSON object", MAKE_AGAIN)
@@ -189,7 +212,7 @@ def read_group_arrays(file: h5py.File, name: str, source: Path) -> dict[str, np.
         if not isinstance(group, h5py.Group) or len(group) > MAX_GROUP_ARRAYS:
             raise SceneError(source, f"is not a group of at most {MAX_GROUP_ARRAYS} arrays", MAKE_AGAIN, name)
         keys = [str(key) for key in group]
-    arrays, left = {}, MAX_ARRAY_BYTES
+    arrays, left = {}, array_limit(source)
     for key in keys:
         dataset = need_dataset(group, key, source)
         with faults_named(source, f"{name}/{key}"):
@@ -213,8 +236,13 @@ def write_array(
     chunks: tuple[int, ...] | bool = True,
     gzip_level: int = 4,
 ) -> h5py.Dataset:
-    """Store an array compressed and with a checksum (which HDF5 offers for neither scalars nor empty arrays)."""
+    """Store an array compressed and with a checksum.
+
+    HDF5 offers checksums for neither scalars nor empty arrays: they stand in the dataset's header, which has one.
+    """
     if values.size == 0 or values.ndim == 0:
-        return parent.create_dataset(name, data=values)
+        plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plan.set_layout(h5py.h5d.COMPACT)
+        return parent.create_dataset(name, data=values, dcpl=plan)
     packing = {"compression": "gzip", "compression_opts": gzip_level, "fletcher32": True}
     return parent.create_dataset(name, data=values, chunks=chunks, shuffle=values.itemsize > 1, **packing)

@@ -95,7 +95,6 @@ def _cached(path: Path, title: str, make: Callable[[], Scene]) -> Scene:
         scene = _readable_scene(path, title)
         if scene is not None:
             return scene
-        _remove_leftovers(path)
         write_scene(make(), path)
     return read_scene(path, name=title)
 
@@ -121,9 +120,3 @@ def _readable_scene(path: Path, title: str) -> Scene | None:
         return read_scene(path, name=title)
     except SceneError:
         return None
-
-
-def _remove_leftovers(path: Path) -> None:
-    """Remove the unfinished files of builders that were killed. Only for the holder of the lock of `path`."""
-    for part in path.parent.glob(f".{path.name}.*.part"):
-        part.unlink(missing_ok=True)

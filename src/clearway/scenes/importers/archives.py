@@ -16,7 +16,8 @@ from clearway.errors import SceneError
 ZIP_SUFFIX = ".zip"
 MAX_MEMBERS = 10_000
 MAX_BYTES = 64 * 1024**3  # of all scene files of an archive together, unpacked
-MAX_RATIO = 200  # unpacked bytes for each packed one, beyond the first MiB
+MAX_RATIO = 200  # unpacked bytes for each packed one, of a file and of all together, beyond the first MiB
+PACKING = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what `zipfile` unpacks piece by piece
 BLOCK_BYTES = 1024**2
 GET_ANOTHER = "Get another copy, or unpack it yourself and give the files"
 _FAULTS = (
@@ -39,7 +40,8 @@ def unpacked(paths: Sequence[Path], suffixes: Sequence[str]) -> Iterator[list[Pa
     Unpacked files are gone afterwards. Folders in an archive do not matter.
 
     Raises:
-        SceneError: an archive is damaged, too large, holds no such file, two of one name, or one that is unsafe.
+        SceneError: an archive is damaged, too large, holds no such file, two of one name, or one that is unsafe. One
+            about an unpacked file, raised within, names the archive in place of where it was unpacked.
     """
     with tempfile.TemporaryDirectory(prefix="clearway-") as folder:
         found: list[Path] = []
@@ -48,7 +50,14 @@ def unpacked(paths: Sequence[Path], suffixes: Sequence[str]) -> Iterator[list[Pa
                 found += _unpack(path, Path(folder) / str(number), tuple(suffixes))
             else:
                 found.append(path)
-        yield found
+        try:
+            yield found
+        except SceneError as fault:
+            unpacked_to = Path(fault.source)
+            if not unpacked_to.is_relative_to(folder):
+                raise
+            archive, name = unpacked_to.relative_to(folder).parts
+            raise SceneError(paths[int(archive)] / name, fault.problem, fault.remedy, fault.dataset) from fault
 
 
 def _unpack(path: Path, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
@@ -56,7 +65,7 @@ def _unpack(path: Path, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = _wanted(path, archive, suffixes)
-            left = MAX_BYTES
+            left = min(MAX_BYTES, BLOCK_BYTES + MAX_RATIO * path.stat().st_size)  # members may share their bytes
             for member in members:
                 left -= _copy(path, archive, member, folder / PurePosixPath(member.filename).name, left)
     except _FAULTS as fault:
@@ -79,6 +88,9 @@ def _wanted(path: Path, archive: zipfile.ZipFile, suffixes: tuple[str, ...]) -> 
             raise SceneError(path, f"holds the link {member.filename[:80]!r}", GET_ANOTHER)
         if member.is_dir() or name.suffix.lower() not in suffixes:
             continue
+        if member.compress_type not in PACKING:
+            problem = f"holds {member.filename[:80]!r}, packed by method {member.compress_type}"
+            raise SceneError(path, problem, "Pack it again with deflate, or unpack it yourself and give the files")
         if name.name in wanted:
             raise SceneError(path, f"holds two files named {name.name!r}", GET_ANOTHER)
         wanted[name.name] = member
@@ -91,7 +103,7 @@ def _copy(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, target:
     """Unpack a member and count its bytes, whatever the archive says about its size."""
     most = min(most, BLOCK_BYTES + MAX_RATIO * member.compress_size)
     written = 0
-    with archive.open(member) as packed, target.open("wb") as file:
+    with archive.open(member) as packed, target.open("xb") as file:
         while block := packed.read(BLOCK_BYTES):
             written += len(block)
             if written > most:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +13,27 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from clearway.errors import SceneError
+from clearway.scenes.limits import array_limit
 from clearway.scenes.pictures import file_stamp
 
 MAX_PICTURE_PIXELS = 80_000_000  # a photograph that unpacks to more is refused before it is unpacked
+PIXEL_BYTES = 4  # in memory
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
 HEIGHT_PX = 300
+_FAULTS = (  # what the readers of the formats raise
+    OSError,
+    EOFError,
+    SyntaxError,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    RuntimeError,
+    MemoryError,
+    struct.error,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True)
@@ -79,14 +97,18 @@ def _opened(path: Path) -> Image.Image:
     """The picture as it is meant to be seen, not unpacked where it would be too large."""
     try:
         with Image.open(path, formats=FORMATS) as picture:
-            if math.prod(picture.size) > MAX_PICTURE_PIXELS:
-                raise SceneError(path, f"has {picture.size[0]} x {picture.size[1]} pixels", "Scale it down")
-            return ImageOps.exif_transpose(picture).convert("RGB")
+            most = min(MAX_PICTURE_PIXELS, array_limit(path) // PIXEL_BYTES)
+            if math.prod(picture.size) > most:
+                problem = f"has {picture.size[0]} x {picture.size[1]} pixels, more than {most:,} for a file of its size"
+                raise SceneError(path, problem, "Scale it down")
+            upright = ImageOps.exif_transpose(picture)
+            return upright if upright.mode == "RGB" else upright.convert("RGB")
     except SceneError:
         raise
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as fault:
+    except (*_FAULTS, Image.DecompressionBombError) as fault:
         kinds = ", ".join(FORMATS)
-        raise SceneError(path, f"cannot be read as a picture ({fault})", f"Give one of {kinds}") from fault
+        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
+        raise SceneError(path, f"cannot be read as a picture ({reason})", f"Give one of {kinds}") from fault
 
 
 def _photograph(path: Path, height_px: int, width_px: int) -> np.ndarray:

@@ -25,9 +25,10 @@ from clearway.scenes import hdf5
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 from clearway.scenes.grid import HEADING_COUNT, HEADING_STEPS
 from clearway.scenes.importers.json_files import read_json
+from clearway.scenes.limits import array_limit
 from clearway.scenes.pictures import file_stamp
 from clearway.scenes.scene import EncoderRecord, Observations, Provenance, Scene
-from clearway.scenes.validate import MAX_FEATURES, MAX_STATES, check_scene
+from clearway.scenes.validate import MAX_COORDINATE_M, MAX_FEATURES, MAX_STATES, check_scene
 from clearway.version import __version__
 
 SOURCE = "savn"
@@ -130,6 +131,8 @@ def _pose(key: str, path: Path) -> Pose | None:
     """The pose of a key; None where the camera is not level or the heading no multiple of 90 degrees."""
     try:
         x, z, heading_deg, horizon_deg = (float(part) for part in key.split("|"))
+        if max(abs(x), abs(z)) > MAX_COORDINATE_M:
+            raise ValueError("too far away")
         column, row = round(x / GRID_M), round(z / GRID_M)
     except (ValueError, OverflowError) as fault:
         raise SceneError(path, f"holds the pose {key[:60]!r}, expected x|z|rotation|horizon", GET_WHOLE) from fault
@@ -182,7 +185,12 @@ def _features(path: Path, names: tuple[str, ...]) -> tuple[np.ndarray | None, En
     if not path.exists():
         return None, None
     with hdf5.opened(path) as file:
-        rows = [_feature(file, name, path) for name in names]
+        rows, left = [], array_limit(path)
+        for name in names:
+            rows.append(_feature(file, name, path))
+            left -= rows[-1].nbytes
+            if left < 0:
+                raise SceneError(path, "its features would take too much memory for its size", "Get another copy", name)
     if len({len(row) for row in rows}) > 1:
         raise SceneError(path, "holds features of different lengths", "Get another copy")
     count = len(rows[0])

@@ -1,0 +1,14 @@
+"""All hostile files, made on the spot, always the same in the same order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hostile import other_files, scene_files
+from hostile.cases import Case
+
+
+def cases(flips: int) -> Iterator[Case]:
+    """Every case; `flips` is the number of bits flipped in a scene file of ours, one a file."""
+    yield from scene_files.cases(flips)
+    yield from other_files.cases()

@@ -1,0 +1,79 @@
+"""Files written whole or not at all."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from clearway import files
+from clearway.files import written_whole
+
+WRITER = """
+import sys; sys.path[:] = {path!r}
+from pathlib import Path
+from clearway.files import written_whole
+with written_whole(Path({target!r})) as part:
+    part.write_text("half")
+    print("writing", flush=True)
+    sys.stdin.read()
+"""
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def writer(target: Path) -> subprocess.Popen[str]:
+    """A process in the midst of writing `target`."""
+    script = WRITER.format(path=sys.path, target=str(target))
+    process = subprocess.Popen([sys.executable, "-c", script], stdin=-1, stdout=-1, text=True)
+    assert process.stdout.readline() == "writing\n"
+    return process
+
+
+def test_what_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(KeyError), written_whole(path) as part:
+        part.write_text("new")
+        raise KeyError
+    assert path.read_text() == "old"
+    assert names(tmp_path) == ["a.txt"]
+
+
+def test_unfinished_files_of_killed_processes_go_and_those_of_living_ones_stay(tmp_path: Path) -> None:
+    killed, living = writer(tmp_path / "a.txt"), writer(tmp_path / "b.txt")
+    assert len(names(tmp_path)) == 2
+    killed.kill()
+    killed.communicate()
+    with written_whole(tmp_path / "c.txt") as part:
+        part.write_text("whole")
+    assert [name[:6] for name in names(tmp_path)] == [".b.txt", "c.txt"]
+    living.communicate("")
+    assert names(tmp_path) == ["b.txt", "c.txt"]
+    assert (tmp_path / "b.txt").read_text() == "half"  # all that it had to write
+
+
+def test_files_of_other_machines_and_programs_stay(tmp_path: Path) -> None:
+    for name in (f".a.h5.00000000-{2**22 + 1}-x.part", f".a.h5.{files._host()}-{os.getpid()}-x.part", ".a.part"):
+        (tmp_path / name).touch()
+    before = names(tmp_path)
+    with written_whole(tmp_path / "c.txt") as part:
+        part.touch()
+    assert names(tmp_path) == [*before, "c.txt"]
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "\ufeff{}"])
+def test_what_is_no_json_is_a_value_error(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError):
+        files.read_json(tmp_path / "a.json")
+
+
+def test_json_too_large_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text("[1, 2]")
+    assert files.read_json(tmp_path / "a.json") == [1, 2]
+    with pytest.raises(ValueError, match="larger than"):
+        files.read_json(tmp_path / "a.json", most_bytes=5)
