@@ -19,6 +19,8 @@ ORDER = (
     {"evaluate"},
     {"experiments"},
     {"viz"},
+    {"web"},
+    {"view"},
     {"serve"},
     {"cli"},
     {"__main__"},
