@@ -33,7 +33,12 @@ try:
 except ImportError as error:
     raise ClearwayError("the viewer needs FastAPI. Install it: pip install 'clearway[view]'") from error
 
-PAGE = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf-8"}
+PAGE = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
 """Kinds of the page's files, by ending."""
 MOST_PAGES = 16  # open at a time
 FILM_FRAMES_PER_S = 3
@@ -125,7 +130,7 @@ def _parsed(text: str) -> object:
 def _stage_json(stage: Stage) -> dict[str, Any]:
     return {
         "agents": [
-            {"name": shown.name, "reward": shown.agent.record.reward.name, "encoder": _encoder(shown.scenes[0])}
+            {"name": shown.name, "reward": shown.reward.name, "encoder": _encoder(shown.scenes[0])}
             for shown in stage.agents
         ],
         "scenes": [scene.name for scene in stage.scenes],

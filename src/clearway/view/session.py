@@ -85,11 +85,12 @@ class Session:
         walkers = []
         for shown in self.stage.agents:
             own_world, index = agent_world(shown, scene.name, target)
-            record = shown.agent.record
-            mind = Mind(shown.agent.critic(own_world), episode.selection, record.learner.history_length)
+            learner = shown.agent.record.learner
+            critic = shown.agent.critic(own_world)
+            mind = Mind(critic, learner.reward_scale, episode.selection, learner.history_length)
             recorded = walks.get(shown.name, ())
             walkers.append(
-                Walker(own_world, index, start, record.reward, seed=episode.seed, mind=mind, recorded=recorded)
+                Walker(own_world, index, start, shown.reward, seed=episode.seed, mind=mind, recorded=recorded)
             )
         if episode.drive:
             walk = Walker(world, 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=walks.get(YOU, ()))
@@ -125,7 +126,7 @@ class Session:
     def _whole_episode(self) -> Message:
         episode = self.episode
         scene = self.stage.scenes[self.stage.index(str(episode.scene))]
-        rewards = [shown.agent.record.reward.name for shown in self.stage.agents] + [self.stage.reward.name]
+        rewards = [shown.reward.name for shown in self.stage.agents] + [self.stage.reward.name]
         return {
             "kind": "episode",
             "scene": self.stage.index(scene.name),

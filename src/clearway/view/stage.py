@@ -31,6 +31,12 @@ class StageAgent:
     agent: Agent
     scenes: tuple[Scene, ...]
 
+    @property
+    def reward(self) -> Reward:
+        """What it learnt from: with rewards clipped, if its learner clipped them, so that values and rewards compare."""
+        record = self.agent.record
+        return record.reward.with_changes(clip=record.reward.clip or record.learner.clip_rewards)
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -54,7 +60,7 @@ class Stage:
     @property
     def reward(self) -> Reward:
         """What a user who drives earns: as the first agent."""
-        return self.agents[0].agent.record.reward if self.agents else COLLISION_AWARE
+        return self.agents[0].reward if self.agents else COLLISION_AWARE
 
     def index(self, name: str) -> int:
         """Place of a scene in `scenes`.

@@ -24,11 +24,13 @@ class Mind:
 
     Attributes:
         critic: its probabilities and values.
+        reward_scale: what its learner multiplied rewards with; values are shown without it.
         selection: how it chooses by them.
         history_length: K, poses that it remembers.
     """
 
     critic: Critic
+    reward_scale: float
     selection: ActionSelection
     history_length: int
 
@@ -48,7 +50,7 @@ class Step:
         reached: this is the target.
         to_go: steps of a shortest path from here, -1 where there is none.
         probabilities: of the actions from here; None for the user and at the target.
-        value: what the agent expects from here; None for the user.
+        value: discounted sum of the rewards that the agent expects from here; None for the user.
         next: the action that the agent is about to take; None at the target and for the user.
     """
 
@@ -146,7 +148,8 @@ class Walker:
         assert self.mind is not None
         states = torch.arange(self.states_here) + self.offset
         history = states[:, None].expand(-1, self.mind.history_length)
-        return self.mind.critic(history, torch.full((len(states),), self.target))
+        probabilities, values = self.mind.critic(history, torch.full((len(states),), self.target))
+        return probabilities, values / self.mind.reward_scale
 
     @torch.no_grad()
     def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Step:
@@ -154,7 +157,7 @@ class Walker:
         probabilities = value = following = None
         if self.mind is not None:
             scores, values = self.mind.critic(self.env.history, self.env.target)
-            value = float(values)
+            value = float(values) / self.mind.reward_scale
             if not reached:
                 probabilities = tuple(scores[0].tolist())
                 following = self._choose(self.mind.selection, scores)
