@@ -24,7 +24,7 @@ def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progres
         SceneError: there is no such room, or the agent fits nowhere in it.
         RenderError: MuJoCo cannot render on this machine.
     """
-    _check_mujoco()
+    check_mujoco()
     from clearway.scenes.rooms import build_room
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.navigation import find_grid
@@ -63,7 +63,7 @@ def shaping_versions() -> dict[str, str]:
     return {"clearway": __version__, "mujoco": version("mujoco"), "numpy": version("numpy")}
 
 
-def _check_mujoco() -> None:
+def check_mujoco() -> None:
     """Import MuJoCo, which fails in many ways if `MUJOCO_GL` names a backend that is not there."""
     try:
         import_module("mujoco")

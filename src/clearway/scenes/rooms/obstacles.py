@@ -85,9 +85,8 @@ class Obstacles:
             ("moving along z", mujoco.mjtGeom.mjGEOM_BOX, (radius_m, step_m / 2, half_m)),
         ):
             spec.worldbody.add_geom(name=name, type=kind, size=size_m)
-        for geom in room.spec.geoms:
-            if geom.group == OBSTACLE_GROUP and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
-                _add_obstacle(spec, geom)
+        for geom in obstacle_geoms(room.spec):
+            copy_obstacle(spec, geom)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
@@ -131,8 +130,13 @@ class Obstacles:
         return gaps_m
 
 
-def _add_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Copy a collision geom into the agent's own model, which has no meshes and compiles in milliseconds."""
+def obstacle_geoms(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
+    """The collision geoms of a room, in the spec's order."""
+    return [g for g in spec.geoms if g.group == OBSTACLE_GROUP and g.type != mujoco.mjtGeom.mjGEOM_PLANE]
+
+
+def copy_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjsGeom:
+    """Copy a collision geom into another model, which has no meshes and compiles in milliseconds."""
     placed_plainly = (
         geom.parent.name == "world"
         and geom.frame is None
@@ -141,8 +145,9 @@ def _add_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     )
     assert placed_plainly, f"collision geom '{geom.name}' must hang on the world body by pos and quat"
     assert geom.type in OBSTACLE_SHAPES, f"collision geom '{geom.name}' must be one of {OBSTACLE_SHAPES}"
-    copy = spec.worldbody.add_geom(type=geom.type, pos=geom.pos, quat=geom.quat)
+    copy = spec.worldbody.add_geom(name=geom.name, type=geom.type, pos=geom.pos, quat=geom.quat, group=OBSTACLE_GROUP)
     copy.size[:] = geom.size
+    return copy
 
 
 def _bounding_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
