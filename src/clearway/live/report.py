@@ -46,7 +46,7 @@ METRICS: dict[str, tuple[Callable[[LiveTable], np.ndarray], Callable[[LiveTable]
     "share_within_30cm": (lambda table: table.near_s, _seconds),
     "rearranged": (lambda table: table.changed, _ones),
 }
-"""A target's value is the sum of the first over its episodes by the sum of the second; docs/metrics.md explains them."""
+"""A target's value is the sum of the first over its episodes by that of the second; docs/metrics.md explains each."""
 
 COMPARED = ("success", "contacts", "min_clearance_m", "mean_clearance_m", "share_within_10cm", "share_within_30cm")
 

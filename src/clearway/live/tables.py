@@ -91,7 +91,9 @@ def markdown_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encod
 
 def _markdown(headings: Sequence[str], rows: Rows) -> list[str]:
     lines = [_pipes(headings), _pipes(["---"] * len(headings))]
-    return lines + [_pipes([label, name, *(f"{value} ({ends})" for value, ends in cells)]) for label, name, cells in rows]
+    return lines + [
+        _pipes([label, name, *(f"{value} ({ends})" for value, ends in cells)]) for label, name, cells in rows
+    ]
 
 
 def _pipes(cells: Sequence[str]) -> str:
