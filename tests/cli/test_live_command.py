@@ -37,7 +37,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runs]:
             targets={scene.name: (8, 41)},
             paths={scene.name: path},
             reward=reward,
-            learner=small_learner(),
         )
         found[name] = train(request, folder / name).path
     with pytest.MonkeyPatch.context() as patch:

@@ -127,8 +127,10 @@ def summarise(
         seed: of the bootstrap.
     """
     agents = {name: _figures(list(METRICS), *_agent_columns(own), _places(own), seed) for name, own in tables.items()}
-    names = list(tables)
-    comparison = _compared(names[0], names[1], *tables.values(), seed) if len(names) == 2 else None
+    comparison = None
+    if len(tables) == 2:
+        (first, first_tables), (second, second_tables) = tables.items()
+        comparison = _compared(first, second, first_tables, second_tables, seed)
     return LiveResult(label, perturbations, agents, comparison)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -33,20 +34,16 @@ class Perturbations:
 
     def scaled(self, strength: float) -> Perturbations:
         """All magnitudes times `strength`; a new obstacle is there or not."""
-        numbers = {name: strength * value for name, value in self._numbers().items()}
-        return replace(self, **numbers)
+        values = self.to_json()
+        return Perturbations(**{k: v if isinstance(v, bool) else strength * v for k, v in values.items()})
 
     def alone(self, name: str) -> Perturbations:
         """This one perturbation without the others."""
-        return replace(Perturbations(), **{name: getattr(self, name)})
+        return Perturbations(**{name: getattr(self, name)})
 
-    def to_json(self) -> dict[str, float | bool]:
-        """As JSON values."""
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values: numbers, and whether there is a new obstacle."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    def _numbers(self) -> dict[str, float]:
-        values = self.to_json()
-        return {name: value for name, value in values.items() if not isinstance(value, bool)}
 
 
 REFERENCE = Perturbations(

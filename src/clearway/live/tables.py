@@ -22,9 +22,11 @@ class _Column:
 
     def cell(self, figures: Figures) -> tuple[str, str]:
         """The figure and its interval."""
-        low, high = (self.scale * end for end in figures.intervals[self.metric])
-        value = f"{self.scale * figures.values[self.metric]:.{self.digits}f}"
-        return value, f"{low:.{self.digits}f}–{high:.{self.digits}f}"
+        value, low, high = (
+            f"{round(self.scale * number, self.digits) + 0.0:.{self.digits}f}"  # + 0.0: no "-0.0"
+            for number in (figures.values[self.metric], *figures.intervals[self.metric])
+        )
+        return value, f"{low}–{high}"
 
 
 COLUMNS = (
