@@ -17,6 +17,7 @@ ORDER = (
     {"model"},
     {"learn"},
     {"evaluate"},
+    {"live"},
     {"experiments"},
     {"deploy"},
     {"viz"},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -10,21 +10,26 @@ import tyro
 
 from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, stderr_console
+from clearway.cli.live import EPISODES as LIVE_EPISODES
+from clearway.cli.live import STEP_CAP as LIVE_STEP_CAP
+from clearway.cli.live import Live, evaluate_live
+
+EPISODES, STEP_CAP = 100, 10_000
 
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Evaluate a trained agent by the paper's protocol, beside a random and a shortest-path agent.
+    """Evaluate a trained agent by the paper's protocol, beside a random and a shortest-path agent; or off the grid.
 
     Example: clearway evaluate runs/bathroom
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
     """The run folder."""
-    episodes: int = 100
-    """Episodes a target."""
-    step_cap: int = 10_000
-    """Steps after which an episode has failed."""
+    episodes: int | None = None
+    """Episodes a target; by default 100, live 10."""
+    step_cap: int | None = None
+    """Steps after which an episode has failed; by default 10,000, live 100."""
     seed: int = 0
     """Of starts and sampled actions."""
     scenes: tuple[Path, ...] = ()
@@ -37,20 +42,36 @@ class Evaluate:
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
     json: bool = False
     """Print JSON: the sampled agent's figures, and the other agents' under "others"."""
+    room: Live = field(default_factory=Live)
 
     def run(self) -> None:
-        """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder."""
+        """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
+        self.room.check()
+        if not self.room.live:
+            self._on_grid(_or(self.episodes, EPISODES), _or(self.step_cap, STEP_CAP))
+            return
+        evaluate_live(
+            self.folder,
+            self.checkpoint,
+            self.scenes,
+            self.room,
+            episodes=_or(self.episodes, LIVE_EPISODES),
+            step_cap=_or(self.step_cap, LIVE_STEP_CAP),
+            seed=self.seed,
+            pictures=self.pictures,
+            json=self.json,
+        )
+
+    def _on_grid(self, episodes: int, step_cap: int) -> None:
         from clearway.evaluate.files import write_evaluations
         from clearway.evaluate.run import evaluate_run
         from clearway.learn.load import load_agent, run_scenes
 
-        check_at_least(1, episodes=self.episodes, step_cap=self.step_cap)
+        check_at_least(1, episodes=episodes, step_cap=step_cap)
         check_seeds(seed=self.seed)
         agent = load_agent(self.folder, self.checkpoint)
         scenes = run_scenes(agent.record, scene_files(self.scenes) if self.scenes else None)
-        evaluations = evaluate_run(
-            agent, scenes, episodes_per_target=self.episodes, step_cap=self.step_cap, seed=self.seed
-        )
+        evaluations = evaluate_run(agent, scenes, episodes_per_target=episodes, step_cap=step_cap, seed=self.seed)
         first, *others = (evaluation.to_json() for evaluation in evaluations)
         content = {**first, "others": others}
         write_evaluations(self.folder, content, evaluations)
@@ -72,3 +93,8 @@ class Evaluate:
         console.print(rich_table(evaluations, "scenes"))
         if len(scenes) > 1:
             console.print(rich_table(evaluations, "average"))
+
+
+def _or(given: int | None, default: int) -> int:
+    """What was given, else the default."""
+    return default if given is None else given

@@ -98,7 +98,7 @@ def run_episodes(
     """
     assert episodes_per_target > 0 and step_cap > 0 and episodes_at_once > 0
     target = torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target)
-    seeds = _episode_seeds(world, episodes_per_target, seed)
+    seeds = episode_seeds(world, episodes_per_target, seed)
     policy = argmax(policy) if selection == "argmax" else policy
     untried = selection == "argmax-untried"
     parts = []
@@ -109,7 +109,7 @@ def run_episodes(
     return _joined(parts)
 
 
-def _episode_seeds(world: World, episodes_per_target: int, seed: int) -> Tensor:
+def episode_seeds(world: World, episodes_per_target: int, seed: int) -> Tensor:
     """One seed an episode, (M * episodes_per_target,) int64, target after target."""
     names = [world.scene_names[scene] for scene in world.target_scene.tolist()]
     labels = [f"{name}:{world.scene_state(target)}" for target, name in enumerate(names)]

@@ -4,15 +4,17 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from clearway.errors import RenderError
 from clearway.scenes.rooms import render as rendering
 from clearway.scenes.rooms.camera import View, first_person_view
-from clearway.scenes.rooms.render import render
+from clearway.scenes.rooms.render import render, studio
 from small_rooms import SmallRoom
 
 NO_LIBRARY = """
@@ -147,3 +149,40 @@ def test_no_pictures_need_no_worker(model):
 def test_fewer_than_one_worker_is_refused(model, view):
     with pytest.raises(RenderError, match="ask for 1 or more"):
         render(model, view, workers=0)
+
+
+def test_a_studio_takes_the_same_pictures_a_few_at_a_time(model, view):
+    together = render(model, view, workers=1)
+    with studio(model, view, workers=2) as camera:
+        first = camera(view.shots[:1])
+        rest = camera(view.shots[1:])
+        nothing = camera(())
+    np.testing.assert_array_equal(np.concatenate([first, rest]), together)
+    assert nothing.shape == (0, 300, 400, 3)
+
+
+def test_a_studio_whose_processes_cannot_draw_says_so(model, view, monkeypatch):
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+    with studio(model, view, workers=1) as camera, pytest.raises(RenderError, match="apt-get install"):
+        camera(view.shots)
+
+
+def test_a_shot_may_move_the_bodies_that_hang_loose(lit_room):
+    model = lit_room
+    straight = first_person_view(np.array([[0.5, 0.5]]), np.array([0])).shots[0]
+    aside = replace(straight, moved_m=((0.5, 0.0, 0.0),))
+    with studio(model, first_person_view(np.zeros((0, 2)), np.zeros(0)), workers=1) as camera:
+        ahead, moved = camera((straight, aside))
+    assert ahead[150, 200, 0] > 2 * ahead[150, 200, 2]  # red stands in the middle of the picture
+    assert moved[150, 200].max() < 30
+    assert moved[150, 350, 0] > 2 * moved[150, 350, 2]
+
+
+@pytest.fixture
+def lit_room():
+    """A red box 1 m ahead of (0.5, 0.5), on a body of its own; nothing else."""
+    spec = SmallRoom().spec
+    spec.visual.headlight.ambient[:] = [1, 1, 1]
+    body = spec.worldbody.add_body(mocap=True)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0.5, 1.5, 1.0], size=[0.1] * 3, rgba=[0.9, 0.1, 0.1, 1], group=2)
+    return spec.compile()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 ROOM_NAMES: tuple[RoomName, ...] = ("bathroom", "bedroom", "living_room", "kitchen")
 
 
-def build_room(name: str, seed: int = 0, *, looks: bool = True) -> Room:
+def build_room(name: str, seed: int = 0, *, looks: bool = True, loose: bool = False) -> Room:
     """A furnished room.
 
     Args:
@@ -25,6 +25,7 @@ def build_room(name: str, seed: int = 0, *, looks: bool = True) -> Room:
         seed: 0 is the default room; another seed gives other colours, pictures and small furniture.
         looks: bake the light, so that `room.spec.compile()` is ready to render (some seconds); False gives the
             obstacles and the grid only, in milliseconds.
+        loose: every piece of furniture hangs on a body of its own, so that it can be moved (`pieces`).
 
     Raises:
         SceneError: there is no room of that name, or the seed is negative.
@@ -37,5 +38,5 @@ def build_room(name: str, seed: int = 0, *, looks: bool = True) -> Room:
     if looks:
         from clearway.scenes.rooms.light import bake
 
-        bake(room)
+        bake(room, loose=loose)
     return room

@@ -5,7 +5,7 @@ Coordinates: x is MuJoCo's x, z (across the floor) is MuJoCo's y. Heading 0 look
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import mujoco
@@ -28,12 +28,15 @@ class Shot:
         distance_m: of the camera from that point.
         azimuth_deg: the direction it looks in across the floor, 0 along +x, 90 along +z.
         elevation_deg: 0 looks level, -90 straight down.
+        moved_m: where the room's loose pieces stand for this picture, how far along x and along z and upwards each has
+            been moved (`pieces`); empty leaves them where they were built.
     """
 
     look_at_m: tuple[float, float, float]
     distance_m: float
     azimuth_deg: float
     elevation_deg: float
+    moved_m: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,11 +78,23 @@ def first_person_view(
         width_px: of a picture.
         groups: the geom groups that show.
     """
+    shots = (
+        first_person_shot(float(x_m), float(z_m), float(heading_deg), height_m=camera_m)
+        for (x_m, z_m), heading_deg in zip(locations_m, headings_deg, strict=True)
+    )
+    return eye_view(shots, height_px=height_px, width_px=width_px, groups=groups)
+
+
+def eye_view(
+    shots: Iterable[Shot] = (),
+    *,
+    height_px: int = PICTURE_HEIGHT_PX,
+    width_px: int = PICTURE_WIDTH_PX,
+    groups: tuple[int, ...] = (SEEN_GROUP, CEILING_GROUP),
+) -> View:
+    """Pictures through the agent's lens; arguments as of `first_person_view`."""
     return View(
-        shots=tuple(
-            _level_shot(float(x_m), float(z_m), camera_m, float(heading_deg))
-            for (x_m, z_m), heading_deg in zip(locations_m, headings_deg, strict=True)
-        ),
+        shots=tuple(shots),
         height_px=height_px,
         width_px=width_px,
         vertical_extent=VERTICAL_FOV_DEG,
@@ -88,18 +103,32 @@ def first_person_view(
     )
 
 
-def _level_shot(x_m: float, z_m: float, camera_m: float, heading_deg: float) -> Shot:
+def first_person_shot(
+    x_m: float,
+    z_m: float,
+    heading_deg: float,
+    *,
+    height_m: float = CAMERA_HEIGHT_M,
+    pitch_deg: float = 0.0,
+    moved_m: tuple[tuple[float, float, float], ...] = (),
+) -> Shot:
+    """The agent's camera above a point of the floor; a pitch above 0 looks up. See `Shot` for `moved_m`."""
     azimuth_deg = 90.0 - heading_deg
-    azimuth = np.radians(azimuth_deg)
-    ahead_m = (x_m + float(np.cos(azimuth)), z_m + float(np.sin(azimuth)), camera_m)
-    return Shot(ahead_m, distance_m=1.0, azimuth_deg=azimuth_deg, elevation_deg=0.0)
+    azimuth, pitch = np.radians(azimuth_deg), np.radians(pitch_deg)
+    level = float(np.cos(pitch))
+    ahead_m = (
+        x_m + level * float(np.cos(azimuth)),
+        z_m + level * float(np.sin(azimuth)),
+        height_m + float(np.sin(pitch)),
+    )
+    return Shot(ahead_m, distance_m=1.0, azimuth_deg=azimuth_deg, elevation_deg=pitch_deg, moved_m=moved_m)
 
 
-def take_pictures(model: mujoco.MjModel, view: View) -> Iterator[np.ndarray]:
-    """The pictures of a view one by one, each (height_px, width_px, 3) uint8 RGB; the array is used again.
+def take_pictures(model: mujoco.MjModel, view: View, shots: Iterable[Shot]) -> Iterator[np.ndarray]:
+    """The pictures of some shots one by one, each (height_px, width_px, 3) uint8 RGB; the array is used again.
 
-    Sets the lens in `model`. Needs a process with a working MUJOCO_GL backend (see `render`); the first
-    picture is taken after the backend has opened.
+    Sets the lens of `view` in `model`; the view's own shots do not count. Needs a process with a working MUJOCO_GL
+    backend (see `render`), which opens before the first shot is asked for.
     """
     lens = model.vis.global_
     lens.offheight, lens.offwidth = view.height_px, view.width_px
@@ -113,7 +142,10 @@ def take_pictures(model: mujoco.MjModel, view: View) -> Iterator[np.ndarray]:
     max_geom = model.ngeom + model.nsite + SPARE_GEOMS
     with mujoco.Renderer(model, view.height_px, view.width_px, max_geom=max_geom) as renderer:
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # the rooms' light is baked
-        for shot in view.shots:
+        for shot in shots:
+            if shot.moved_m:
+                data.mocap_pos[:] = shot.moved_m
+                mujoco.mj_forward(model, data)
             renderer.update_scene(data, _free_camera(shot, view.orthographic), shown)
             yield renderer.render(out=picture)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from clearway.scenes.rooms.meshes import rectangle
 from clearway.scenes.rooms.parts import Part
+from clearway.scenes.rooms.pieces import BODY_NAME, FIXED
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.spec import add_mesh_geom, add_texture
 from clearway.scenes.rooms.surfaces import Surface
@@ -52,24 +53,41 @@ def _soft_limit(picture: np.ndarray) -> np.ndarray:
     return np.where(picture < 0.7, picture, 0.7 + 0.3 * np.tanh((picture - 0.7) / 0.3))
 
 
-def draw_parts(room: Room, parts: Iterable[Part], brightness: np.ndarray) -> None:
+def draw_parts(
+    room: Room,
+    parts: Sequence[Part],
+    brightness: np.ndarray,
+    pieces: np.ndarray,
+    piece_count: int,
+) -> None:
     """Add the parts under (N, 3) brightness; those alike in material and brightness become one geom.
 
     See-through parts stay single, because MuJoCo sorts whole geoms by their distance.
+
+    Args:
+        room: where to.
+        parts: visible ones.
+        brightness: of each part.
+        pieces: (N,) int, number of the body that each part hangs on, whose position can be set later (MuJoCo's mocap);
+            `pieces.FIXED`: the world's. The colours are the same either way.
+        piece_count: number of such bodies.
     """
     alike: dict[tuple, list[int]] = defaultdict(list)
-    parts = list(parts)
+    bodies = {FIXED: room.spec.worldbody}
+    for piece in range(piece_count):
+        bodies[piece] = room.spec.worldbody.add_body(name=f"{BODY_NAME} {piece}", mocap=True)
     for number, (part, bright) in enumerate(zip(parts, brightness, strict=True)):
         step = round(bright.mean() / BRIGHTNESS_STEP) if room.is_opaque(part.material) else -number - 1
         alike[part.material, part.group, step].append(number)
     for serial, ((material, group, _), members) in enumerate(alike.items()):
-        arrays = _merged([parts[number] for number in members])
-        geom = add_mesh_geom(room.spec, f"furniture {serial}", arrays, material, group)
         rgba = room.tint_of(material)
         rgba[:3] *= brightness[members].mean(axis=0)
         if np.abs(rgba - NOT_SET).max() < 1e-3:
             rgba[0] += 0.002
-        geom.rgba[:] = rgba
+        for piece in np.unique(pieces[members]).tolist():
+            arrays = _merged([parts[number] for number in members if pieces[number] == piece])
+            name = f"furniture {serial}" if piece == FIXED else f"furniture {serial} of {BODY_NAME} {piece}"
+            add_mesh_geom(room.spec, name, arrays, material, group, bodies[piece]).rgba[:] = rgba
 
 
 def _merged(parts: list[Part]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

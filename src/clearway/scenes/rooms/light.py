@@ -16,6 +16,7 @@ from scipy import ndimage
 from clearway.scenes.rooms.draw import draw_parts, draw_surface
 from clearway.scenes.rooms.occupancy import Occupancy, occupancy_of
 from clearway.scenes.rooms.parts import Lamp, Part, Window
+from clearway.scenes.rooms.pieces import loose_obstacles, pieces_of_parts
 from clearway.scenes.rooms.room import Room
 from clearway.scenes.rooms.surfaces import Surface
 
@@ -56,13 +57,14 @@ class _Scene:
     floor_tint: np.ndarray
 
 
-def bake(room: Room, *, count_hidden: bool = True) -> None:
+def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
     """Light the room: draw its surfaces with light maps and set the brightness of every furniture part.
 
     Args:
-        room: to be lit.
+        room: furnished.
         count_hidden: set the exposure by all of the surfaces; False leaves out what lies within solid parts, for
             rooms with much floor and wall under thick walls.
+        loose: hang every piece of furniture on a body of its own (`pieces`).
     """
     scene = _scene_of(room)
     maps = [_light_map(scene, surface, room.rng) for surface in room.surfaces]
@@ -77,7 +79,9 @@ def bake(room: Room, *, count_hidden: bool = True) -> None:
     shown_parts = [part for part in room.parts if part.material]
     brightness = _brightness_of(shown_parts, scene, exposure, room.rng)
     brightness[[not room.is_shaded(part.material) for part in shown_parts]] = 1.0
-    draw_parts(room, shown_parts, brightness)
+    obstacles = loose_obstacles(room.spec) if loose else []
+    pieces = pieces_of_parts(obstacles, shown_parts, (room.width_m, room.depth_m))
+    draw_parts(room, shown_parts, brightness, pieces, len(obstacles))
     _add_lights(room)
 
 

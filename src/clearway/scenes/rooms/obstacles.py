@@ -97,9 +97,8 @@ def body_geoms(model: mujoco.MjModel) -> list[int]:
 def collision_model(room: CollisionRoom, agent: AgentShape) -> mujoco.MjModel:
     """The obstacles of one of our own rooms and the agent's body, without meshes: compiles in milliseconds."""
     spec = mujoco.MjSpec()
-    for geom in room.spec.geoms:
-        if geom.group == OBSTACLE_GROUP and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
-            _add_obstacle(spec, geom)
+    for geom in obstacle_geoms(room.spec):
+        copy_obstacle(spec, geom)
     add_body(spec, agent)
     return spec.compile()
 
@@ -171,8 +170,13 @@ class Obstacles:
         return np.all(apart_m < sum_m + self._reach_m, axis=2)
 
 
-def _add_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
-    """Copy a collision geom."""
+def obstacle_geoms(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
+    """The collision geoms of a room, in the spec's order."""
+    return [g for g in spec.geoms if g.group == OBSTACLE_GROUP and g.type != mujoco.mjtGeom.mjGEOM_PLANE]
+
+
+def copy_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjsGeom:
+    """Copy a collision geom into another model, which has no meshes and compiles in milliseconds."""
     placed_plainly = (
         geom.parent.name == "world"
         and geom.frame is None
@@ -181,8 +185,9 @@ def _add_obstacle(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
     )
     assert placed_plainly, f"collision geom '{geom.name}' must hang on the world body by pos and quat"
     assert geom.type in OBSTACLE_SHAPES, f"collision geom '{geom.name}' must be one of {OBSTACLE_SHAPES}"
-    copy = spec.worldbody.add_geom(type=geom.type, pos=geom.pos, quat=geom.quat)
+    copy = spec.worldbody.add_geom(name=geom.name, type=geom.type, pos=geom.pos, quat=geom.quat, group=OBSTACLE_GROUP)
     copy.size[:] = geom.size
+    return copy
 
 
 def bounding_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:

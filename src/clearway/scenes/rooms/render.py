@@ -1,4 +1,4 @@
-"""Take all pictures of a room on all cores, one renderer process a core.
+"""Take all pictures of a room on all cores, one renderer process a core; or a few at a time, in a `studio`.
 
 Each process gets the compiled room (its light is baked once, by the caller) and every n-th shot, and sends its
 pictures back through a pipe. The processes are plain subprocesses: their environment names MuJoCo's OpenGL
@@ -13,22 +13,22 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from clearway.errors import RenderError
 from clearway.progress import picture_progress
-from clearway.scenes.rooms.render_worker import CANNOT_DRAW, CANNOT_DRAW_MARK, binary_model, view_line
+from clearway.scenes.rooms.render_worker import CANNOT_DRAW, CANNOT_DRAW_MARK, binary_model, job_head, shots_line
 
 if TYPE_CHECKING:
     import mujoco
 
-    from clearway.scenes.rooms.camera import View
+    from clearway.scenes.rooms.camera import Shot, View
 
 BACKEND_VARIABLE = "MUJOCO_GL"
 MESA_THREADS_VARIABLE = "LP_NUM_THREADS"  # of the software rasteriser, in each process
@@ -40,6 +40,9 @@ REMEDIES = {
     "osmesa": "On Debian or Ubuntu: apt-get install libosmesa6; or unset MUJOCO_GL",
 }
 OTHER_REMEDY = "Unset MUJOCO_GL to render without a screen"
+
+Camera = Callable[[Sequence["Shot"]], np.ndarray]
+"""From shots to their pictures, (shots, height_px, width_px, 3) uint8 RGB."""
 
 
 def render(
@@ -66,7 +69,7 @@ def render(
         raise RenderError(f"{workers} renderer processes cannot render; ask for 1 or more")
     count = min(workers or _core_count(), MOST_WORKERS, len(view.shots))
     pictures = np.empty((len(view.shots), view.height_px, view.width_px, 3), np.uint8)
-    room = binary_model(model)
+    head = job_head(view, binary_model(model))
     with (
         picture_progress(label, len(pictures), progress) as show_done,
         _started_workers(count) as started,
@@ -80,8 +83,8 @@ def render(
         try:
             jobs = []
             for first, worker in enumerate(started):
-                share = replace(view, shots=view.shots[first::count])
-                jobs.append(threads.submit(worker.fill, pictures[first::count], share, room, advance))
+                share = pictures[first::count], view.shots[first::count]
+                jobs.append(threads.submit(worker.do_job, head, *share, advance))
             done, _ = wait(jobs, return_when=FIRST_EXCEPTION)
             for job in done:
                 job.result()
@@ -89,6 +92,46 @@ def render(
             for worker in started:
                 worker.process.kill()  # the threads then find their pipes at an end
     return pictures
+
+
+@contextmanager
+def studio(model: mujoco.MjModel, view: View, *, workers: int | None = None) -> Iterator[Camera]:
+    """Renderer processes that stay open for the block, to take pictures of one room again and again.
+
+    Args:
+        model: the compiled room.
+        view: the lens; its own shots are not taken.
+        workers: number of processes; None: one a core.
+
+    Yields:
+        A function from shots to their pictures, (shots, height_px, width_px, 3) uint8 RGB; it raises what `render`
+        raises.
+    """
+    count = min(workers or _core_count(), MOST_WORKERS)
+    head = job_head(view, binary_model(model))
+    with _started_workers(count) as started, ThreadPoolExecutor(count) as threads:
+
+        def take(shots: Sequence[Shot]) -> np.ndarray:
+            pictures = np.empty((len(shots), view.height_px, view.width_px, 3), np.uint8)
+            jobs = [
+                threads.submit(worker.take, pictures[first::count], shots[first::count], _nothing)
+                for first, worker in enumerate(started)
+            ]
+            for job in jobs:
+                job.result()
+            return pictures
+
+        try:
+            for worker in started:
+                worker.begin(head)
+            yield take
+        finally:
+            for worker in started:
+                worker.process.kill()  # the threads then find their pipes at an end
+
+
+def _nothing() -> None:
+    """Called after each picture where nobody counts them."""
 
 
 def _core_count() -> int:
@@ -125,31 +168,47 @@ class _Worker:
         )
         return cls(process, messages)
 
-    def fill(self, pictures: np.ndarray, view: View, room: bytes, advance: Callable[[], None]) -> None:
-        """Take the pictures of `view` into `pictures`, (shots, height_px, width_px, 3) uint8.
+    def do_job(self, head: bytes, pictures: np.ndarray, shots: Sequence[Shot], advance: Callable[[], None]) -> None:
+        """Begin, take all pictures, and end; see `begin` and `take`."""
+        self.begin(head)
+        self.take(pictures, shots, advance, last=True)
+        if self.process.wait() != 0:
+            raise self._failure(len(pictures), len(pictures))
+
+    def begin(self, head: bytes) -> None:
+        """Send the lens and the room (`job_head`)."""
+        self._send(head, 0)
+
+    def take(
+        self, pictures: np.ndarray, shots: Sequence[Shot], advance: Callable[[], None], *, last: bool = False
+    ) -> None:
+        """Take the pictures of some shots.
 
         Args:
-            pictures: what to fill.
-            view: the share of this worker.
-            room: the model as `binary_model` makes it.
+            pictures: what to fill, (shots, height_px, width_px, 3) uint8.
+            shots: the share of this worker.
             advance: called after each picture.
+            last: no more shots will follow.
         """
         assert self.process.stdin is not None and self.process.stdout is not None
-        try:
-            with self.process.stdin as stdin:
-                stdin.write(view_line(view))
-                stdin.write(room)
-        except BrokenPipeError:
-            raise self._failure(0, len(pictures)) from None
-        size = view.height_px * view.width_px * 3
+        self._send(shots_line(shots), len(pictures))
+        if last:
+            self.process.stdin.close()
+        size = pictures[0].nbytes if len(pictures) else 0
         for index in range(len(pictures)):
             raw = self.process.stdout.read(size)
             if len(raw) < size:
                 raise self._failure(index, len(pictures))
             pictures[index] = np.frombuffer(raw, np.uint8).reshape(pictures.shape[1:])
             advance()
-        if self.process.wait() != 0:
-            raise self._failure(len(pictures), len(pictures))
+
+    def _send(self, message: bytes, asked: int) -> None:
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(message)
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            raise self._failure(0, asked) from None
 
     def close(self) -> None:
         """End the process if it still runs, and close its pipes."""
@@ -157,7 +216,8 @@ class _Worker:
         self.process.wait()
         for stream in (self.process.stdin, self.process.stdout):
             if stream is not None:
-                stream.close()
+                with suppress(BrokenPipeError):  # a process that died left something unread
+                    stream.close()
 
     def _failure(self, taken: int, asked: int) -> RenderError:
         """What went wrong in a process that ended early, as an error to raise."""

@@ -109,19 +109,19 @@ class Room:
 
     # --------------------------------------------------------------- obstacles
 
-    def block(self, frame: Frame, centre_m: Point, size_m: Point) -> None:
-        """An obstacle: a hidden box of full size `size_m`."""
-        self._obstacle(mujoco.mjtGeom.mjGEOM_BOX, frame, centre_m, [side / 2 for side in size_m])
+    def block(self, frame: Frame, centre_m: Point, size_m: Point, name: str = "") -> None:
+        """An obstacle: a hidden box of full size `size_m`; parts of the shell have a name (`pieces`)."""
+        self._obstacle(mujoco.mjtGeom.mjGEOM_BOX, frame, centre_m, [side / 2 for side in size_m], name)
 
     def post(self, frame: Frame, radius_m: float, height_m: float) -> None:
         """An obstacle: a hidden cylinder that stands on the frame's origin."""
         half_m = height_m / 2
         self._obstacle(mujoco.mjtGeom.mjGEOM_CYLINDER, frame, (0, 0, half_m), [radius_m, half_m, 0.0])
 
-    def _obstacle(self, kind: int, frame: Frame, centre_m: Point, size: Sequence[float]) -> None:
+    def _obstacle(self, kind: int, frame: Frame, centre_m: Point, size: Sequence[float], name: str = "") -> None:
         point, quat = self._placed(frame, centre_m, UPRIGHT)
         geom = self.spec.worldbody.add_geom(
-            type=kind, pos=point, quat=quat, group=OBSTACLE_GROUP, contype=1, conaffinity=1
+            name=name, type=kind, pos=point, quat=quat, group=OBSTACLE_GROUP, contype=1, conaffinity=1
         )
         geom.size[:] = size
 

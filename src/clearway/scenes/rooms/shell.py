@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clearway.scenes.rooms.frame import Frame
-from clearway.scenes.rooms.groups import CEILING_GROUP, SEEN_GROUP
+from clearway.scenes.rooms.groups import CEILING_GROUP, SEEN_GROUP, SHELL_NAME
 from clearway.scenes.rooms.room import ORIGIN, WALL_THICKNESS_M, Room
 from clearway.scenes.rooms.surfaces import Surface, pixels
 
@@ -69,16 +69,17 @@ def wall_size_m(room: Room, side: str) -> tuple[float, float]:
 def add_walls(room: Room, columns: tuple[Column, ...] = ()) -> None:
     """The obstacles of the shell: the four walls and the columns."""
     w, d, h, t = room.width_m, room.depth_m, room.height_m, WALL_THICKNESS_M
-    for x, y, size_x, size_y in (
+    walls = (
         (w / 2, -t / 2, w + 2 * t, t),
         (w / 2, d + t / 2, w + 2 * t, t),
         (-t / 2, d / 2, t, d),
         (w + t / 2, d / 2, t, d),
-    ):
-        room.block(ORIGIN, (x, y, h / 2), (size_x, size_y, h))
-    for column in columns:
+    )
+    for number, (x, y, size_x, size_y) in enumerate(walls):
+        room.block(ORIGIN, (x, y, h / 2), (size_x, size_y, h), f"{SHELL_NAME} wall {number}")
+    for number, column in enumerate(columns):
         frame, size = _column_box(room, column)
-        room.block(frame, (0, 0, size[2] / 2), size)
+        room.block(frame, (0, 0, size[2] / 2), size, f"{SHELL_NAME} column {number}")
 
 
 def _column_box(room: Room, column: Column) -> tuple[Frame, tuple[float, float, float]]:

@@ -59,13 +59,17 @@ def add_mesh_geom(
     arrays: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     material: str,
     group: int,
+    body: mujoco.MjsBody | None = None,
 ) -> mujoco.MjsGeom:
-    """A visible geom from a mesh in room coordinates: (V, 3) vertices, (F, 3) faces, (V, 3) normals, (V, 2) uvs."""
+    """A visible geom from a mesh in room coordinates: (V, 3) vertices, (F, 3) faces, (V, 3) normals, (V, 2) uvs.
+
+    It hangs on a body that stands at the room's origin, by default the world's.
+    """
     vertices, faces, normals, uvs = arrays
     mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
     mesh.uservert, mesh.userface = vertices.ravel(), faces.ravel()
     mesh.usernormal, mesh.usertexcoord = normals.ravel(), uvs.ravel()
-    return spec.worldbody.add_geom(
+    return (body or spec.worldbody).add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,
         meshname=name,

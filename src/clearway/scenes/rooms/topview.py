@@ -16,13 +16,20 @@ PIXELS_PER_M = 100
 ABOVE_M = 10.0  # where the camera hangs; the picture is orthographic, so the height does not matter
 
 
-def render_top_view(model: mujoco.MjModel, width_m: float, depth_m: float) -> TopView:
+def render_top_view(
+    model: mujoco.MjModel, width_m: float, depth_m: float, moved_m: tuple[tuple[float, float, float], ...] = ()
+) -> TopView:
     """The floor from x = 0 to `width_m` and z = 0 to `depth_m`, rounded to whole pixels, seen from above.
+
+    Args:
+        model: the compiled room.
+        width_m, depth_m: size of the floor.
+        moved_m: where its loose pieces stand, see `camera.Shot`.
 
     Raises:
         RenderError: this machine has no OpenGL backend that works.
     """
-    return render_from_above(model, (0.0, 0.0), (width_m, depth_m), ABOVE_M, PIXELS_PER_M, (SEEN_GROUP,))
+    return render_from_above(model, (0.0, 0.0), (width_m, depth_m), ABOVE_M, PIXELS_PER_M, (SEEN_GROUP,), moved_m)
 
 
 def render_from_above(
@@ -32,6 +39,7 @@ def render_from_above(
     camera_m: float,
     pixels_per_m: float,
     groups: tuple[int, ...],
+    moved_m: tuple[tuple[float, float, float], ...] = (),
 ) -> TopView:
     """A rectangle of floor, rounded to whole pixels, seen from straight above.
 
@@ -42,6 +50,7 @@ def render_from_above(
         camera_m: height of the camera, above all that is to be seen.
         pixels_per_m: scale.
         groups: the geom groups that show.
+        moved_m: where loose pieces stand, see `camera.Shot`.
 
     Raises:
         RenderError: this machine has no OpenGL backend that works.
@@ -50,7 +59,7 @@ def render_from_above(
     middle_x_m, middle_z_m = ((low + high) / 2 for low, high in zip(low_m, high_m, strict=True))
     half_x_m, half_z_m = width_px / pixels_per_m / 2, height_px / pixels_per_m / 2
     view = View(
-        shots=(Shot((middle_x_m, middle_z_m, 0.0), camera_m, azimuth_deg=90.0, elevation_deg=-90.0),),
+        shots=(Shot((middle_x_m, middle_z_m, 0.0), camera_m, azimuth_deg=90.0, elevation_deg=-90.0, moved_m=moved_m),),
         height_px=height_px,
         width_px=width_px,
         vertical_extent=2 * half_z_m,

@@ -9,7 +9,7 @@ import numpy as np
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import neighbour_pairs
 from clearway.scenes.rooms.light import bake
-from clearway.scenes.rooms.obstacles import AgentShape, Obstacles
+from clearway.scenes.rooms.obstacles import AgentShape, Obstacles, collision_model
 from clearway.scenes.rooms.plans.decoration import decorate
 from clearway.scenes.rooms.plans.finish import finish_of
 from clearway.scenes.rooms.plans.layout import GAP, Layout, lay_out
@@ -61,7 +61,7 @@ def open_plan(room: Room, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     """
     size_m = layout.cell_size_m
     agent = AgentShape(radius_m=AGENT_RADIUS * size_m, step_m=size_m, clearance_m=CLEARANCE * size_m)
-    obstacles = Obstacles(room, agent)
+    obstacles = Obstacles(collision_model(room, agent), agent)
     places = np.argwhere(np.ones(layout.free.shape, bool))
     middles_m = layout.middles_m(places)
     free = obstacles.standing_gaps_m(middles_m) > agent.clearance_m

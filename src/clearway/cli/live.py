@@ -1,0 +1,141 @@
+"""`clearway evaluate --live`: its flags, and what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
+from clearway.cli.console import print_json, stderr_console
+from clearway.errors import ClearwayError
+from clearway.live.settings import Perturbations
+
+if TYPE_CHECKING:
+    from clearway.learn.load import Agent
+    from clearway.live.run import LiveOutcome, Stage
+
+EPISODES, STEP_CAP = 10, 100
+
+
+@dataclass(frozen=True)
+class Live:
+    """In the room itself: continuous pose, pictures rendered and encoded step by step, contacts by MuJoCo."""
+
+    live: bool = False
+    """Evaluate in the rooms instead of on the grid; 10 episodes a target of at most 100 steps by default."""
+    against: Path | None = None
+    """A second run on the same scenes and targets, compared episode by episode."""
+    selection: Literal["sampled", "argmax"] = "sampled"
+    """How actions are chosen."""
+    sweep: bool = False
+    """Every perturbation alone, then all together, instead of the flags below."""
+    strengths: tuple[float, ...] = (0.5, 1.0)
+    """Of a sweep, shares of its full perturbations."""
+    perturbations: Perturbations = field(default_factory=Perturbations)
+
+    def check(self) -> None:
+        """Check the flags; without --live they must be as they are by default."""
+        if not self.live:
+            if self != Live():
+                raise ClearwayError("perturbations, --against and --sweep need --live. Add it")
+            return
+        numbers = {k: v for k, v in self.perturbations.to_json().items() if not isinstance(v, bool)}
+        check_finite(**numbers)
+        negative = [name.replace("_", "-") for name, value in numbers.items() if value < 0]
+        if negative:
+            raise ClearwayError(f"--{negative[0]} is below 0. Give 0 or more")
+        if self.sweep and self.perturbations != Perturbations():
+            raise ClearwayError("--sweep sets the perturbations itself. Leave their flags out")
+        if not self.strengths:
+            raise ClearwayError("--strengths is empty. Give one or more numbers above 0")
+        for strength in self.strengths:
+            check_positive(strengths=strength)
+
+
+def evaluate_live(
+    folder: Path,
+    checkpoint: Path | None,
+    scene_paths: tuple[Path, ...],
+    options: Live,
+    *,
+    episodes: int,
+    step_cap: int,
+    seed: int,
+    pictures: Path | None,
+    json: bool,
+) -> None:
+    """Walk the episodes, print, leave live.json and live.md in the run folder, and draw what is asked for."""
+    from clearway.evaluate.run import encoder_names
+    from clearway.learn.load import load_agent, run_scenes
+    from clearway.live.settings import Setting, label_of, sweep_settings
+
+    check_at_least(1, episodes=episodes, step_cap=step_cap)
+    check_seeds(seed=seed)
+    paths = [folder] if options.against is None else [folder, options.against]
+    agents = _named(paths, [load_agent(path, checkpoint if path == folder else None) for path in paths])
+    scenes = run_scenes(next(iter(agents.values())).record, scene_files(scene_paths) if scene_paths else None)
+    _check_rooms_can_be_built()
+    from clearway.live.episodes import LiveProtocol
+    from clearway.live.run import check_alike, live_json, stages, walk_setting, write_live
+    from clearway.live.tables import rich_tables
+
+    check_alike(agents)
+    one = Setting(label_of(options.perturbations), options.perturbations)
+    settings = sweep_settings(options.strengths) if options.sweep else [one]
+    history = next(iter(agents.values())).record.learner.history_length
+    protocol = LiveProtocol(episodes, step_cap, seed, options.selection, history)
+    encoder = encoder_names(scenes)
+    with stages(agents, scenes) as places:
+        outcomes: list[LiveOutcome] = []
+        with _status() as show:
+            for setting in settings:
+                outcomes.append(walk_setting(places, agents, setting, protocol, show))
+                results = [outcome.result for outcome in outcomes]
+                write_live(folder, results, protocol, encoder)  # what is complete outlives an interruption
+        if pictures is not None:
+            _draw(pictures, places, outcomes)
+    if json:
+        print_json(live_json(results, protocol, encoder))
+        return
+    from rich.console import Console
+
+    console = Console()
+    for table in rich_tables(results, protocol, encoder):
+        console.print(table)
+
+
+def _draw(folder: Path, places: list[Stage], outcomes: list[LiveOutcome]) -> None:
+    from clearway.viz.live import draw_live_pictures
+
+    made = draw_live_pictures(folder, places, outcomes)
+    stderr_console().print(f"pictures: {', '.join(str(path) for path in made)}", highlight=False)
+
+
+def _named(paths: list[Path], agents: list[Agent]) -> dict[str, Agent]:
+    """The agents by the names of their rewards, or of their folders where those are alike."""
+    rewards = [agent.record.reward.name for agent in agents]
+    names = rewards if len(set(rewards)) == len(rewards) else [str(path) for path in paths]
+    if len(set(names)) < len(names):
+        raise ClearwayError(f"--against {paths[1]}: the same run. Name another")
+    return dict(zip(names, agents, strict=True))
+
+
+def _check_rooms_can_be_built() -> None:
+    """MuJoCo is imported by what follows."""
+    from clearway.scenes.build import check_mujoco
+
+    check_mujoco()
+
+
+@contextmanager
+def _status() -> Iterator[Callable[[str], None]]:
+    """A line on standard error that says what goes on, if it is a terminal."""
+    console = stderr_console()
+    if not console.is_terminal:
+        yield lambda text: None
+        return
+    with console.status("") as status:
+        yield status.update

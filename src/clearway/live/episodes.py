@@ -1,0 +1,249 @@
+"""Episodes in the live room, walked side by side: picture, encoder, policy, body, step by step.
+
+Starts, targets and the chances of sampled actions are those of the evaluation on the grid (`evaluate.episodes`):
+without perturbations an episode is the same here and there up to its first contact.
+
+Axis letters: N episodes, B of them still walking, K pictures of history (newest last), F features, A actions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from clearway.envs.navigation import Navigation
+from clearway.envs.streams import Streams
+from clearway.envs.world import World
+from clearway.evaluate.episodes import ACTION_STREAM, episode_seeds
+from clearway.live.body import SAMPLES, Body, Step
+from clearway.live.draws import FURNITURE, OBSTACLE, Draws
+from clearway.live.layout import Layout, arranged, as_built, furniture_moved, with_obstacle_on_path
+from clearway.live.room import LiveRoom
+from clearway.live.settings import Perturbations
+from clearway.perception.encoder import Encoder
+from clearway.reward import COLLISION_AWARE
+from clearway.scenes.actions import Action
+from clearway.scenes.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
+from clearway.scenes.rooms.render import Camera
+
+LiveSelection = Literal["sampled", "argmax"]
+LivePolicy = Callable[[Tensor, Tensor], Tensor]
+"""Features of histories (B, K, F) and of targets (B, F) -> probabilities of actions (B, A)."""
+
+SUCCESS_M, SUCCESS_DEG = 0.25, 45.0
+"""A target is reached within half a cell and half a turn of its pose."""
+NEAR_M, CLOSE_M = 0.3, 0.1
+STEP_S = 1.0  # a step takes so long, move or turn
+PICTURES_AT_ONCE = 32
+
+
+@dataclass(frozen=True, eq=False)
+class LiveTable:
+    """What happened in N episodes in a room.
+
+    Attributes:
+        target: (N,) int64, index of the world's target, ascending.
+        start: (N,) int64, first state in the scene's numbering.
+        steps: (N,) int64, steps taken; the cap where the target was not reached.
+        contacts: (N,) int64, moves that ended at an obstacle.
+        reached: (N,) bool, the target was reached before the cap.
+        shortest_path_steps: (N,) int64, fewest steps on the grid as it was built.
+        least_gap_m: (N,) float64, smallest distance between the body and an obstacle.
+        mean_gap_m: (N,) float64, its mean over time, every distance counted up to `body.REACH_M`.
+        close_s, near_s: (N,) float64, time within CLOSE_M and within NEAR_M of an obstacle, seconds.
+        changed: (N,) bool, the room was arranged otherwise than it was built.
+        layouts: of every episode.
+        walks: of every episode, (T + 1, 3): x, z, heading in degrees.
+    """
+
+    target: np.ndarray
+    start: np.ndarray
+    steps: np.ndarray
+    contacts: np.ndarray
+    reached: np.ndarray
+    shortest_path_steps: np.ndarray
+    least_gap_m: np.ndarray
+    mean_gap_m: np.ndarray
+    close_s: np.ndarray
+    near_s: np.ndarray
+    changed: np.ndarray
+    layouts: tuple[Layout, ...]
+    walks: tuple[np.ndarray, ...]
+
+    def __len__(self) -> int:
+        """N."""
+        return len(self.target)
+
+
+@dataclass(frozen=True)
+class LiveProtocol:
+    """How episodes are walked.
+
+    Attributes:
+        episodes_per_target: how many.
+        step_cap: steps after which an episode has failed.
+        seed: of starts, actions and perturbations.
+        selection: how actions are chosen by the policy's probabilities.
+        history_length: K.
+    """
+
+    episodes_per_target: int
+    step_cap: int
+    seed: int
+    selection: LiveSelection
+    history_length: int
+
+
+def run_live_episodes(
+    live: LiveRoom,
+    world: World,
+    policy: LivePolicy,
+    encoder: Encoder,
+    camera: Camera,
+    perturbations: Perturbations,
+    protocol: LiveProtocol,
+    show_steps: Callable[[int], None] | None = None,
+) -> LiveTable:
+    """Walk episodes to every target of one scene.
+
+    Args:
+        live: the room.
+        world: of the room's scene alone, with its features.
+        policy: what the agent does by what it sees.
+        encoder: that of the scene's features.
+        camera: takes pictures of `live.model`.
+        perturbations: what is different from the grid.
+        protocol: how many episodes, how long, and so on.
+        show_steps: called after every step with the number of episodes still walking.
+    """
+    target = torch.arange(world.target_count).repeat_interleave(protocol.episodes_per_target)
+    seeds = episode_seeds(world, protocol.episodes_per_target, protocol.seed)
+    env = Navigation(world, COLLISION_AWARE, seeds, history_length=protocol.history_length)
+    env.reset(target=target)
+    walkers = [
+        _Walker(live, int(start), int(world.target_state[goal]), Draws(int(seed), perturbations))
+        for start, goal, seed in zip(env.state, target, seeds, strict=True)
+    ]
+    assert world.features is not None
+    wanted = world.features[world.target_state[target]]
+    chances = Streams(seeds, ACTION_STREAM)
+    walking = np.arange(len(walkers))
+    seen = _features(walkers, camera, encoder)
+    history = seen[:, None].repeat(1, protocol.history_length, 1)  # (B, K, F)
+    for _ in range(protocol.step_cap):
+        index = torch.from_numpy(walking)
+        actions = _chosen(policy(history, wanted[index]), chances.at(index), protocol.selection)
+        for episode, action in zip(walking, actions.tolist(), strict=True):
+            walkers[episode].act(Action(action))
+        still = np.array([not walkers[episode].reached for episode in walking])
+        walking = walking[still]
+        if show_steps is not None:
+            show_steps(len(walking))
+        if not len(walking):
+            break
+        seen = _features([walkers[episode] for episode in walking], camera, encoder)
+        history = torch.cat([history[torch.from_numpy(still), 1:], seen[:, None]], dim=1)
+    distance = world.distance_table()[target, env.state].numpy()
+    return _table(walkers, target.numpy(), distance)
+
+
+class _Walker:
+    """One episode: the body in its layout of the room, and what has happened so far."""
+
+    def __init__(self, live: LiveRoom, start: int, target: int, draws: Draws) -> None:
+        scene = live.scene
+        self.start, self.draws = start, draws
+        self.layout = _layout(live, start, target, draws)
+        self.body = Body(arranged(live.room, self.layout))
+        self.body.stand_at(scene.locations_m[start])
+        self.heading_deg = float(scene.headings_deg[start])
+        self.target_m, self.target_heading_deg = scene.locations_m[target], float(scene.headings_deg[target])
+        self.cell_size_m, self.turn_deg = scene.cell_size_m, scene.turn_deg
+        self.changed = self.layout != as_built(live.room)
+        self.steps: list[Step] = []
+        self.walk = [self._pose()]
+
+    def _pose(self) -> tuple[float, float, float]:
+        x_m, z_m = self.body.place_m.tolist()
+        return x_m, z_m, self.heading_deg
+
+    def act(self, action: Action) -> None:
+        """Take a step."""
+        if action in (Action.MOVE_FORWARD, Action.MOVE_BACKWARD):
+            sign = 1 if action is Action.MOVE_FORWARD else -1
+            step = self.body.move(sign * (self.cell_size_m + self.draws.distance_error_m()), self.heading_deg)
+        else:
+            sign = 1 if action is Action.TURN_RIGHT else -1
+            turned_deg = self.heading_deg + sign * (self.turn_deg + self.draws.angle_error_deg())
+            self.heading_deg = turned_deg % 360
+            step = self.body.wait()
+        self.steps.append(step)
+        self.walk.append(self._pose())
+
+    @property
+    def reached(self) -> bool:
+        """The body is at the target and looks its way."""
+        off_deg = abs((self.heading_deg - self.target_heading_deg + 180) % 360 - 180)
+        return bool(np.linalg.norm(self.body.place_m - self.target_m) <= SUCCESS_M and off_deg <= SUCCESS_DEG)
+
+    def shot_arguments(self) -> tuple[tuple[float, float, float], float, float]:
+        """Pose, camera height and pitch of the next picture."""
+        return self._pose(), CAMERA_HEIGHT_M + self.draws.height_error_m(), self.draws.pitch_error_deg()
+
+
+def _layout(live: LiveRoom, start: int, target: int, draws: Draws) -> Layout:
+    """The layout of an episode."""
+    layout, wanted = as_built(live.room), draws.perturbations
+    if wanted.move_furniture:
+        rng = draws.generator(FURNITURE)
+        layout = furniture_moved(live.room, live.scene, start, target, wanted.move_furniture, rng)
+    if wanted.new_obstacle:
+        rng = draws.generator(OBSTACLE)
+        layout = with_obstacle_on_path(live.room, live.scene, layout, start, target, rng)
+    return layout
+
+
+def _features(walkers: list[_Walker], camera: Camera, encoder: Encoder) -> Tensor:
+    """Features (B, F) of what each sees."""
+    shots = []
+    for walker in walkers:
+        pose, height_m, pitch_deg = walker.shot_arguments()
+        moved_m = walker.layout.bodies_m
+        shots.append(first_person_shot(*pose, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m))
+    pictures = camera(shots)
+    pictures = np.stack([walker.draws.seen(picture) for walker, picture in zip(walkers, pictures, strict=True)])
+    batches = range(0, len(pictures), PICTURES_AT_ONCE)
+    return torch.cat([torch.from_numpy(encoder.encode(pictures[b : b + PICTURES_AT_ONCE])) for b in batches])
+
+
+def _chosen(probabilities: Tensor, chance: Tensor, selection: LiveSelection) -> Tensor:
+    """Actions (B,) int64 by probabilities (B, A); chance: (B,) in [0, 1)."""
+    if selection == "argmax":
+        return probabilities.argmax(1)
+    bounds = probabilities.to(torch.float64).cumsum(1)
+    return ((chance * bounds[:, -1])[:, None] >= bounds[:, :-1]).sum(1)
+
+
+def _table(walkers: list[_Walker], target: np.ndarray, distance: np.ndarray) -> LiveTable:
+    gaps_m = [np.concatenate([step.gaps_m for step in walker.steps]) for walker in walkers]
+    sample_s = STEP_S / SAMPLES
+    return LiveTable(
+        target=target,
+        start=np.array([walker.start for walker in walkers]),
+        steps=np.array([len(walker.steps) for walker in walkers]),
+        contacts=np.array([sum(step.contact for step in walker.steps) for walker in walkers]),
+        reached=np.array([walker.reached for walker in walkers]),
+        shortest_path_steps=distance,
+        least_gap_m=np.array([gaps.min() for gaps in gaps_m]),
+        mean_gap_m=np.array([gaps.mean() for gaps in gaps_m]),
+        close_s=np.array([sample_s * (gaps < CLOSE_M).sum() for gaps in gaps_m]),
+        near_s=np.array([sample_s * (gaps < NEAR_M).sum() for gaps in gaps_m]),
+        changed=np.array([walker.changed for walker in walkers]),
+        layouts=tuple(walker.layout for walker in walkers),
+        walks=tuple(np.array(walker.walk) for walker in walkers),
+    )

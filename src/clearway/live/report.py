@@ -1,0 +1,187 @@
+"""What live episodes come to: figures with intervals for each agent, and how two agents compare.
+
+As on the grid, a scene's value is the plain mean over its targets and the average the plain mean over scenes; intervals
+are stratified bootstraps over episodes. Two agents face the same starts and the same chances, so they are compared
+episode by episode.
+
+Axis letters: N episodes, J metrics, M targets, R resamples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from clearway.evaluate import bootstrap
+from clearway.evaluate.metrics import average, by_scene
+from clearway.live.episodes import STEP_S, LiveTable
+from clearway.live.settings import Perturbations
+
+Interval = tuple[float, float]
+TIE_M = 0.001  # the body draws back a millimetre from what it touches
+
+
+def _seconds(table: LiveTable) -> np.ndarray:
+    return table.steps * STEP_S
+
+
+def _ones(table: LiveTable) -> np.ndarray:
+    return np.ones(len(table))
+
+
+METRICS: dict[str, tuple[Callable[[LiveTable], np.ndarray], Callable[[LiveTable], np.ndarray]]] = {
+    "success": (lambda table: table.reached, _ones),
+    "steps": (lambda table: table.steps, _ones),
+    "shortest_path_steps": (lambda table: table.shortest_path_steps, _ones),
+    "contacts": (lambda table: table.contacts, _ones),
+    "contacts_per_100_steps": (lambda table: 100 * table.contacts, lambda table: table.steps),
+    "contact_free": (lambda table: table.contacts == 0, _ones),
+    "min_clearance_m": (lambda table: table.least_gap_m, _ones),
+    "mean_clearance_m": (lambda table: table.mean_gap_m * _seconds(table), _seconds),
+    "within_10cm_s": (lambda table: table.close_s, _ones),
+    "within_30cm_s": (lambda table: table.near_s, _ones),
+    "share_within_10cm": (lambda table: table.close_s, _seconds),
+    "share_within_30cm": (lambda table: table.near_s, _seconds),
+    "rearranged": (lambda table: table.changed, _ones),
+}
+"""A target's value is the sum of the first over its episodes by that of the second; docs/metrics.md explains each."""
+
+COMPARED = ("success", "contacts", "min_clearance_m", "mean_clearance_m", "share_within_10cm", "share_within_30cm")
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Values by name, each with its 95 % interval."""
+
+    values: Mapping[str, float]
+    intervals: Mapping[str, Interval]
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values."""
+        return {**self.values, "intervals": {name: list(ends) for name, ends in self.intervals.items()}}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How the second agent differs from the first, episode by episode.
+
+    Attributes:
+        first, second: their names.
+        differences: second less first, of `COMPARED`.
+        larger_clearance: probability that the second keeps the larger least clearance in an episode, a tie (to a
+            millimetre) counting half; with its interval under the same name.
+    """
+
+    first: str
+    second: str
+    differences: Figures
+    larger_clearance: Figures
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values."""
+        return {
+            "first": self.first,
+            "second": self.second,
+            "second_less_first": self.differences.to_json(),
+            **self.larger_clearance.to_json(),
+        }
+
+
+@dataclass(frozen=True)
+class LiveResult:
+    """One setting of the room.
+
+    Attributes:
+        label: of the setting.
+        perturbations: what was changed.
+        agents: figures by the agent's name.
+        comparison: of two agents; None for one.
+    """
+
+    label: str
+    perturbations: Perturbations
+    agents: Mapping[str, Figures]
+    comparison: Comparison | None
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values."""
+        return {
+            "setting": self.label,
+            "perturbations": self.perturbations.to_json(),
+            "agents": {name: figures.to_json() for name, figures in self.agents.items()},
+            "comparison": None if self.comparison is None else self.comparison.to_json(),
+        }
+
+
+def summarise(
+    label: str, perturbations: Perturbations, tables: Mapping[str, Sequence[LiveTable]], seed: int
+) -> LiveResult:
+    """What a setting comes to.
+
+    Args:
+        label: of the setting.
+        perturbations: what was changed.
+        tables: for each agent's name its episodes, a table a scene; two agents at most.
+        seed: of the bootstrap.
+    """
+    agents = {name: _figures(list(METRICS), *_agent_columns(own), _places(own), seed) for name, own in tables.items()}
+    comparison = None
+    if len(tables) == 2:
+        (first, first_tables), (second, second_tables) = tables.items()
+        comparison = _compared(first, second, first_tables, second_tables, seed)
+    return LiveResult(label, perturbations, agents, comparison)
+
+
+def _agent_columns(tables: Sequence[LiveTable]) -> tuple[np.ndarray, np.ndarray]:
+    """Numerators and denominators of all metrics, two (N, J) arrays."""
+    columns = [np.concatenate([_columns(table, part) for table in tables]) for part in (0, 1)]
+    return columns[0], columns[1]
+
+
+def _columns(table: LiveTable, part: int) -> np.ndarray:
+    return np.stack([metric[part](table) for metric in METRICS.values()], axis=1).astype(np.float64)
+
+
+def _places(tables: Sequence[LiveTable]) -> tuple[np.ndarray, np.ndarray]:
+    """Target of each episode, (N,), counted over all scenes; scene of each target, (M,)."""
+    counts = [int(table.target.max()) + 1 for table in tables]
+    first = np.cumsum([0, *counts])
+    target = np.concatenate([table.target + offset for table, offset in zip(tables, first, strict=False)])
+    return target, np.repeat(np.arange(len(tables)), counts)
+
+
+def _figures(
+    names: Sequence[str],
+    numerator: np.ndarray,
+    denominator: np.ndarray,
+    places: tuple[np.ndarray, np.ndarray],
+    seed: int,
+) -> Figures:
+    """Averages over scenes of columns (N, J) by name, with their intervals."""
+    target, scene_of_target = places
+    total = [np.zeros((len(scene_of_target), numerator.shape[1])) for _ in range(2)]
+    for sums, column in zip(total, (numerator, denominator), strict=True):
+        np.add.at(sums, target, column)
+    value = average(by_scene(total[0] / total[1], scene_of_target))
+    drawn = bootstrap.resampled_by_target(numerator, denominator, target, seed=seed)
+    low, high = bootstrap.intervals(average(by_scene(drawn, scene_of_target)))
+    ends = zip(low.tolist(), high.tolist(), strict=True)
+    return Figures(dict(zip(names, value.tolist(), strict=True)), dict(zip(names, ends, strict=True)))
+
+
+def _compared(
+    first: str, second: str, first_tables: Sequence[LiveTable], second_tables: Sequence[LiveTable], seed: int
+) -> Comparison:
+    """Paired by episode; for the metrics that are quotients, of the quotients of an episode."""
+    chosen = [list(METRICS).index(name) for name in COMPARED]
+    columns = [_agent_columns(tables) for tables in (first_tables, second_tables)]
+    values = [(numerator / denominator)[:, chosen] for numerator, denominator in columns]
+    places = _places(first_tables)
+    difference = values[1] - values[0]
+    differences = _figures(COMPARED, difference, np.ones_like(difference), places, seed)
+    gap_m = difference[:, [COMPARED.index("min_clearance_m")]]
+    larger = np.where(np.abs(gap_m) <= TIE_M, 0.5, (gap_m > 0).astype(np.float64))
+    larger_figures = _figures(["probability_of_larger_clearance"], larger, np.ones_like(larger), places, seed)
+    return Comparison(first, second, differences, larger_figures)

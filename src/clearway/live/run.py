@@ -1,0 +1,141 @@
+"""Live evaluation of one or two runs, setting after setting."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from clearway.envs.world import World, make_world
+from clearway.errors import RunError
+from clearway.files import written_whole
+from clearway.learn.load import Agent
+from clearway.live.agent import live_policy
+from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
+from clearway.live.report import LiveResult, summarise
+from clearway.live.room import LiveRoom, live_room
+from clearway.live.settings import Setting
+from clearway.live.tables import markdown_tables
+from clearway.perception.encode import encoder_from_record
+from clearway.perception.encoder import Encoder
+from clearway.scenes.rooms.camera import eye_view
+from clearway.scenes.rooms.render import Camera, studio
+from clearway.scenes.scene import Scene
+
+JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One scene, ready to be walked in.
+
+    Attributes:
+        live: its room.
+        world: of the scene alone, with the targets.
+        encoder: that of the scene's features.
+        camera: open for the room.
+    """
+
+    live: LiveRoom
+    world: World
+    encoder: Encoder
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class LiveOutcome:
+    """One setting: the result, and for each agent's name its episodes, a table a scene."""
+
+    setting: Setting
+    result: LiveResult
+    tables: Mapping[str, tuple[LiveTable, ...]]
+
+
+def check_alike(agents: Mapping[str, Agent]) -> None:
+    """Check that agents can be compared episode by episode.
+
+    Raises:
+        RunError: they have other scenes, targets or a history of another length.
+    """
+    first, *others = (agent.record for agent in agents.values())
+    for record in others:
+        alike = record.targets == first.targets and record.learner.history_length == first.learner.history_length
+        if not alike or [scene.digest for scene in record.scenes] != [scene.digest for scene in first.scenes]:
+            raise RunError("the runs differ in their scenes, targets or history length. Evaluate them one by one")
+
+
+@contextmanager
+def stages(agents: Mapping[str, Agent], scenes: Sequence[Scene]) -> Iterator[list[Stage]]:
+    """Build the rooms of the agents' scenes and open a camera in each, for the block.
+
+    Raises:
+        SceneError: a scene is none of our rooms.
+        EncoderError: an encoder cannot be had again.
+    """
+    record = next(iter(agents.values())).record
+    with ExitStack() as opened:
+        found = []
+        for scene in scenes:
+            live = live_room(scene)
+            if scene.encoder is None:
+                raise RunError(f"scene {scene.name} has no record of its encoder. Encode it and train again")
+            encoder = encoder_from_record(scene.encoder)
+            world = make_world([scene], {scene.name: record.targets[scene.name]}, record.zone_level)
+            found.append(Stage(live, world, encoder, opened.enter_context(studio(live.model, eye_view()))))
+        yield found
+
+
+def walk_setting(
+    places: Sequence[Stage],
+    agents: Mapping[str, Agent],
+    setting: Setting,
+    protocol: LiveProtocol,
+    show: Callable[[str], None] | None = None,
+) -> LiveOutcome:
+    """All agents' episodes in all scenes under one setting; `show` is told what goes on."""
+    tables = {}
+    for name, agent in agents.items():
+        own = []
+        for index, stage in enumerate(places):
+            label = f"{setting.label}: {name} in {stage.live.scene.name}"
+
+            def show_walking(walking: int, label: str = label) -> None:
+                if show is not None:
+                    show(f"{label}, {walking} episodes walking")
+
+            own.append(
+                run_live_episodes(
+                    stage.live,
+                    stage.world,
+                    live_policy(agent, index),
+                    stage.encoder,
+                    stage.camera,
+                    setting.perturbations,
+                    protocol,
+                    show_walking,
+                )
+            )
+        tables[name] = tuple(own)
+    return LiveOutcome(setting, summarise(setting.label, setting.perturbations, tables, protocol.seed), tables)
+
+
+def live_json(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> dict[str, object]:
+    """All results as JSON values."""
+    return {
+        "encoder": encoder,
+        "episodes_per_target": protocol.episodes_per_target,
+        "step_cap": protocol.step_cap,
+        "seed": protocol.seed,
+        "action_selection": protocol.selection,
+        "results": [result.to_json() for result in results],
+    }
+
+
+def write_live(folder: Path, results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> None:
+    """Leave live.json and live.md in a run folder."""
+    with written_whole(folder / JSON_FILE) as part:
+        part.write_text(json.dumps(live_json(results, protocol, encoder), indent=2) + "\n", encoding="utf-8")
+    with written_whole(folder / MARKDOWN_FILE) as part:
+        part.write_text(markdown_tables(results, protocol, encoder), encoding="utf-8")

@@ -1,0 +1,103 @@
+"""`clearway evaluate --live` from a trained run to its tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from clearway.learn.train import train
+from clearway.reward import COLLISION_AWARE, SHORTEST
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from small_live import walkable_room, walkable_scene
+from small_runs import small_request
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Two runs in the small room."""
+
+    wary: Path
+    bold: Path
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runs]:
+    folder = tmp_path_factory.mktemp("live")
+    path = folder / "walkable.h5"
+    write_scene(walkable_scene(walkable_room()), path)
+    scene = read_scene(path)
+    found = {}
+    for name, reward in (("wary", COLLISION_AWARE), ("bold", SHORTEST)):
+        request = small_request(
+            scenes=[scene],
+            targets={scene.name: (8, 41)},
+            paths={scene.name: path},
+            reward=reward,
+        )
+        found[name] = train(request, folder / name).path
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("clearway.scenes.rooms.build_room", lambda *room, **options: walkable_room())
+        yield Runs(**found)
+
+
+SHORT = ("--live", "--episodes", 2, "--step-cap", 4)
+
+
+def test_two_runs_are_compared_and_the_run_folder_keeps_the_tables(clearway, runs, tmp_path):
+    answer = clearway("evaluate", runs.bold, *SHORT, "--against", runs.wary, "--new-obstacle", "--json",
+                      "--pictures", tmp_path / "pictures")  # fmt: skip
+    assert answer.code == 0, answer
+    (result,) = answer.json["results"]
+    assert answer.json["episodes_per_target"] == 2 and answer.json["step_cap"] == 4
+    assert result["setting"] == "new obstacle"
+    assert set(result["agents"]) == {"shortest", "collision-aware"}
+    assert result["comparison"]["first"] == "shortest"
+    assert result["agents"]["shortest"]["rearranged"] > 0
+    assert json.loads((runs.bold / "live.json").read_text()) == answer.json
+    assert "| new obstacle | shortest |" in (runs.bold / "live.md").read_text()
+    for name in ("live.png", "live-walkable.png"):
+        assert (tmp_path / "pictures" / name).read_bytes()[:4] == b"\x89PNG"
+
+
+def test_one_run_alone_is_a_table(clearway, runs):
+    answer = clearway("evaluate", runs.bold, *SHORT, "--selection", "argmax")
+    assert answer.code == 0, answer
+    assert "none" in answer.out and "Actions argmax" in answer.out and "less" not in answer.out
+
+
+def test_a_sweep_has_a_row_a_setting(clearway, runs):
+    answer = clearway(
+        "evaluate", runs.bold, "--live", "--episodes", 1, "--step-cap", 1, "--sweep", "--strengths", 1, "--json"
+    )
+    assert answer.code == 0, answer
+    labels = [result["setting"] for result in answer.json["results"]]
+    assert len(labels) == 10 and labels[0] == "none" and labels[-1] == "all, strength 1"
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("--light", "0.3"), ("--live",)),
+        (("--live", "--light", "-0.1"), ("--light is below 0",)),
+        (("--live", "--pixel-noise", "nan"), ("--pixel-noise is nan",)),
+        (("--live", "--sweep", "--light", "0.1"), ("--sweep sets the perturbations itself",)),
+        (("--live", "--sweep", "--strengths", "0"), ("--strengths is 0",)),
+        (("--live", "--episodes", "0"), ("--episodes is 0",)),
+        (("--live", "--selection", "argmax-untried"), ("argmax-untried",)),
+    ],
+    ids=" ".join,
+)
+def test_flags_that_cannot_be_used(clearway, runs, words, parts):
+    clearway("evaluate", runs.bold, *words).refusal(*parts)
+
+
+def test_the_same_run_twice_is_refused(clearway, runs):
+    clearway("evaluate", runs.bold, *SHORT, "--against", runs.bold).refusal("--against", "the same run")
+
+
+def test_a_run_on_an_imported_scene_is_refused(clearway, trained):
+    clearway("evaluate", trained.run, "--live").refusal("bathroom_02", "thor_v1", "scenes build")

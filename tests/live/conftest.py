@@ -1,0 +1,9 @@
+import pytest
+
+from clearway.live.room import LiveRoom
+from small_live import walkable_live
+
+
+@pytest.fixture(scope="session")
+def live() -> LiveRoom:
+    return walkable_live()

@@ -1,0 +1,98 @@
+"""Figures of typed-in episodes, and what their tables say."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from clearway.live.episodes import LiveProtocol, LiveTable
+from clearway.live.layout import Layout
+from clearway.live.report import LiveResult, summarise
+from clearway.live.settings import Perturbations
+from clearway.live.tables import agent_rows, compared_rows, markdown_tables
+
+PROTOCOL = LiveProtocol(2, 10, 0, "sampled", 4)
+
+
+def table(**columns: list[float]) -> LiveTable:
+    """Two targets, two episodes each."""
+    plain: dict[str, list[float]] = {
+        "start": [0, 0, 0, 0],
+        "steps": [10, 4, 5, 5],
+        "contacts": [3, 0, 0, 1],
+        "reached": [False, True, True, True],
+        "shortest_path_steps": [4, 4, 5, 5],
+        "least_gap_m": [0.0, 0.05, 0.2, 0.0],
+        "mean_gap_m": [0.1, 0.3, 0.4, 0.2],
+        "close_s": [5.0, 1.0, 0.0, 1.0],
+        "near_s": [10.0, 2.0, 1.0, 4.0],
+        "changed": [False, False, False, False],
+    }
+    arrays = {name: np.array(values) for name, values in (plain | columns).items()}
+    return LiveTable(target=np.array([0, 0, 1, 1]), layouts=(Layout(()),) * 4, walks=(np.zeros((1, 3)),) * 4, **arrays)
+
+
+def wary() -> LiveTable:
+    return table(
+        contacts=[0, 0, 0, 0], reached=[True] * 4, steps=[4, 4, 5, 5], least_gap_m=[0.1, 0.0505, 0.1, 0.1],
+        close_s=[0.0, 0.0, 0.0, 0.0], near_s=[2.0, 2.0, 1.0, 1.0],
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result() -> LiveResult:
+    return summarise("none", Perturbations(), {"bold": [table()], "wary": [wary()]}, seed=0)
+
+
+def test_values_are_means_over_targets(result):
+    values = result.agents["bold"].values
+    assert values["success"] == pytest.approx((0.5 + 1.0) / 2)
+    assert values["steps"] == pytest.approx((7 + 5) / 2)
+    assert values["contacts"] == pytest.approx((1.5 + 0.5) / 2)
+    assert values["contacts_per_100_steps"] == pytest.approx((300 / 14 + 100 / 10) / 2)
+    assert values["contact_free"] == 0.5
+    assert values["min_clearance_m"] == pytest.approx((0.025 + 0.1) / 2)
+    assert values["mean_clearance_m"] == pytest.approx(((10 * 0.1 + 4 * 0.3) / 14 + 0.3) / 2)
+    assert values["share_within_10cm"] == pytest.approx((6 / 14 + 1 / 10) / 2)
+    assert values["share_within_30cm"] == pytest.approx((12 / 14 + 5 / 10) / 2)
+    assert values["within_30cm_s"] == pytest.approx((6 + 2.5) / 2)
+
+
+def test_every_value_lies_in_its_interval(result):
+    for figures in result.agents.values():
+        for name, (low, high) in figures.intervals.items():
+            assert low - 1e-9 <= figures.values[name] <= high + 1e-9, name
+
+
+def test_agents_are_compared_episode_by_episode(result):
+    found = result.comparison
+    assert found is not None and (found.first, found.second) == ("bold", "wary")
+    assert found.differences.values["success"] == pytest.approx(0.25)
+    assert found.differences.values["contacts"] == pytest.approx(-1.0)
+    assert found.differences.values["min_clearance_m"] == pytest.approx((0.1 + 0.0005 - 0.1 + 0.1) / 4)
+    # larger, a tie to a millimetre, smaller, larger
+    assert found.larger_clearance.values["probability_of_larger_clearance"] == pytest.approx((0.75 + 0.5) / 2)
+
+
+def test_scenes_count_alike():
+    few = LiveTable(**{**vars(table()), "target": np.array([0, 0, 0, 0]), "contacts": np.array([8, 8, 8, 8])})
+    both = summarise("none", Perturbations(), {"bold": [table(), few]}, seed=0)
+    assert both.agents["bold"].values["contacts"] == pytest.approx((1.0 + 8.0) / 2)
+    assert both.comparison is None and compared_rows([both]) == []
+
+
+def test_tables_show_figures_with_intervals_and_say_what_success_means(result):
+    (_, name, cells), *_ = agent_rows([result])
+    assert name == "bold" and cells[0][0] == "75" and cells[1][0] == "6.0"
+    text = markdown_tables([result], PROTOCOL, "tiny")
+    assert "| none | wary | 100 (100–100) |" in text
+    assert "wary less bold" in text and "within 25 cm and 45°" in text and "Encoder: tiny" in text
+
+
+def test_results_are_json(result):
+    content = json.loads(json.dumps(result.to_json()))
+    assert content["agents"]["bold"]["success"] == 0.75
+    assert content["comparison"]["probability_of_larger_clearance"] == 0.625
+    assert content["perturbations"]["new_obstacle"] is False
