@@ -39,7 +39,7 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
             if top_m == 0 and not doors and usable_m > 1.05:
                 openings.door(room, at)
                 doors += 1
-            elif window_here and usable_m > 0.7 and room.rng.random() < 0.6:
+            elif window_here and usable_m > 0.7 and (room.rng.random() < 0.6 or not room.windows):
                 _window(room, at, usable_m, top_m)
             else:
                 _hang(room, at, usable_m, top_m)

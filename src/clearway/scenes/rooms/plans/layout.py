@@ -114,18 +114,19 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
     for number, (i0, j0, i1, j1) in enumerate(boxes):
         owners[i0:i1, j0:j1] = number
     width_m, depth_m = (_line_m(count, size_m) + GAP * size_m for count in free.shape)
-    corner_m = tuple((cell - 0.5 - GAP) * size_m for cell in first_cell)
+    x_m, z_m = ((cell - 0.5 - GAP) * size_m for cell in first_cell)
+    blocked_edges = plan.blocked_edges.astype(np.int64) - np.array(first_cell)
     return Layout(
-        width_m,
-        depth_m,
-        (corner_m[0], corner_m[1]),
-        size_m,
-        first_cell,
-        free,
-        _walls(free, outside, size_m),
-        tuple(_partition(*pair, size_m) for pair in plan.blocked_edges - np.array(first_cell)),
-        tuple(_piece(box, owners, size_m) for box in boxes),
-        _stretches(owners, size_m),
+        width_m=width_m,
+        depth_m=depth_m,
+        origin_m=(x_m, z_m),
+        cell_size_m=size_m,
+        first_cell=first_cell,
+        free=free,
+        walls=_walls(free, outside, size_m),
+        partitions=tuple(_partition(one, other, size_m) for one, other in blocked_edges),
+        pieces=tuple(_piece(box, owners, size_m) for box in boxes),
+        stretches=_stretches(owners, size_m),
     )
 
 

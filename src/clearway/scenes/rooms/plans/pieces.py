@@ -148,13 +148,13 @@ def _cupboard(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
     decor.stack_of_books(room, at, height_m)
 
 
-KITCHEN = (
+KITCHEN: tuple[Kind, ...] = (
     Kind(_counter, (0.4, 2.4), (0.35, 0.85), 0.9, at_wall=True),
     Kind(_pantry, (0.5, 2.2), (0.35, 0.85), 2.0, at_wall=True),
     Kind(_sideboard, (0.8, 2.2), (0.35, 0.7), 0.9),
     Kind(_table, (0.7, 2.4), (0.6, 2.0), 0.75, at_wall=False),
 )
-LIVING = (
+LIVING: tuple[Kind, ...] = (
     Kind(_bookcase, (0.35, 1.4), (0.15, 0.6), 1.9),
     Kind(_sideboard, (0.8, 2.2), (0.35, 0.7), 0.9),
     Kind(_television, (1.25, 2.2), (0.35, 0.7), 1.2, at_wall=True, once=True),
@@ -162,7 +162,7 @@ LIVING = (
     Kind(_sofa, (0.7, 2.4), (0.7, 1.4), 0.76),
     Kind(_table, (0.7, 2.4), (0.6, 2.0), 0.75, at_wall=False),
 )
-BEDROOM = (
+BEDROOM: tuple[Kind, ...] = (
     Kind(_wardrobe, (0.5, 2.2), (0.35, 1.0), 2.1, at_wall=True),
     Kind(_chest, (0.35, 1.8), (0.2, 0.8), 1.05),
     Kind(_white_chest, (0.35, 1.8), (0.25, 0.8), 0.95),
@@ -171,7 +171,7 @@ BEDROOM = (
     Kind(_sofa, (0.7, 2.4), (0.7, 1.4), 0.76),
 )
 THEMES = (KITCHEN, LIVING, BEDROOM)
-ANYWHERE = (
+ANYWHERE: tuple[Kind, ...] = (
     Kind(_stand, (0.08, 0.45), (0.08, 0.45), 1.01),
     Kind(_pillar, (0.08, 0.45), (0.08, 0.45), 2.6, at_wall=False),
     Kind(_low_shelf, (0.35, 1.5), (0.12, 0.45), 1.2),
@@ -189,14 +189,13 @@ def furnish(room: Room, pieces: Sequence[Piece], nearest_m: float) -> list[float
         pieces: the places.
         nearest_m: how near the agent's camera comes to furniture.
     """
-    theme = THEMES[int(room.layout_rng.integers(len(THEMES)))]
+    kinds = THEMES[int(room.layout_rng.integers(len(THEMES)))] + ANYWHERE
     used: set[Kind] = set()
     tops_m = []
     for piece in pieces:
         lowest_m = _lowest_seen_m(nearest_m + min(piece.width_m, piece.depth_m) / 2)
-        fitting = [kind for kind in (theme, ANYWHERE) for kind in kind if kind.fits(piece, lowest_m)]
-        fresh = [kind for kind in fitting if kind not in used] or [LAST_RESORT]
-        kind = fresh[int(room.layout_rng.integers(len(fresh)))]
+        fitting = [kind for kind in kinds if kind not in used and kind.fits(piece, lowest_m)] or [LAST_RESORT]
+        kind = fitting[int(room.layout_rng.integers(len(fitting)))]
         if kind.once:
             used.add(kind)
         kind.place(room, piece.at, piece.width_m, piece.depth_m)

@@ -74,4 +74,4 @@ def open_plan(room: Room, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
 
 def _same(one: np.ndarray, other: np.ndarray) -> bool:
     """Whether two arrays hold the same rows, in whatever order."""
-    return bool(np.array_equal(*(np.unique(rows, axis=0) for rows in (one, other))))
+    return np.array_equal(np.unique(one, axis=0), np.unique(other, axis=0))

@@ -42,15 +42,15 @@ def _largest_from(left: np.ndarray, i: int, j: int, widest: int) -> Box:
     """The larger of two boxes with this first cell: grown along one index as far as it goes, then along the other."""
     along_first = _run(left[i:, j])
     along_second = _run(left[i, j:])
-    across_second = _run(left[i : i + along_first, j : j + widest].all(axis=0))
-    across_first = _run(left[i : i + widest, j : j + along_second].all(axis=1))
+    across_second = _run(np.all(left[i : i + along_first, j : j + widest], axis=0))
+    across_first = _run(np.all(left[i : i + widest, j : j + along_second], axis=1))
     if along_first * across_second > along_second * across_first:
         return i, j, i + along_first, j + across_second
     return i, j, i + across_first, j + along_second
 
 
 def _run(flags: np.ndarray) -> int:
-    """How many are set before the first that is not."""
+    """How many of (N,) flags are set before the first that is not."""
     return len(flags) if flags.all() else int(flags.argmin())
 
 
