@@ -1,6 +1,6 @@
 import numpy as np
 
-from clearway.scenes.grid import neighbour_pairs, pose_graph
+from clearway.scenes.grid import connected_parts, edges_among, neighbour_pairs, pose_graph
 from imported import imported_by
 
 
@@ -28,6 +28,14 @@ def test_neighbours_share_a_side() -> None:
 def test_a_single_cell_has_no_neighbours() -> None:
     pairs, axes = neighbour_pairs(np.array([[3, 4]]))
     assert pairs.shape == (0, 2) and axes.shape == (0,)
+
+
+def test_the_largest_part_comes_first_and_its_edges_are_renumbered() -> None:
+    edges = np.array([[0, 2], [1, 3], [3, 4]])
+    part, sizes = connected_parts(6, edges)
+    assert part.tolist() == [1, 0, 1, 0, 0, 2]
+    assert sizes == (3, 2, 1)
+    assert edges_among(part == 0, edges).tolist() == [[0, 1], [1, 2]]
 
 
 def test_a_grid_needs_no_simulator() -> None:

@@ -116,8 +116,10 @@ def test_the_scene_says_what_made_it(scene: Scene) -> None:
 
 def test_what_does_not_fit_is_refused_before_any_picture(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importer, "_pictures", lambda *_: pytest.fail("photographed"))
-    with pytest.raises(SceneError, match="has 800 x 300 places to try, expected at most 65536"):
+    with pytest.raises(SceneError, match="has 240,000 places to try, expected at most 65,536"):
         photographed(world, "TwoRooms", step_m=0.01, **SIZE)
+    with pytest.raises(SceneError, match="has inf places to try"):
+        photographed(world, "TwoRooms", step_m=5e-324, **SIZE)
     with pytest.raises(SceneError, match=r"radius of 0\.4 m fits nowhere on a grid of 10 m"):
         photographed(world, "TwoRooms", step_m=10.0, **SIZE)
     monkeypatch.setattr(limits, "MAX_STATES", 8)

@@ -140,7 +140,7 @@ def test_a_floor_reaches_as_far_as_finite_geoms_or_as_said() -> None:
 @pytest.mark.parametrize(
     ("extent_m", "problem"),
     [
-        ((0.0, 900.0, 0.0, 900.0), "1801 x 1801 places to try, expected at most 262144"),
+        ((0.0, 900.0, 0.0, 900.0), "3,243,601 places to try, expected at most 262,144"),
         ((0.0, 1e5, 0.0, 1.0), "numbers up to 10,000"),
         ((1.0, 0.0, 0.0, 1.0), "lengths above 0"),
         ((0.0, float("nan"), 0.0, 1.0), "lengths above 0"),
@@ -155,6 +155,12 @@ def test_a_world_too_large_is_refused_before_any_work(
     far = '<geom type="sphere" size="1" pos="5000 5000 0"/>'
     with pytest.raises(SceneError, match=r"maze\.xml: its floor spans .* places to try.*--extent"):
         found(ENDLESS_FLOOR + WALLS + far)
+
+
+@pytest.mark.parametrize("spawn_m", [(9.0, 0.0), (float("nan"), 0.0), (0.0, float("inf"))])
+def test_a_spawn_point_off_the_floor_is_refused(spawn_m: tuple[float, float]) -> None:
+    with pytest.raises(SceneError, match=r"not to the spawn point \(.*--spawn"):
+        found(ENDLESS_FLOOR + WALLS, World(spawn_m=spawn_m))
 
 
 def test_no_cell_where_the_floor_is_smaller_than_the_agent() -> None:

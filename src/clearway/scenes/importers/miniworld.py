@@ -30,6 +30,7 @@ SOURCE = "miniworld"
 MAX_GRID_POINTS = 1 << 16  # places where the agent is tried
 SWEEP_M = 0.05  # along a move, the agent's circle is tried this often
 BESIDE_M = 1e-3  # the border between two rooms lies in neither; a point this near counts
+ROUNDING = 1e-9  # 2.1 / 0.7 is a little less than 3
 TOP_VIEW_PX = (600, 800)  # height, width
 SAMPLES = 8  # a pixel, for smooth edges
 FEWER = "Give a larger --step"
@@ -116,9 +117,11 @@ def photographed(
 
 def _free_cells(env: Any, name: str, step_m: float) -> tuple[np.ndarray, np.ndarray]:
     """The largest connected part of the free cells, (C, 2) columns and rows, and its free moves, (E, 2)."""
-    columns, rows = (int((high - low) / step_m) for low, high in _extent(env))
-    if columns * rows > MAX_GRID_POINTS:
-        raise SceneError(name, f"has {columns} x {rows} places to try, expected at most {MAX_GRID_POINTS}", FEWER)
+    x_count, z_count = ((high - low) / step_m for low, high in _extent(env))
+    if x_count * z_count > MAX_GRID_POINTS:
+        problem = f"has {x_count * z_count:,.0f} places to try, expected at most {MAX_GRID_POINTS:,}"
+        raise SceneError(name, problem, FEWER)
+    columns, rows = int(x_count + ROUNDING), int(z_count + ROUNDING)
     points = np.stack(np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"), axis=-1).reshape(-1, 2)
     free = np.array([_fits(env, place_m) for place_m in _places(env, points, step_m)], bool)
     if not free.any():

@@ -15,7 +15,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.rooms.camera import CAMERA_HEIGHT_M
-from clearway.scenes.rooms.navigation import Floor, NavigationGrid, grid_on_floor, grid_shape
+from clearway.scenes.rooms.navigation import Floor, NavigationGrid, grid_on_floor
 from clearway.scenes.rooms.obstacles import AgentShape, Obstacles, body_geoms, bounding_boxes
 from clearway.scenes.validate import MAX_COORDINATE_M
 
@@ -48,9 +48,8 @@ def floor_of(path: Path, model: mujoco.MjModel, data: mujoco.MjData, world: Worl
     """The rectangle that the agent may stand in.
 
     Raises:
-        SceneError: it cannot be told, has no area, lies too far off, or has too many places to try.
+        SceneError: it cannot be told, has no area, lies too far off, is too large, or the spawn point is not on it.
     """
-    origin_m = world.spawn_m or (0.0, 0.0)
     if world.extent_m is None:
         low_m, high_m = span_of(model, data)
         if not np.isfinite(low_m).all():
@@ -60,16 +59,19 @@ def floor_of(path: Path, model: mujoco.MjModel, data: mujoco.MjData, world: Worl
         x_low_m, x_high_m, z_low_m, z_high_m = world.extent_m
     sides = f"its floor spans x from {x_low_m:g} to {x_high_m:g} m and z from {z_low_m:g} to {z_high_m:g} m"
     sane = all(low < high for low, high in ((x_low_m, x_high_m), (z_low_m, z_high_m)))
-    sane = sane and all(abs(side) <= MAX_COORDINATE_M for side in (x_low_m, x_high_m, z_low_m, z_high_m))
-    if not sane:
+    if not sane or not all(abs(side) <= MAX_COORDINATE_M for side in (x_low_m, x_high_m, z_low_m, z_high_m)):
         problem = f"{sides}, expected lengths above 0 and numbers up to {MAX_COORDINATE_M:,.0f}"
         raise SceneError(path, problem, f"Say how far it reaches: {EXTENT}")
-    floor = Floor((x_low_m, z_low_m), (x_high_m, z_high_m), origin_m)
-    columns, rows = grid_shape(floor, step_m)
-    if columns * rows > MAX_GRID_POINTS:
-        problem = f"{sides}: {columns} x {rows} places to try, expected at most {MAX_GRID_POINTS}"
+    x_m, z_m = origin_m = world.spawn_m or (0.0, 0.0)
+    if world.spawn_m is not None and not (x_low_m <= x_m <= x_high_m and z_low_m <= z_m <= z_high_m):
+        raise SceneError(
+            path, f"{sides}, not to the spawn point ({x_m:g}, {z_m:g})", f"Give another --spawn or {EXTENT}"
+        )
+    places = (1 + (x_high_m - x_low_m) / step_m) * (1 + (z_high_m - z_low_m) / step_m)
+    if places > MAX_GRID_POINTS:
+        problem = f"{sides}: {places:,.0f} places to try, expected at most {MAX_GRID_POINTS:,}"
         raise SceneError(path, problem, f"Give a larger --step, or a part of it: {EXTENT}")
-    return floor
+    return Floor((x_low_m, z_low_m), (x_high_m, z_high_m), origin_m)
 
 
 def span_of(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:

@@ -141,31 +141,14 @@ def mean_shortest_path(graph: np.ndarray) -> float:
     return float(steps.sum() / (len(graph) * (len(graph) - 1)))
 
 
-def grid_shape(floor: Floor, step_m: float) -> tuple[int, int]:
-    """How many columns (along x) and rows (along z) a floor's grid has."""
-    columns, rows = (
-        int(np.floor((high_m - first_m) / step_m + 1e-9)) + 1
-        for first_m, high_m in zip(_first_lines_m(floor, step_m), floor.high_m, strict=True)
-    )
-    return columns, rows
-
-
-def _first_lines_m(floor: Floor, step_m: float) -> tuple[float, float]:
-    """The smallest x of a column and the smallest z of a row on the floor."""
-    x_m, z_m = (
-        low_m + round((origin_m - low_m) % step_m, 9)
-        for origin_m, low_m in zip(floor.origin_m, floor.low_m, strict=True)
-    )
-    return x_m, z_m
-
-
 def _grid_lines(floor: Floor, step_m: float) -> tuple[np.ndarray, np.ndarray]:
     """The x of the grid's columns and the z of its rows that lie on the floor, ascending."""
-    columns_m, rows_m = (
-        first_m + step_m * np.arange(count)
-        for first_m, count in zip(_first_lines_m(floor, step_m), grid_shape(floor, step_m), strict=True)
-    )
-    return columns_m, rows_m
+    lines = []
+    for origin_m, low_m, high_m in zip(floor.origin_m, floor.low_m, floor.high_m, strict=True):
+        first_m = low_m + round((origin_m - low_m) % step_m, 9)
+        count = int(np.floor((high_m - first_m) / step_m + 1e-9)) + 1
+        lines.append(first_m + step_m * np.arange(count))
+    return lines[0], lines[1]
 
 
 def _edge_gaps_m(floor: Floor, points_m: np.ndarray, radius_m: float) -> np.ndarray:
