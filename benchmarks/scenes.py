@@ -134,6 +134,7 @@ class Clock:
         self.then = time.perf_counter()
 
     def lap(self) -> float:
+        """Seconds since the last call, or since it was made."""
         then, self.then = self.then, time.perf_counter()
         return self.then - then
 
@@ -184,7 +185,7 @@ def finished(connection: Connection, costs: Costs, frames: int, seconds: Sequenc
 def measured(
     size: Size, few: Connection, paths: Sequence[Path], threads: int, warm: int, repeats: int
 ) -> tuple[Costs, list[float]]:
-    """The costs of a size, and the the seconds of four rooms' updates beside its own."""
+    """The costs of a size, and the seconds of four rooms' updates beside its own."""
     frames = size.learner.envs * size.learner.rollout_steps
     with started(size, paths, threads) as many:
         costs = many.recv()

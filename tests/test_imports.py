@@ -8,7 +8,7 @@ import pytest
 import clearway
 
 ORDER = (
-    {"version", "errors", "choices", "files", "colours", "progress"},
+    {"version", "errors", "choices", "files", "colours", "progress", "ray_cluster"},
     {"scenes"},
     {"perception"},
     {"zones"},

@@ -1,4 +1,4 @@
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
@@ -128,3 +128,9 @@ def test_settings_out_of_range_are_refused_by_name(name: str, value: float) -> N
 def test_a2c_with_several_passes_is_refused() -> None:
     with pytest.raises(RunError, match="one pass"):
         Learner(algorithm="a2c")
+
+
+def test_a_setting_that_came_later_renames_no_older_run() -> None:
+    assert DEFAULT.told_apart_by().keys() == asdict(DEFAULT).keys() - {"heads"}
+    assert replace(DEFAULT, heads="shared").told_apart_by() == asdict(replace(DEFAULT, heads="shared"))
+    assert (DEFAULT.head_count(1000), replace(DEFAULT, heads="shared").head_count(1000)) == (1000, 1)

@@ -26,10 +26,10 @@ def request_with_files(folder: Path) -> RunRequest:
     return small_request(scenes=scenes, paths=paths, learner=small_learner(frames=160))
 
 
-@pytest.mark.parametrize("directions", [0, 3])
-def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path, directions: int) -> None:
+@pytest.mark.parametrize(("directions", "heads"), [(0, "scene"), (3, "scene"), (0, "shared")])
+def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path, directions: int, heads: str) -> None:
     request = request_with_files(tmp_path)
-    request = replace(request, learner=replace(request.learner, feature_basis=directions))
+    request = replace(request, learner=replace(request.learner, feature_basis=directions, heads=heads))
     trainer = request.trainer()
     for _ in range(3):
         trainer.update()

@@ -97,6 +97,9 @@ def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) 
             folder.read_record()
     (tmp_path / "run.json").write_text(json.dumps(content))
     assert folder.read_record() == made_record()
+    del content["learner"]["heads"]  # a run of before there was a choice
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    assert folder.read_record() == made_record()
 
 
 def test_metrics_leave_out_a_line_cut_off_and_forget_what_comes_again(tmp_path: Path) -> None:

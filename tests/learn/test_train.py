@@ -21,7 +21,8 @@ from clearway.learn.config import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.trainer import Trainer, Update
 from clearway.reward import SHORTEST
-from small_runs import equal_bits, small_learner, small_request
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from small_runs import equal_bits, small_learner, small_request, small_scenes
 
 
 def without_seconds(folder: RunFolder) -> list[dict[str, float]]:
@@ -275,3 +276,23 @@ def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
     for name in ("nonsense", "cuda:99"):
         with pytest.raises(RunError, match=f"device {name}: cannot be used here"):
             train.train(small_request(device=name), tmp_path)
+
+
+def test_features_in_a_mapped_file_train_the_same_agent_bit_for_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    for scene in small_scenes():
+        write_scene(scene, tmp_path / f"{scene.name}.h5")
+    parameters = {}
+    for store in ("memory", "mapped", "float16"):
+        paths = [tmp_path / "corridor.h5", tmp_path / "grid.h5"]
+        scenes = [read_scene(path, features_in_file=store != "memory") for path in paths]
+        request = small_request(scenes=scenes, feature_store=store)
+        trainer = request.trainer()
+        trainer.update()
+        parameters[store] = dict(trainer.network.named_parameters())
+        assert request.record().same_experiment(small_request().record())
+    assert equal_bits(parameters["mapped"], parameters["memory"])
+    assert not equal_bits(parameters["float16"], parameters["memory"])
+    torch.testing.assert_close(parameters["float16"], parameters["memory"], rtol=0.05, atol=0.01)

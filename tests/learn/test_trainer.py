@@ -13,6 +13,8 @@ from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
 from clearway.learn.losses import Batch, merged
 from clearway.learn.rollout import Rollout
 from clearway.learn.trainer import Trainer
+from clearway.model import lookup
+from clearway.model.first_layer import AllStates, VisitedStates
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
@@ -255,3 +257,29 @@ def test_one_row_an_update_gives_finite_figures() -> None:
     learner = small_learner(envs=1, rollout_steps=1, minibatches=1, epochs=1)
     figures = vars(Trainer(corridor_world(), learner, COLLISION_AWARE, 0).update())
     assert all(math.isfinite(value) for value in figures.values())
+
+
+@pytest.mark.parametrize("heads", ["scene", "shared"])
+def test_projecting_visited_states_alone_changes_nothing_but_rounding(
+    monkeypatch: pytest.MonkeyPatch, heads: str
+) -> None:
+    learner = small_learner(heads=heads)
+    everywhere = small_trainer(learner)
+    monkeypatch.setattr(lookup, "FEW_STATES", 0)
+    visited = small_trainer(learner)
+    assert isinstance(everywhere.lookup.first_layer, AllStates)
+    assert isinstance(visited.lookup.first_layer, VisitedStates)
+    for _ in range(3):
+        first, second = everywhere.update(), visited.update()
+        assert second.loss == pytest.approx(first.loss, rel=1e-3)
+        assert second.gradient_norm == pytest.approx(first.gradient_norm, rel=1e-3)
+    for name, parameter in visited.network.named_parameters():
+        torch.testing.assert_close(parameter, everywhere.network.get_parameter(name), rtol=1e-3, atol=1e-4)
+
+
+def test_one_head_learns_for_all_scenes() -> None:
+    trainer = small_trainer(small_learner(heads="shared"))
+    before = trainer.network.scene_weight.clone()
+    trainer.update()
+    assert trainer.network.scene_weight.shape == (1, 16, 16)
+    assert not torch.equal(trainer.network.scene_weight, before)

@@ -7,7 +7,7 @@ import pytest
 import torch
 from transformers import ResNetConfig, ResNetModel
 
-from clearway.errors import EncoderError
+from clearway.errors import EncoderError, SceneError
 from clearway.perception import EncoderWarning, encode, encode_scenes, encoder_from_record, random_resnet
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
@@ -131,3 +131,38 @@ def test_what_cannot_be_encoded_is_one_clear_error() -> None:
         encode_scenes([], "random-resnet50")
     with pytest.raises(EncoderError, match="does not say how"):
         encoder_from_record(corridor_scene(3).encoder)
+
+
+@pytest.mark.slow
+def test_several_processes_encode_as_one_thread_does(
+    tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_scene(rooms()[0], tmp_path / "a.h5")
+    scenes = [read_scene(tmp_path / "a.h5"), rooms()[2]]  # pictures in a file, and in memory
+    alone = encode_scenes(scenes, "random-resnet50", batch=7, threads=1)
+    monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / "other"))
+    shared = encode_scenes(scenes, alone[0].encoder, batch=7, workers=2)
+    for one, other in zip(alone, shared, strict=True):
+        assert np.array_equal(one.features, other.features)
+
+
+@pytest.mark.slow
+def test_what_goes_wrong_in_another_process_is_told_as_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record = encode_scenes(rooms()[:1], "random-resnet50")[0].encoder
+    write_scene(rooms()[2], tmp_path / "a.h5")
+    scene = read_scene(tmp_path / "a.h5")
+    write_scene(rooms()[1], tmp_path / "a.h5")
+    monkeypatch.setattr(encode, "content_key", lambda pictures: "not looked at here")
+    with pytest.raises(SceneError, match="has changed since the scene was read"):
+        encode_scenes([scene], record, workers=1)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_ray_cluster_encodes_as_one_thread_does(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ray")
+    alone = encode_scenes(rooms(), "random-resnet50", batch=7, threads=1)
+    monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / "other"))
+    shared = encode_scenes(rooms(), alone[0].encoder, batch=7, ray="local", workers=1)
+    for one, other in zip(alone, shared, strict=True):
+        assert np.array_equal(one.features, other.features)

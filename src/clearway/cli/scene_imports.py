@@ -33,6 +33,10 @@ class Encoding:
     """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
+    workers: int | None = None
+    """Processes that encode, with one thread each; by default one, with as many threads as there are cores."""
+    ray: str | None = None
+    """Encode on a Ray cluster: local, auto or an address."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,10 @@ class ImportDumps:
     """Encode the pictures anew, all files together, with this encoder; by default the files' features stay."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
+    workers: int | None = None
+    """Processes that encode, with one thread each; by default one, with as many threads as there are cores."""
+    ray: str | None = None
+    """Encode on a Ray cluster: local, auto or an address."""
 
     def run(self) -> None:
         """Import and write."""
@@ -62,7 +70,9 @@ class ImportDumps:
             files = scene_files(paths)
             scenes = [read_scene(path) for path in files]
             if self.encoder:
-                encode_and_write(scenes, self.out, Encoding(self.encoder, self.encoder_seed), files)
+                encode_and_write(
+                    scenes, self.out, Encoding(self.encoder, self.encoder_seed, self.workers, self.ray), files
+                )
             else:
                 write_scenes(scenes, self.out, files)
 
@@ -163,6 +173,10 @@ class ImportSavn:
     """Encode the pictures anew with this encoder; by default the features of resnet50_fc.hdf5 stay, where they are."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
+    workers: int | None = None
+    """Processes that encode, with one thread each; by default one, with as many threads as there are cores."""
+    ray: str | None = None
+    """Encode on a Ray cluster: local, auto or an address."""
 
     def run(self) -> None:
         """Read, encode and write."""
@@ -174,7 +188,9 @@ class ImportSavn:
         if self.encoder is None and featured:
             write_scenes(scenes, self.out)
         else:
-            encode_and_write(scenes, self.out, Encoding(self.encoder or "auto", self.encoder_seed))
+            encode_and_write(
+                scenes, self.out, Encoding(self.encoder or "auto", self.encoder_seed, self.workers, self.ray)
+            )
 
 
 @dataclass(frozen=True)
@@ -367,8 +383,17 @@ def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding, fil
     from clearway.perception import encode_scenes
 
     check_seeds(encoder_seed=encoding.encoder_seed)
+    check_at_least(1, workers=encoding.workers)
     _paths(scenes, out, files)  # before the minutes that encoding takes
-    write_scenes(encode_scenes(scenes, encoding.encoder, seed=encoding.encoder_seed, progress=True), out, files)
+    encoded = encode_scenes(
+        scenes,
+        encoding.encoder,
+        seed=encoding.encoder_seed,
+        progress=True,
+        workers=encoding.workers,
+        ray=encoding.ray,
+    )
+    write_scenes(encoded, out, files)
 
 
 def write_scenes(scenes: Sequence[Scene], out: Path, files: Sequence[Path] = ()) -> None:

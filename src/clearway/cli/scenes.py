@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from clearway.choices import RoomName
-from clearway.cli.arguments import check_seeds, scene_files
+from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, stderr_console
 from clearway.errors import ClearwayError
 
@@ -31,6 +31,11 @@ class Build:
     """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
+    workers: int | None = None
+    """Processes that render, and then encode with one thread each; by default one a core renders, and one encodes with
+    as many threads as there are cores."""
+    ray: str | None = None
+    """Encode on a Ray cluster: local, auto or an address."""
 
     def run(self) -> None:
         """Build and write."""
@@ -40,11 +45,15 @@ class Build:
         from clearway.scenes.thor_v1 import write_scene
 
         check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)
+        check_at_least(1, workers=self.workers)
         if self.room == "all" and self.out.suffix:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
         names = ROOM_NAMES if self.room == "all" else (self.room,)
-        scenes = [cached_room_scene(name, self.seed, progress=True) for name in names]
-        for scene in encode_scenes(scenes, self.encoder, seed=self.encoder_seed, progress=True):
+        scenes = [cached_room_scene(name, self.seed, workers=self.workers, progress=True) for name in names]
+        encoded = encode_scenes(
+            scenes, self.encoder, seed=self.encoder_seed, progress=True, workers=self.workers, ray=self.ray
+        )
+        for scene in encoded:
             path = self.out if self.out.suffix else self.out / f"{scene.name}.h5"
             write_scene(scene, path)
             stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)

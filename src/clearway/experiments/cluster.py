@@ -5,9 +5,7 @@ All nodes must see `out` under the same path, since a job that begins again goes
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +14,8 @@ from clearway.experiments.job import do, run_folder
 from clearway.experiments.local import ATTEMPTS, JOB_BYTES, POLL_S
 from clearway.experiments.plan import Job
 from clearway.learn.run_folder import METRICS_FILE
+from clearway.ray_cluster import connected
 
-LOCAL = "local"
 GRACE_S = 60.0  # for jobs under way to save a checkpoint when the user interrupts
 
 
@@ -45,7 +43,7 @@ def run_jobs_on_ray(
     """
     if not jobs:
         return
-    with _connected(address, workers, threads) as ray:
+    with connected(address, None if workers is None else workers * threads) as ray:
         # a fresh process a job, as on one machine; a job whose worker or node dies is begun again by Ray
         options = {"num_cpus": threads, "max_calls": 1, "max_retries": ATTEMPTS - 1, "memory": JOB_BYTES}
         remote = ray.remote(**options)(do)
@@ -87,33 +85,3 @@ def _collected(ray: Any, reference: object, job: Job) -> None:
         raise RunError(
             f"run {job.run.name}: its worker or node died {ATTEMPTS} times ({reason}). Run the command again to go on"
         ) from error
-
-
-@contextmanager
-def _connected(address: str, workers: int | None, threads: int) -> Iterator[Any]:
-    """Ray, connected; disconnected in the end, and stopped where it was started here."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    os.environ.setdefault("RAY_AUTH_MODE", "token")
-    try:
-        import ray
-    except ImportError as error:
-        raise RunError("--ray needs Ray. Install it: pip install 'clearway[ray]'") from error
-    started_before = ray.is_initialized()
-    options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
-    if address == LOCAL:
-        options["num_cpus"] = None if workers is None else workers * threads
-    else:
-        del options["include_dashboard"]
-    try:
-        if not started_before:
-            ray.init(address=address, **options)
-    except (ConnectionError, RuntimeError, ValueError) as error:
-        reason = str(error).strip().splitlines()[0]
-        raise RunError(
-            f"--ray {address}: no cluster to be reached ({reason}). Start one, or give --ray local"
-        ) from error
-    try:
-        yield ray
-    finally:
-        if not started_before:
-            ray.shutdown()

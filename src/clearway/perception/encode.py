@@ -6,12 +6,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
 from clearway.errors import EncoderError
-from clearway.perception import pretrained, random_resnet
+from clearway.perception import pretrained, random_resnet, spread
 from clearway.perception.cache import Entry, cached, content_key, joint_key
 from clearway.perception.encoder import Encoder, EncoderWarning
 from clearway.perception.preprocess import Preprocessing
@@ -91,6 +91,8 @@ def encode_scenes(
     threads: int | None = None,
     progress: bool = False,
     batch: int = BATCH_PICTURES,
+    workers: int | None = None,
+    ray: str | None = None,
 ) -> list[Scene]:
     """The scenes with features of their pictures, all by one encoder.
 
@@ -103,22 +105,25 @@ def encode_scenes(
         threads: processor threads; None: as many as torch uses, one a core if nobody set it.
         progress: show a progress bar, if standard error is a terminal.
         batch: pictures that go through the network together.
+        workers: processes that share the encoding, one thread each; None: this process alone, with `threads`.
+        ray: address of a Ray cluster that encodes instead, see `ray_cluster.connected`.
 
     Raises:
-        EncoderError: see `find_record`; or a scene has no pictures.
+        EncoderError: see `find_record`; or a scene has no pictures, or a process died.
         SceneError: the pictures of a scene's file are damaged.
+        RunError: Ray is asked for and cannot be had.
     """
     with (
         _threads(threads),
         picture_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
+        _encoding(workers, ray) as encode,
     ):
         record = find_record(encoder, scenes, seed=seed) if isinstance(encoder, str) else encoder
-        load = lru_cache(partial(encoder_from_record, record))  # at most once, and only where features are not cached
         encoded, done = [], 0
         for scene in scenes:
             pictures = _pictures(scene)
             key = joint_key(content_key(pictures), record.identity)
-            make = partial(_encode_all, load, pictures, batch, show_done, done)
+            make = partial(_encode_all, encode, record, pictures, batch, show_done, done)
             features = cached("features", key, make).arrays["features"]
             done += scene.state_count
             show_done(done)
@@ -126,21 +131,48 @@ def encode_scenes(
     return encoded
 
 
+@contextmanager
+def _encoding(workers: int | None, ray: str | None) -> Iterator[spread.Encode]:
+    """Who encodes: this process, several, or a cluster. Processes start where features are not cached."""
+    if ray is not None:
+        with spread.cluster(ray, workers) as encode:
+            yield encode
+    elif workers is not None:
+        with spread.processes(workers) as encode:
+            yield encode
+    else:
+        yield _encoding_here()
+
+
+def _encoding_here() -> spread.Encode:
+    """Encoding in this process, with the threads that torch has; the network is loaded at most once."""
+    encoders: list[Encoder] = []
+
+    def encode(load: spread.Loader, record: EncoderRecord, pictures: Observations, batch: int) -> Iterator[np.ndarray]:
+        if not encoders:
+            encoders.append(load(record))
+        for part, first, last in spread.batches(pictures, batch):
+            yield encoders[0].encode(part[first:last])
+
+    return encode
+
+
 def _encode_all(
-    load: Callable[[], Encoder],
+    encode: spread.Encode,
+    record: EncoderRecord,
     pictures: Observations,
     batch: int,
     show_done: Callable[[int], None],
     done_before: int,
 ) -> Entry:
     """The features (S, F) float32 of all pictures of a scene, to be cached."""
-    encoder = load()
-    features = np.empty((pictures.shape[0], encoder.feature_count), np.float32)
-    for start in range(0, len(features), batch):
-        part = pictures[start : start + batch]
-        features[start : start + len(part)] = encoder.encode(part)
-        show_done(done_before + start + len(part))
-    return Entry({"features": features})
+    parts: list[np.ndarray] = []
+    done = done_before
+    for part in encode(encoder_from_record, record, pictures, batch):
+        parts.append(part)
+        done += len(part)
+        show_done(done)
+    return Entry({"features": np.concatenate(parts)})
 
 
 def _pictures(scene: Scene) -> Observations:

@@ -31,7 +31,11 @@ class FileFeatures:
     path: Path
     shape: tuple[int, ...]
     stamp: tuple[int, ...]
-    dtype: np.dtype = np.dtype(np.float32)
+
+    @property
+    def dtype(self) -> np.dtype:
+        """float32, whatever the file has."""
+        return np.dtype(np.float32)
 
     def __array__(self, dtype: np.dtype | None = None, /, *, copy: bool | None = None) -> np.ndarray:
         """All features, (S, F) float32 or as asked for.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import Enum
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 import torch
@@ -121,4 +122,5 @@ def world_tensors(world: World) -> dict[str, Tensor]:
 
 def world_from(shared: SharedTensors, scene_names: tuple[str, ...]) -> World:
     """The world whose tables lie in shared memory."""
-    return World(scene_names=scene_names, **shared.part("world"))
+    tables: dict[str, Any] = shared.part("world")
+    return World(scene_names=scene_names, **tables)

@@ -1,0 +1,50 @@
+"""A connection to Ray, for whatever is to be spread over several machines."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from clearway.errors import RunError
+
+LOCAL = "local"
+
+
+@contextmanager
+def connected(address: str, cores: int | None = None) -> Iterator[Any]:
+    """Ray, connected; disconnected in the end, and stopped where it was started here.
+
+    Args:
+        address: "local" starts Ray on this machine, "auto" finds a running cluster, or a cluster's address.
+        cores: processors that Ray may use under "local"; None: all.
+
+    Raises:
+        RunError: Ray is not installed, or the cluster cannot be reached.
+    """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    os.environ.setdefault("RAY_AUTH_MODE", "token")
+    try:
+        import ray
+    except ImportError as error:
+        raise RunError("--ray needs Ray. Install it: pip install 'clearway[ray]'") from error
+    started_before = ray.is_initialized()
+    options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
+    if address == LOCAL:
+        options["num_cpus"] = cores
+    else:
+        del options["include_dashboard"]
+    try:
+        if not started_before:
+            ray.init(address=address, **options)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise RunError(
+            f"--ray {address}: no cluster to be reached ({reason}). Start one, or give --ray local"
+        ) from error
+    try:
+        yield ray
+    finally:
+        if not started_before:
+            ray.shutdown()
