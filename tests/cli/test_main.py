@@ -32,12 +32,14 @@ COMMANDS = {
     "scenes import ai2thor",
     "scenes inspect",
     "scenes export",
+    "scenes view",
     "train",
     "evaluate",
     "oracle",
     "reproduce",
     "report",
     "video",
+    "view",
 }
 
 
