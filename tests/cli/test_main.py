@@ -34,6 +34,7 @@ COMMANDS = {
     "scenes import miniworld",
     "scenes inspect",
     "scenes export",
+    "scenes view",
     "train",
     "evaluate",
     "oracle",
@@ -41,6 +42,7 @@ COMMANDS = {
     "report",
     "video",
     "export",
+    "view",
 }
 
 
