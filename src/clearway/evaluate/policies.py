@@ -24,7 +24,7 @@ def random_policy() -> Policy:
 
 def shortest_path_policy(world: World) -> Policy:
     """Uniform over the actions that begin a shortest path to the target; all zero where there is none."""
-    steps_to_go = world.distance_table()  # (M, S)
+    steps_to_go = world.distance_table()
 
     def probabilities(history: Tensor, target: Tensor) -> Tensor:
         here = history[:, -1]

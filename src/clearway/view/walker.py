@@ -96,7 +96,7 @@ class Walker:
         self.world, self.target, self.mind = world, target, mind
         self.offset = int(world.scene_offset[world.target_scene[target]])
         self.states_here = int(world.scene_offset[world.target_scene[target] + 1]) - self.offset
-        self.to_go = world.distance_table()[target]
+        self.to_go = world.distance_table()
         history_length = mind.history_length if mind else 1
         self.env = Navigation(world, reward, seeds, history_length=history_length, reward_dtype=torch.float64)
         self.env.reset(target=torch.tensor([target]), start=torch.tensor([start + self.offset]))
@@ -170,7 +170,7 @@ class Walker:
             collisions=int(blocked) + (before.collisions if before else 0),
             zone=zone,
             reached=reached,
-            to_go=int(self.to_go[self.env.state]),
+            to_go=int(self.to_go[self.target, self.env.state]),
             probabilities=probabilities,
             value=value,
             next=following,
