@@ -90,7 +90,7 @@ def cases(flips: int) -> Iterator[Case]:
     yield whole.case("with something behind", "its own bytes again", whole.content * 2)
     yield whole.case("with something behind", "zeros", whole.content + bytes(4096))
     plain = published()
-    yield from plain.flipped(flips // 4)
+    yield from plain.flipped(250)
     yield from plain.cut(40)
     yield from plain.overwritten(60)
     for name, (change, says) in FAULTS.items():
