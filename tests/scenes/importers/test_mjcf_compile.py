@@ -53,13 +53,17 @@ def test_meshes_and_included_files_are_found_and_the_models_defaults_leave_the_b
 @pytest.mark.parametrize(
     ("words", "problem"),
     [
-        ("<worldbody>", "XML"),
-        ('<asset><mesh file="gone.stl"/></asset>', r"gone\.stl"),
-        ('<extension><plugin plugin="their.own"/></extension>', "plugin their.own not found"),
-        ('<include file="world.xml"/>', "world.xml"),
-        ('<size memory="1T"/>', "memory"),
+        pytest.param("<worldbody>", "XML", id="no XML", marks=pytest.mark.slow),
+        pytest.param('<asset><mesh file="gone.stl"/></asset>', r"gone\.stl", id="missing mesh"),
+        pytest.param(
+            '<extension><plugin plugin="their.own"/></extension>',
+            "plugin their.own not found",
+            id="plugin",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param('<include file="world.xml"/>', "world.xml", id="includes itself", marks=pytest.mark.slow),
+        pytest.param('<size memory="1T"/>', "memory", id="huge data"),
     ],
-    ids=["no XML", "missing mesh", "plugin", "includes itself", "huge data"],
 )
 def test_what_mujoco_says_becomes_one_line(tmp_path: Path, words: str, problem: str) -> None:
     with pytest.raises(SceneError, match=rf"world\.xml: MuJoCo cannot use it \(.*{problem}.*\)\. ") as caught:
@@ -83,6 +87,7 @@ def test_a_model_that_asks_for_all_memory_gets_no_more_than_the_limit(
         compiled(written(tmp_path, bomb), AGENT)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 def test_a_model_that_takes_too_long_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf_compile, "TIME_LIMIT_S", 3)
