@@ -149,7 +149,6 @@ PICTURE = np.zeros((4, 4, 3), np.uint8)
         (np.zeros((1, 4097, 3), np.uint8), "4097 x 1 pixels, expected at most 4096"),
         (Image.new("L", (5, 5)), r"uint8 \(5, 5\)"),
     ],
-    ids=str,
 )
 def test_what_is_no_picture_is_refused(picture, part) -> None:
     navigator = clearway.Navigator(Sums())
