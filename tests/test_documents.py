@@ -4,10 +4,18 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from documents import ROOT, Block, code_blocks, run_block, shortened
+
+ROOM = """
+<mujoco>
+  <worldbody>
+    <geom type="plane" size="2 2 .1"/>
+    <geom type="box" size=".2 .2 .5" pos="1 1 .5" rgba="1 0 0 1"/>
+  </worldbody>
+</mujoco>
+"""
 
 
 def test_blocks_are_found() -> None:
@@ -53,14 +61,17 @@ def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
-    first, commands, program = code_blocks(ROOT / "README.md")
+    first, watching, commands, program = code_blocks(ROOT / "README.md")
     programs = [line.partition("#")[0].strip() for line in first.text.splitlines()]
     assert programs == ["scripts/demo", "scripts/test"]  # CI runs the second, and with it this test
+    assert watching.text.splitlines()[1].startswith("clearway view ")  # tests/view clicks through what it shows
     changes = {
         ". .venv/bin/activate\n": "",
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
-        "--scene kitchen": "--scene bathroom",
+        "--live --sweep": "--live --sweep --strengths 1 --episodes 1 --step-cap 3",
+        "--scene kitchen --out episode.mp4": "--scene bathroom --out episode.mp4",
+        "--scene kitchen --out kitchen.onnx": "--scene bathroom --out kitchen.onnx",
         "reproduce all": "reproduce fig3 --rooms bathroom --frames 4000",
     }
     prepare_stand_ins(tmp_path)
@@ -69,14 +80,17 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
     done = run_block(program, tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[0] in ("True", "False")
-    made = ("bathroom.png", "pictures", "episode.mp4", "scenes/plan.h5", "scenes/poses.h5", "scenes/dump.h5")
+    made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx"]
+    made += [f"scenes/{name}.h5" for name in ("dump", "hall", "poses", "scene")]
     assert all((tmp_path / name).exists() for name in made)
 
 
 def prepare_stand_ins(folder: Path) -> None:
-    """What the README's commands take for given: a dump, a floor plan, photographs."""
+    """What the README's commands take for given: a dump, a floor plan, photographs, a MuJoCo model."""
     (folder / "dumps").mkdir()
-    np.savez(folder / "plan.npz", plan=np.argwhere(np.ones((3, 4), bool)))
+    (folder / "hall.txt").write_text("....\n....\n..#.\n")
+    (folder / "office").mkdir()
+    (folder / "office/scene.xml").write_text(ROOM)
     build = "clearway scenes build --room bathroom --out room.h5\n"
     export = "clearway scenes export room.h5 --out dumps/dump.h5\n"
     photographs = next(b for b in code_blocks(ROOT / "docs/tutorial.md") if b.language == "python")
