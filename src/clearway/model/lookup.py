@@ -28,7 +28,6 @@ from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
 from clearway.scenes.actions import ACTION_COUNT
 
-
 FEW_TARGETS = 1_024  # up to so many, the target branch is computed of all, beyond of those that occur
 
 
