@@ -16,9 +16,9 @@ def made_layers(features_type: torch.dtype = torch.float32) -> tuple[AllStates, 
     generator = torch.Generator().manual_seed(0)
     weight = torch.randn(HISTORY, WIDTH, FEATURES, generator=generator)
     features = torch.randn(STATES, FEATURES, generator=generator).to(features_type)
-    layers = AllStates(weight, features.float(), TARGETS), VisitedStates(weight, features, TARGETS)
+    layers = AllStates(weight.clone(), features.float(), TARGETS), VisitedStates(weight, features, TARGETS)
     for layer in layers:
-        layer.refresh()
+        layer.refresh(keep=False)
     return layers
 
 
@@ -43,7 +43,12 @@ def test_only_states_that_occur_are_projected_and_each_once() -> None:
     occurred = torch.cat([histories(0, 10), histories(5, 15)]).unique()
     assert visited.known == len(occurred)
     assert torch.equal((visited.row_of >= 0).nonzero()[:, 0], occurred)
-    visited.refresh()
+    for layer in (everything, visited):
+        layer.weight.mul_(2)
+        layer.refresh(keep=True)
+    assert visited.known == len(occurred)
+    torch.testing.assert_close(visited.seen(histories(0, 10)), everything.seen(histories(0, 10)))
+    visited.refresh(keep=False)
     assert visited.known == 0
 
 

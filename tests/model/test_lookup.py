@@ -1,6 +1,6 @@
 """`LookupNetwork` against plain autograd on `SiameseActorCritic`, which defines what it computes.
 
-Everything holds for both ways to compute the first layer, see `first_layer`.
+Everything holds in small worlds and in large ones, where the first layer is computed otherwise, see `first_layer`.
 """
 
 from collections.abc import Iterator
@@ -19,9 +19,12 @@ TARGET_STATE = (3, 9, 15, 25, 25)  # two targets are the same pose
 TARGET_SCENE = (0, 0, 1, 2, 2)
 
 
-@pytest.fixture(autouse=True, params=[STATES, STATES - 1], ids=["all states", "visited states"])
-def few_states(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lookup_module, "FEW_STATES", request.param)
+@pytest.fixture(autouse=True, params=["few", "many"])
+def world_size(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is computed of all states and targets while they are few is computed of those that occur in large worlds."""
+    if request.param == "many":
+        monkeypatch.setattr(lookup_module, "FEW_STATES", STATES - 1)
+        monkeypatch.setattr(lookup_module, "FEW_TARGETS", len(TARGET_STATE) - 1)
 
 
 @pytest.fixture
@@ -161,13 +164,14 @@ def test_without_the_siamese_weight_refresh_follows_all_other_parameters() -> No
     with torch.no_grad():
         for name, parameter in network.named_parameters():
             parameter.mul_(1 if name == "siamese_weight" else 0.5)
-    wanted, term = lookup.wanted, lookup.target_term
+    every = torch.arange(len(TARGET_STATE))
+    wanted, term = lookup.wanted, lookup._target_terms(every)
     lookup.refresh(siamese_weight=False)
-    partly = lookup.wanted, lookup.target_term
+    partly = lookup.wanted, lookup._target_terms(every)
     lookup.refresh()
     assert torch.equal(before, lookup.first_layer.projected)
-    assert all(torch.equal(a, b) for a, b in zip(partly, (lookup.wanted, lookup.target_term), strict=True))
-    assert not torch.equal(wanted, lookup.wanted) and not torch.equal(term, lookup.target_term)
+    assert all(torch.equal(a, b) for a, b in zip(partly, (lookup.wanted, lookup._target_terms(every)), strict=True))
+    assert not torch.equal(wanted, lookup.wanted) and not torch.equal(term, lookup._target_terms(every))
 
 
 def test_features_of_another_size_are_refused() -> None:

@@ -275,8 +275,9 @@ class Trainer:
                 orders.append(first + torch.randperm(count, generator=generator, device=device))
                 first += count
             for part in range(parts):
-                dealt = [order[len(order) * part // parts : len(order) * (part + 1) // parts] for order in orders]
-                yield batch.rows(torch.cat(dealt), tuple(len(rows) for rows in dealt))
+                cuts = [(rows * part // parts, rows * (part + 1) // parts) for rows in batch.rows_per_scene]
+                dealt = torch.cat([order[a:b] for order, (a, b) in zip(orders, cuts, strict=True)])
+                yield batch.rows(dealt, tuple(b - a for a, b in cuts))
 
     def _rebalance(self) -> None:
         """Draw targets more often that are reached less often."""

@@ -21,8 +21,8 @@ MOST_ROWS = 131_072  # projected states kept while nothing is being learnt from 
 class FirstLayer(Protocol):
     """What both ways offer. All results are sums over the K slots, before bias and ReLU."""
 
-    def refresh(self) -> None:
-        """The weight has changed."""
+    def refresh(self, keep: bool) -> None:
+        """The weight has changed; `keep`: the states that occurred since the last time will occur again."""
 
     def seen(self, history: Tensor) -> Tensor:
         """(B, H) of histories (B, K) int64."""
@@ -60,8 +60,8 @@ class AllStates:
         self.projected = torch.empty(len(features), columns, device=features.device)
         self.by_state = torch.empty(0, columns, device=features.device)
 
-    def refresh(self) -> None:
-        """The weight has changed."""
+    def refresh(self, keep: bool) -> None:
+        """The weight has changed; `keep` makes no difference here."""
         torch.mm(self.features, self.weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
 
     def seen(self, history: Tensor) -> Tensor:
@@ -96,7 +96,7 @@ class AllStates:
 
 
 class VisitedStates:
-    """States are projected when they occur, and forgotten when the weight moves.
+    """States are projected when they occur, and forgotten when another batch begins.
 
     A target stands in every slot, so that the sum of the slots' weights serves it, and likewise a start.
 
@@ -122,9 +122,13 @@ class VisitedStates:
         self.targets = self._read(target_state)  # (M, F)
         self.by_state, self.by_target = self.projected, torch.empty(0, self.width, device=device)
 
-    def refresh(self) -> None:
-        """The weight has changed."""
-        self._forget()
+    def refresh(self, keep: bool) -> None:
+        """The weight has changed; `keep` the states that are known and project them anew."""
+        if keep:
+            torch.mm(self.rows[: self.known], self.weight.flatten(0, 1).T, out=self.projected[: self.known])
+        else:
+            self._forget()
+        self.by_state = self.by_state[:0]
         self.slots_together = self.weight.sum(0)  # (H, F)
         self.wanted_rows = self.targets @ self.slots_together.T
 
@@ -185,7 +189,6 @@ class VisitedStates:
     def _forget(self) -> None:
         self.row_of.fill_(-1)
         self.known = 0
-        self.by_state = self.by_state[:0]
 
     def _read(self, states: Tensor) -> Tensor:
         """Features (U, F) of states (U,)."""

@@ -3,7 +3,7 @@
 Features are frozen and states finite, so the first layer needs no picture twice:
 
     W_k f(s)             one matrix product of the states' features an update, then K rows are summed per sample;
-    target branch        one row a target (M of them), not one a sample;
+    target branch        one row a target (M of them, or those that occur), not one a sample;
     dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once; several
                          batches may be added up before that, as long as W_k stays what it is.
 
@@ -27,6 +27,8 @@ from clearway.envs.feature_store import FEW_STATES
 from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
 from clearway.scenes.actions import ACTION_COUNT
+
+FEW_TARGETS = 1_024  # up to so many, the target branch is computed of all, beyond of those that occur
 
 
 def _relu_backward_(grad: Tensor, result: Tensor) -> Tensor:
@@ -110,12 +112,13 @@ class LookupNetwork:
         """
         net = self.network
         if siamese_weight:
-            self.first_layer.refresh()
+            self.first_layer.refresh(keep=not few_rows)
         self.fusion_in, self.scene_in = net.fusion_weight[0].T, net.scene_weight.transpose(1, 2)
         if few_rows:
             self.fusion_in, self.scene_in = self.fusion_in.contiguous(), self.scene_in.contiguous()
         self.wanted = self.first_layer.wanted().add_(net.siamese_bias).relu_()  # (M, H)
-        self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
+        if len(self.wanted) <= FEW_TARGETS:
+            self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
 
     @torch.no_grad()
     def forward(
@@ -132,7 +135,7 @@ class LookupNetwork:
         net = self.network
         out = out or Activations.empty(len(history), self.width, history.device)
         torch.add(self.first_layer.seen(history), net.siamese_bias, out=out.seen).relu_()
-        torch.addmm(self.target_term[target], out.seen, self.fusion_in, out=out.fused).relu_()
+        torch.addmm(self._target_terms(target), out.seen, self.fusion_in, out=out.fused).relu_()
         self._forward_scenes(rows_per_scene, out)
         return out
 
@@ -145,7 +148,7 @@ class LookupNetwork:
         out = Activations.empty(len(state), self.width, state.device)
         sums, row = self.first_layer.starts(state)
         seen = sums.add_(self.network.siamese_bias).relu_()
-        torch.add((seen @ self.fusion_in)[row], self.target_term[target], out=out.fused).relu_()
+        torch.add((seen @ self.fusion_in)[row], self._target_terms(target), out=out.fused).relu_()
         self._forward_scenes(rows_per_scene, out)
         return out.value
 
@@ -178,9 +181,11 @@ class LookupNetwork:
         _relu_backward_(grad_fused, kept.fused)
         torch.sum(grad_fused, 0, out=grad_of(net.fusion_bias))
         torch.mm(grad_fused.T, kept.seen, out=grad_of(net.fusion_weight)[0])
-        grad_term = self._sum_by_target(target, grad_fused)  # (M, H)
-        torch.mm(grad_term.T, self.wanted, out=grad_of(net.fusion_weight)[1])
-        grad_wanted = _relu_backward_(grad_term @ net.fusion_weight[1], self.wanted)
+        goals = target.unique() if len(self.wanted) > FEW_TARGETS else slice(None)
+        wanted, grad_term = self.wanted[goals], self._sum_by_target(target, grad_fused)[goals]  # (M, H) or fewer
+        torch.mm(grad_term.T, wanted, out=grad_of(net.fusion_weight)[1])
+        grad_wanted = torch.zeros_like(self.wanted)
+        grad_wanted[goals] = _relu_backward_(grad_term @ net.fusion_weight[1], wanted)
         torch.mm(grad_fused, net.fusion_weight[0], out=grad_seen)
         _relu_backward_(grad_seen, kept.seen)
         torch.sum(grad_seen, 0, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
@@ -228,6 +233,14 @@ class LookupNetwork:
     def _rows_per_head(self, rows_per_scene: Sequence[int]) -> Sequence[int]:
         """Number of rows of each head: of its scene, or all of them."""
         return rows_per_scene if self.network.shape.head_count > 1 else (sum(rows_per_scene),)
+
+    def _target_terms(self, target: Tensor) -> Tensor:
+        """The target's part of the fusion layer, before its ReLU, for targets (B,): (B, H)."""
+        net = self.network
+        if len(self.wanted) <= FEW_TARGETS:
+            return self.target_term[target]
+        goals, row = torch.unique(target, return_inverse=True)
+        return torch.addmm(net.fusion_bias, self.wanted[goals], net.fusion_weight[1].T)[row]
 
     def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:
         """Rows (B, H) added up by target, (M, H)."""
