@@ -69,6 +69,7 @@ def test_one_run_alone_is_a_table(clearway, runs):
     assert "none" in answer.out and "Actions argmax" in answer.out and "less" not in answer.out
 
 
+@pytest.mark.slow
 def test_a_sweep_has_a_row_a_setting(clearway, runs):
     answer = clearway(
         "evaluate", runs.bold, "--live", "--episodes", 1, "--step-cap", 1, "--sweep", "--strengths", 1, "--json"

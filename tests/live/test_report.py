@@ -86,6 +86,8 @@ def test_scenes_count_alike():
 def test_tables_show_figures_with_intervals_and_say_what_success_means(result):
     (_, name, cells), *_ = agent_rows([result])
     assert name == "bold" and cells[0][0] == "75" and cells[1][0] == "6.0"
+    ((_, _, differences),) = compared_rows([result])
+    assert differences[1][0] == "-1.00" and " to " in differences[1][1]
     text = markdown_tables([result], PROTOCOL, "tiny")
     assert "| none | wary | 100 (100–100) |" in text
     assert "wary less bold" in text and "within 25 cm and 45°" in text and "Encoder: tiny" in text

@@ -26,7 +26,7 @@ class _Column:
             f"{round(self.scale * number, self.digits) + 0.0:.{self.digits}f}"  # + 0.0: no "-0.0"
             for number in (figures.values[self.metric], *figures.intervals[self.metric])
         )
-        return value, f"{low}–{high}"
+        return value, f"{low} to {high}" if low.startswith("-") else f"{low}–{high}"
 
 
 COLUMNS = (

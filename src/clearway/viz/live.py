@@ -10,11 +10,12 @@ import numpy as np
 
 from clearway import colours
 from clearway.live.draws import Draws
-from clearway.live.layout import shortest_path
 from clearway.live.report import LiveResult
 from clearway.live.run import LiveOutcome, Stage
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
 from clearway.scenes.rooms.topview import render_top_view
+from clearway.scenes.scene import Scene
 from clearway.viz.figures import CURVES, LINES, Look, new_figure
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ PANELS = (
     ("share_within_10cm", "time within 10 cm, %", 100.0),
 )
 ROW_IN, HEAD_IN, LABELS_IN, PANEL_IN = 0.34, 0.9, 1.9, 1.75
-COLUMNS, COLUMN_IN, PAIR_IN = 4, 2.6, 4.2
-FROM_M = 0.9  # the view that shows a new obstacle is taken at least so far from it
+COLUMNS, COLUMN_IN, PAIR_IN = 3, 2.8, 4.4
+VIEW_MOVES = 3  # the view that shows a new obstacle is taken from at most so far
 
 
 def draw_live_pictures(folder: Path, places: Sequence[Stage], outcomes: Sequence[LiveOutcome]) -> list[Path]:
@@ -50,7 +51,7 @@ def draw_live_figures(results: Sequence[LiveResult], path: Path) -> None:
             _draw_panel(axes, results, metric, scale)
             axes.set_title(title, loc="left", fontsize=9)
         panels[0].set_yticks(range(len(results)), [result.label for result in results])
-        panels[0].invert_yaxis()
+        panels[0].set_ylim(len(results) - 0.5, -0.5)
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower left", ncols=2)
 
@@ -86,7 +87,7 @@ def draw_live_episode(stage: Stage, scene_index: int, outcomes: Sequence[LiveOut
             panels[2 * row, column].set_title(outcome.setting.label, loc="left", fontsize=9)
             panels[2 * row + 1, column].imshow(_view(stage, scene_index, outcome, episode, pose))
         handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower left", ncols=len(labels), handlelength=3)
+        figure.legend(handles, labels, loc="outside lower left", ncols=columns + 1, fontsize=8)
 
 
 def _telling_episode(outcomes: Sequence[LiveOutcome], scene_index: int) -> int:
@@ -99,23 +100,28 @@ def _telling_episode(outcomes: Sequence[LiveOutcome], scene_index: int) -> int:
 def _telling_pose(
     stage: Stage, scene_index: int, outcomes: Sequence[LiveOutcome], episode: int
 ) -> tuple[float, float, float]:
-    """A pose on the shortest path that looks at a new obstacle, if a setting has one; else the start's."""
+    """A pose from which free moves lead to the place of a new obstacle, if a setting has one; else the start's."""
     scene = stage.live.scene
     tables = [next(iter(outcome.tables.values()))[scene_index] for outcome in outcomes]
-    start, target = int(tables[0].start[episode]), stage.world.scene_state(int(tables[0].target[episode]))
-    chosen = start
-    for new_m in (table.layouts[episode].new_m for table in tables):
-        if new_m is None:
-            continue
-        for state in shortest_path(scene, start, target):
-            turn = np.deg2rad(scene.headings_deg[state])
-            away_m = np.array(new_m) - scene.locations_m[state]
-            ahead_m = float(away_m @ (np.sin(turn), np.cos(turn)))
-            if ahead_m > 0.99 * np.linalg.norm(away_m) and ahead_m > FROM_M:
-                chosen = state
+    chosen = int(tables[0].start[episode])
+    places_m = [table.layouts[episode].new_m for table in tables]
+    for new_m in (place_m for place_m in places_m if place_m is not None):
+        moves = [_moves_to(scene, state, np.array(new_m)) for state in range(scene.state_count)]
+        chosen = int(np.argmax(moves)) if max(moves) else chosen
         break
     x_m, z_m = scene.locations_m[chosen].tolist()
     return x_m, z_m, float(scene.headings_deg[chosen])
+
+
+def _moves_to(scene: Scene, state: int, place_m: np.ndarray) -> int:
+    """Free moves forward from a state to a place of the grid; 0 where it does not lie ahead within VIEW_MOVES."""
+    for moves in range(1, VIEW_MOVES + 1):
+        state = int(scene.graph[state, Action.MOVE_FORWARD])
+        if state == BLOCKED:
+            return 0
+        if np.allclose(scene.locations_m[state], place_m):
+            return moves
+    return 0
 
 
 def _draw_from_above(axes: Axes, stage: Stage, scene_index: int, outcome: LiveOutcome, episode: int) -> None:
