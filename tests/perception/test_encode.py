@@ -155,14 +155,3 @@ def test_what_goes_wrong_in_another_process_is_told_as_here(tmp_path: Path, monk
     monkeypatch.setattr(encode, "content_key", lambda pictures: "not looked at here")
     with pytest.raises(SceneError, match="has changed since the scene was read"):
         encode_scenes([scene], record, workers=1)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_ray_cluster_encodes_as_one_thread_does(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("ray")
-    alone = encode_scenes(rooms(), "random-resnet50", batch=7, threads=1)
-    monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / "other"))
-    shared = encode_scenes(rooms(), alone[0].encoder, batch=7, ray="local", workers=1)
-    for one, other in zip(alone, shared, strict=True):
-        assert np.array_equal(one.features, other.features)
