@@ -127,7 +127,7 @@ def raising(error: BaseException):
     ("error", "code", "said"),
     [
         (KeyboardInterrupt(), 130, "interrupted\n"),
-        (ClearwayError("x.h5: broken\n  in two ways. Mend it"), 2, "error: x.h5: broken in two ways. Mend it\n"),
+        (ClearwayError("x.h5: broken\n in two ways. Mend it"), 2, "error: x.h5: broken\\n in two ways. Mend it\n"),
         (
             PermissionError(13, "Permission denied", "out/x.h5"),
             2,
