@@ -20,6 +20,8 @@ ORDER = (
     {"experiments"},
     {"deploy"},
     {"viz"},
+    {"web"},
+    {"view"},
     {"serve"},
     {"cli"},
     {"__main__"},

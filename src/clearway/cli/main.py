@@ -23,6 +23,7 @@ from clearway.cli.scene_imports import ImportScenes
 from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.train import Train
 from clearway.cli.video import Video
+from clearway.cli.view import View, ViewScene
 from clearway.errors import ClearwayError
 
 DESCRIPTION = (
@@ -33,7 +34,7 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build rooms, import dumps, floor plans and photographs, inspect, export.
+    """Scene files: build rooms, import dumps, floor plans and photographs, inspect, walk through, export.
 
     Example: clearway scenes inspect bathroom.h5
     """
@@ -43,6 +44,7 @@ class Scenes:
         | Annotated[ImportScenes, tyro.conf.subcommand("import")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
         | Annotated[Export, tyro.conf.subcommand("export")]
+        | Annotated[ViewScene, tyro.conf.subcommand("view")]
     )
 
     def run(self) -> None:
@@ -60,6 +62,7 @@ Command = (
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Video, tyro.conf.subcommand("video")]
     | Annotated[ExportAgent, tyro.conf.subcommand("export")]
+    | Annotated[View, tyro.conf.subcommand("view")]
 )
 
 

@@ -17,7 +17,7 @@ from clearway.envs.streams import Streams, stream_keys
 from clearway.envs.world import World
 from clearway.evaluate.loops import LoopSkipper, Tally
 from clearway.evaluate.policies import argmax
-from clearway.evaluate.selection import ActionSelection, UntriedActions
+from clearway.evaluate.selection import ActionSelection, UntriedActions, sampled
 from clearway.model.policy import Policy
 from clearway.reward import COLLISION_AWARE
 
@@ -161,15 +161,12 @@ class _Walk:
 
     def _choose(self, probabilities: Tensor) -> tuple[Tensor, Tensor]:
         """Actions (B,) int64 by (B, A) probabilities, and where the history left no choice, (B,) bool."""
-        bounds = probabilities.to(torch.float64).cumsum(1)
-        total = bounds[:, -1]
-        _check(total)
+        _check(probabilities.to(torch.float64).sum(1))
         if self.untried is not None:
             scene_state = self.env.state - self.world.scene_offset[self.world.target_scene[self.env.target]]
             action = self.untried.choose(self.walking, scene_state, probabilities)
             return action, torch.zeros_like(action, dtype=torch.bool)
-        chance = self.chances.at(self.walking) * total
-        action = (chance[:, None] >= bounds[:, :-1]).sum(1)
+        action = sampled(probabilities, self.chances.at(self.walking))
         return action, (probabilities > 0).sum(1) == 1
 
     def _close_circles(self, certain: Tensor) -> None:

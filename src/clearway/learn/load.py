@@ -15,7 +15,7 @@ from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
 from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
-from clearway.model.policy import Policy, network_policy
+from clearway.model.policy import Critic, Policy, network_critic, network_policy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
 
@@ -36,10 +36,16 @@ class Agent:
 
     def policy(self, world: World) -> Policy:
         """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
+        return network_policy(self._lookup(world), world)
+
+    def critic(self, world: World) -> Critic:
+        """As `policy`, with the values (B,) too."""
+        return network_critic(self._lookup(world), world)
+
+    def _lookup(self, world: World) -> LookupNetwork:
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
-        lookup = LookupNetwork(self.network, self.feature_map(world.features), world.target_state)
-        return network_policy(lookup, world)
+        return LookupNetwork(self.network, self.feature_map(world.features), world.target_state)
 
 
 def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:

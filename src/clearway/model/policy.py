@@ -20,17 +20,28 @@ A pure function: the same history and target give the same probabilities. They n
 """
 
 
-def network_policy(network: LookupNetwork, world: World) -> Policy:
-    """The network's policy in the world whose states and targets it was made for; rows may come in any order."""
+Critic = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
+"""As a `Policy`, with the value of the history too: probabilities (B, A) and values (B,)."""
+
+
+def network_critic(network: LookupNetwork, world: World) -> Critic:
+    """What the network says in the world whose states and targets it was made for; rows may come in any order."""
     scene_of_target = world.target_scene
 
-    def probabilities(history: Tensor, target: Tensor) -> Tensor:
+    def probabilities_and_values(history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         scene = scene_of_target[target]
         order = torch.argsort(scene, stable=True)
         rows_per_scene = torch.bincount(scene, minlength=world.scene_count).tolist()
-        scores = network.forward(history[order], target[order], rows_per_scene).scores
-        placed = torch.empty_like(scores)
-        placed[order] = torch.softmax(scores, 1)
-        return placed
+        output = network.forward(history[order], target[order], rows_per_scene)
+        probabilities, values = torch.empty_like(output.scores), torch.empty_like(output.value)
+        probabilities[order] = torch.softmax(output.scores, 1)
+        values[order] = output.value
+        return probabilities, values
 
-    return probabilities
+    return probabilities_and_values
+
+
+def network_policy(network: LookupNetwork, world: World) -> Policy:
+    """The network's policy in the world whose states and targets it was made for; rows may come in any order."""
+    critic = network_critic(network, world)
+    return lambda history, target: critic(history, target)[0]

@@ -73,7 +73,7 @@ def draw_map(
         title: stands above.
     """
     assert zones.shape == (scene.state_count,)
-    left, right, low, high = _extent(scene)
+    left, right, low, high = map_extent(scene)
     bottom = low - SCALE_BAR_SPACE_M
     height_in = WIDTH_IN * (high - bottom) / (right - left)
     lane_m = LANE_PT / 72 * (right - left) / WIDTH_IN
@@ -95,7 +95,7 @@ def draw_map(
         )
 
 
-def _extent(scene: Scene) -> tuple[float, float, float, float]:
+def map_extent(scene: Scene) -> tuple[float, float, float, float]:
     """The rectangle of the map, metres: x from, x to, z from, z to."""
     view = scene.top_view
     if view is not None:
@@ -109,7 +109,7 @@ def _draw_room(axes: Axes, scene: Scene) -> None:
     """The picture from above, its cells under a veil; without one a dark ground with light cells."""
     from matplotlib.patches import Rectangle
 
-    left, right, low, high = _extent(scene)
+    left, right, low, high = map_extent(scene)
     if scene.top_view is not None:
         axes.imshow(scene.top_view.image, extent=(left, right, low, high), origin="upper", aspect="equal")
     else:

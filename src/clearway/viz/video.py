@@ -36,13 +36,13 @@ class Walked:
         world: where it was walked.
         target: index of the world's target.
         trajectory: states and actions.
-        probabilities: (T + 1, A) of the actions, before each step and after the last.
+        probabilities: (T + 1, A) of the actions, before each step and after the last; None where no agent chose them.
     """
 
     world: World
     target: int
     trajectory: Trajectory
-    probabilities: np.ndarray
+    probabilities: np.ndarray | None
 
 
 def walked(world: World, policy: Policy, target: int, trajectory: Trajectory, history_length: int) -> Walked:
@@ -64,11 +64,12 @@ def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
         bumps = np.stack([states[:step], actions[:step]], axis=1)[blocked[:step]]
         picture = Image.fromarray(renderer.rgb(Episode(states[: step + 1], bumps), shown.target))
         chosen = int(actions[step]) if step < len(actions) else None
-        yield np.asarray(_with_strip(picture, shown.probabilities[step], chosen))
+        thought = None if shown.probabilities is None else shown.probabilities[step]
+        yield np.asarray(_with_strip(picture, thought, chosen))
 
 
-def _with_strip(picture: Image.Image, probabilities: np.ndarray, chosen: int | None) -> Image.Image:
-    """The picture with a bar for each action below it; the action taken is named in full strength."""
+def _with_strip(picture: Image.Image, probabilities: np.ndarray | None, chosen: int | None) -> Image.Image:
+    """The picture with a bar for each action below it, or its name alone; the action taken is named in full strength."""
     width, height = picture.width // 2 * 2, (picture.height + STRIP_PX) // 2 * 2
     frame = Image.new("RGB", (width, height), colours.PAPER)
     frame.paste(picture, (0, 0))
@@ -77,11 +78,13 @@ def _with_strip(picture: Image.Image, probabilities: np.ndarray, chosen: int | N
     top = height - STRIP_PX
     for action in Action:
         left = MARGIN_PX + action * space
-        share = float(probabilities[action])
+        name = action.name.lower().replace("_", " ")
         ink = colours.INK if action == chosen else colours.FAINT_INK
-        pen.text(
-            (left, top + 8), f"{action.name.lower().replace('_', ' ')}  {100 * share:.0f} %", ink, font, anchor="lm"
-        )
+        if probabilities is None:
+            pen.text((left, top + 8), name, ink, font, anchor="lm")
+            continue
+        share = float(probabilities[action])
+        pen.text((left, top + 8), f"{name}  {100 * share:.0f} %", ink, font, anchor="lm")
         length = (space - MARGIN_PX) * share
         pen.rectangle((left, top + 20, left + space - MARGIN_PX, top + 20 + BAR_PX), outline=colours.FAINT_INK)
         if length >= 1:

@@ -1,0 +1,277 @@
+// The page: holds what is known of the episode, asks the viewer for more, and shows it.
+import { createCard, element } from "./cards.js";
+import { drawChart } from "./charts.js";
+import { connect, fetched } from "./connection.js";
+import { listenToKeys } from "./keys.js";
+import { showLegend } from "./legend.js";
+import { createMap } from "./map.js";
+
+const $ = (id) => document.getElementById(id);
+const STEPS_PER_S = [1, 2, 4, 8, 16, 30];
+const STATUS_MS = 6000;
+
+const known = { stage: null, scene: null, sceneIndex: -1, episode: null, walkers: [], ended: [], cards: [], minds: new Map(), link: "" };
+let shown = 0; // the step looked at
+let playing = false;
+let turn = 0; // of playing: an older loop notices that it is over
+
+const map = createMap($("map"), (state, put) => {
+  const what = put ?? document.querySelector("input[name=put]:checked").value;
+  begin({ [what]: state, ...(what === "target" ? { start: known.episode.start } : {}) });
+});
+const viewer = connect(() => say("The viewer has ended. Start it again, then load its new address.", true, false));
+
+async function start() {
+  known.stage = await fetched("stage.json");
+  $("scene").replaceChildren(...known.stage.scenes.map((name) => element("option", { value: name, textContent: name.replaceAll("_", " ") })));
+  $("mind").replaceChildren(...known.stage.agents.map((agent, index) => element("option", { value: index, textContent: agent.name })));
+  for (const part of document.querySelectorAll(".needs-agent")) part.hidden = !known.stage.agents.length;
+  $("scene-field").hidden = known.stage.scenes.length < 2;
+  document.title = `clearway: ${known.stage.agents.map((agent) => agent.name).join(", ") || known.stage.scenes[0]}`;
+  $("value-figure").hidden = !known.stage.agents.length;
+  $("speed").dispatchEvent(new Event("input"));
+  await load(location.hash.slice(1));
+}
+
+async function load(query) {
+  if (!(await ask({ do: "begin", episode: query }))) await ask({ do: "begin", episode: "" });
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  if (known.episode?.recorded && !still) play(true);
+}
+
+// A new episode like this one but for what `changes` say; without a start in them it begins where this one did.
+async function begin(changes = {}) {
+  play(false);
+  const { scene, start, target, selection, seed, drive } = known.episode;
+  const next = { scene: known.stage.scenes[scene], start, target, selection, seed, drive: drive ? 1 : 0, ...changes };
+  for (const name of Object.keys(next)) if (next[name] === null) delete next[name];
+  await ask({ do: "begin", episode: new URLSearchParams(next).toString() });
+}
+
+// Asks, takes in the answer, and says whether it was not refused.
+async function ask(message) {
+  const answer = await viewer.ask(message);
+  if (answer.kind === "refused") {
+    say(answer.text, true);
+    return false;
+  }
+  await { episode: takeEpisode, steps: takeSteps, map: takeMind }[answer.kind](answer);
+  return true;
+}
+
+async function takeEpisode(answer) {
+  const before = known.episode;
+  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link });
+  if (answer.scene !== known.sceneIndex) {
+    known.scene = await fetched(`scenes/${answer.scene}/map.json`);
+    known.sceneIndex = answer.scene;
+    await map.setScene(known.scene, `scenes/${answer.scene}/above.jpg`);
+  }
+  if (!before || before.scene !== answer.scene || before.target !== answer.target) known.minds.clear();
+  shown = 0;
+  $("scene").value = known.scene.name;
+  $("selection").value = answer.selection;
+  $("race").setAttribute("aria-pressed", answer.drive);
+  const pictures = {
+    any: known.scene.has_pictures,
+    coarse: known.scene.has_pictures && known.scene.picture_shape[0] < 100,
+    path: (state) => `scenes/${answer.scene}/views/${state}.jpg`,
+  };
+  known.cards = known.walkers.map((walker, index) => createCard(walker, index, pictures, drive));
+  $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
+  showTarget(pictures);
+  await showLayer();
+  keepLink();
+  show();
+}
+
+function takeSteps(answer) {
+  answer.steps.forEach((step, index) => step && known.walkers[index].steps.push(step));
+  const arrived = answer.steps.flatMap((step, index) => (step?.reached ? [index] : []));
+  Object.assign(known, { ended: answer.ended, link: answer.link });
+  shown = last();
+  for (const index of arrived) {
+    const { name, steps } = known.walkers[index], { collisions } = steps.at(-1);
+    say(`${name}: target reached in ${counted(steps.length - 1, "step")}, ${counted(collisions, "collision")}`);
+  }
+  if (!playing) keepLink();
+  show();
+  return answer.steps.some((step) => step);
+}
+
+function takeMind(answer) {
+  known.minds.set(answer.walker, answer);
+}
+
+const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
+const last = () => Math.max(...known.walkers.map((walker) => walker.steps.length - 1));
+const over = () => known.ended.every((ended, index) => ended || (!known.walkers[index].agent && known.walkers.length > 1));
+
+function show() {
+  const end = last();
+  known.cards.forEach(({ show: showCard }, index) => showCard(shown, known.ended[index]));
+  map.show({ walkers: known.walkers, target: known.episode.target, start: known.episode.start, step: shown });
+  $("timeline").max = end;
+  $("timeline").value = shown;
+  $("position").textContent = `${shown} / ${end}`;
+  $("back").disabled = shown === 0;
+  showCharts();
+}
+
+function showCharts() {
+  drawChart($("value-chart"), known.walkers, shown, (step) => step.value, 2);
+  drawChart($("distance-chart"), known.walkers, shown, (step) => (step.to_go < 0 ? null : step.to_go), 0);
+}
+
+function showTarget(pictures) {
+  const { target } = known.episode, heading = (state) => `pose ${state}, heading ${known.scene.headings_deg[state]}°`;
+  $("goal-picture").hidden = !pictures.any;
+  $("goal-missing").hidden = pictures.any;
+  $("goal-picture").classList.toggle("coarse", pictures.coarse);
+  if (pictures.any) {
+    $("goal-picture").src = pictures.path(target);
+    $("goal-picture").alt = `Picture of the target, ${heading(target)}`;
+  }
+  const trained = known.stage.agents.length ? (known.scene.targets.includes(target) ? ", trained on" : ", not trained on") : "";
+  $("goal-where").textContent = heading(target) + trained;
+  $("targets").replaceChildren(
+    ...known.scene.targets.map((state) => {
+      const inside = pictures.any ? element("img", { src: pictures.path(state), alt: "" }) : String(state);
+      const button = element("button", { type: "button", "aria-pressed": state === target, "aria-label": `Target ${heading(state)}`, title: heading(state) }, inside);
+      button.addEventListener("click", () => begin({ target: state }));
+      return button;
+    }),
+  );
+}
+
+async function showLayer() {
+  const kind = document.querySelector("input[name=layer]:checked").value, mind = Number($("mind").value);
+  $("mind-field").hidden = kind === "zones" || known.stage.agents.length < 2;
+  if (kind !== "zones" && !known.minds.has(mind)) await ask({ do: "map", walker: mind });
+  const { values, probabilities } = known.minds.get(mind) ?? {};
+  const layer = { kind, values, probabilities, range: values && [Math.min(...values), Math.max(...values)] };
+  map.setLayer(layer);
+  showLegend($("legend"), layer);
+}
+
+async function play(on) {
+  const mine = ++turn;
+  playing = on;
+  document.body.classList.toggle("playing", on);
+  $("play").setAttribute("aria-label", on ? "Pause" : "Play");
+  if (!on) return keepLink();
+  if (shown === last() && over()) await rewind();
+  while (turn === mine) {
+    const due = performance.now() + 1000 / STEPS_PER_S[$("speed").value];
+    if (!(await forward())) return turn === mine ? play(false) : undefined;
+    await new Promise((resolve) => setTimeout(resolve, Math.max(due - performance.now(), 0)));
+  }
+}
+
+// One step further: what has been seen before first, then a new one. False where the episode is over.
+async function forward() {
+  if (shown < last()) {
+    shown += 1;
+    show();
+    return true;
+  }
+  if (over()) return false;
+  const before = last();
+  return (await ask({ do: "step" })) && last() > before;
+}
+
+async function rewind() {
+  shown = 0;
+  show();
+}
+
+async function step() {
+  play(false);
+  await forward();
+}
+
+function back() {
+  play(false);
+  shown = Math.max(shown - 1, 0);
+  show();
+}
+
+async function drive(action) {
+  if (!known.episode.drive) return;
+  shown = last();
+  await ask({ do: "drive", action, along: !playing });
+}
+
+function keepLink() {
+  if (known.link) history.replaceState(null, "", `#${known.link}`);
+}
+
+async function copyLink() {
+  keepLink();
+  try {
+    await navigator.clipboard.writeText(location.href);
+    say("Link copied: it replays this episode as long as this viewer runs");
+  } catch {
+    say("The link is in the address bar");
+  }
+}
+
+async function saveFilm() {
+  $("save-film").disabled = true;
+  say("Making the film …", false, false);
+  const response = await fetch(`film.mp4?${known.link}`).catch(() => null);
+  if (response?.ok) {
+    const address = URL.createObjectURL(await response.blob());
+    element("a", { href: address, download: "episode.mp4" }).click();
+    URL.revokeObjectURL(address);
+    say("Film saved as episode.mp4");
+  } else {
+    say(response ? (await response.json()).text : "The viewer did not answer", true);
+  }
+  $("save-film").disabled = false;
+}
+
+let forget = 0;
+function say(text, refusal = false, passing = true) {
+  clearTimeout(forget);
+  $("status").textContent = text;
+  $("status").classList.toggle("refusal", refusal);
+  if (passing) forget = setTimeout(() => ($("status").textContent = ""), STATUS_MS);
+}
+
+function setSpeed(change) {
+  $("speed").value = Number($("speed").value) + change;
+  $("speed").dispatchEvent(new Event("input"));
+}
+
+function chooseLayer(kind) {
+  if (!known.stage.agents.length) return;
+  document.querySelector(`input[name=layer][value=${kind}]`).checked = true;
+  showLayer();
+}
+
+const newStart = () => begin({ start: null, seed: Math.floor(Math.random() * 1e6) });
+const race = () => known.stage.agents.length && begin({ drive: known.episode.drive ? 0 : 1 });
+const help = () => $("help-dialog").showModal();
+
+$("scene").addEventListener("change", () => begin({ scene: $("scene").value, start: null, target: null }));
+$("selection").addEventListener("change", () => begin({ selection: $("selection").value }));
+$("layer").addEventListener("change", showLayer);
+$("mind").addEventListener("change", showLayer);
+$("timeline").addEventListener("input", () => {
+  play(false);
+  shown = Number($("timeline").value);
+  show();
+});
+$("speed").addEventListener("input", () => ($("speed-shown").textContent = `${STEPS_PER_S[$("speed").value]} steps/s`));
+for (const [id, act] of Object.entries({ play: () => play(!playing), step, back, restart: () => begin(), "new-start": newStart, race, "copy-link": copyLink, "save-film": saveFilm, help })) {
+  $(id).addEventListener("click", act);
+}
+listenToKeys({ play: () => play(!playing), step, back, restart: () => begin(), newStart, race, drive, chooseLayer, setSpeed, copyLink, help, toMap: () => $("map").focus() });
+window.addEventListener("resize", () => {
+  map.refresh();
+  if (known.walkers.length) showCharts();
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => known.walkers.length && showCharts());
+window.addEventListener("hashchange", () => load(location.hash.slice(1)));
+start();

@@ -1,0 +1,246 @@
+// The map: the room from above, its zones or what an agent thinks of every pose, and the ways walked so far.
+import { ACTIONS, INK, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, lookOf, penOf } from "./looks.js";
+
+const VEIL = "rgb(255 255 255 / 45%)"; // over the cells in the picture from above
+const CELL_SHARE = 0.94;
+const LOWEST_PX = 220, LARGEST_CELL_PX = 90;
+
+export function createMap(canvas, onPick) {
+  const ground = document.createElement("canvas"); // all that stays the same from step to step
+  let scene = null, above = null, layer = { kind: "zones" }, shown = null, cursor = null;
+  let scale = 1, width = 0, height = 0;
+
+  const place = (x, z) => [(x - scene.extent_m[0]) * scale, (scene.extent_m[3] - z) * scale];
+  const at = (state) => place(...scene.locations_m[state]);
+
+  // The point so far ahead of a pose, and to its right, in cells.
+  function beside(state, ahead, right) {
+    const turn = (scene.headings_deg[state] * Math.PI) / 180;
+    const [x, y] = at(state), side = scene.cell_size_m * scale;
+    return [x + side * (ahead * Math.sin(turn) + right * Math.cos(turn)), y - side * (ahead * Math.cos(turn) - right * Math.sin(turn))];
+  }
+
+  function triangle(pen, state) {
+    const reach = CELL_SHARE / 2, aside = reach * Math.tan((scene.turn_deg * Math.PI) / 360);
+    pen.moveTo(...at(state));
+    pen.lineTo(...beside(state, reach, aside));
+    pen.lineTo(...beside(state, reach, -aside));
+    pen.closePath();
+  }
+
+  function fit() {
+    const [left, right, low, high] = scene.extent_m;
+    const room = canvas.parentElement.clientWidth;
+    const tallest = Math.max(window.innerHeight - (window.innerWidth > 990 ? 300 : 260), LOWEST_PX);
+    scale = Math.min(room / (right - left), tallest / (high - low), LARGEST_CELL_PX / scene.cell_size_m);
+    width = Math.round((right - left) * scale);
+    height = Math.round((high - low) * scale);
+    canvas.style.width = `${width}px`;
+    canvas.style.height = `${height}px`;
+  }
+
+  function paintGround() {
+    const pen = penOf(ground, width, height), side = scene.cell_size_m * scale;
+    pen.fillStyle = WALL;
+    pen.fillRect(0, 0, width, height);
+    if (above) pen.drawImage(above, 0, 0, width, height);
+    pen.strokeStyle = "#ffffff";
+    pen.lineWidth = 0.8;
+    pen.fillStyle = above ? VEIL : ZONES[0];
+    for (const state of scene.firstOfCell) {
+      const [x, y] = at(state);
+      pen.fillRect(x - side / 2, y - side / 2, side, side);
+      pen.strokeRect(x - side / 2, y - side / 2, side, side);
+    }
+    if (layer.kind === "zones") paintZones(pen);
+    else if (layer.kind === "value") paintValues(pen);
+    else paintPolicy(pen, side);
+  }
+
+  function paintZones(pen) {
+    const hatch = hatching(pen);
+    for (const zone of [1, 2]) {
+      pen.beginPath();
+      scene.zones.forEach((own, state) => own === zone && triangle(pen, state));
+      pen.globalAlpha = ZONE_OPACITY[zone];
+      pen.fillStyle = ZONES[zone];
+      pen.fill();
+      if (zone === 2) {
+        pen.fillStyle = hatch;
+        pen.fill();
+      }
+      pen.globalAlpha = 1;
+    }
+  }
+
+  function paintValues(pen) {
+    const [low, high] = layer.range;
+    layer.values.forEach((value, state) => {
+      pen.beginPath();
+      triangle(pen, state);
+      pen.fillStyle = heat((value - low) / Math.max(high - low, 1e-9));
+      pen.fill();
+    });
+  }
+
+  function paintPolicy(pen, side) {
+    layer.probabilities.forEach((shares, state) => {
+      const best = shares.indexOf(Math.max(...shares)), sure = (shares[best] - 0.25) / 0.75;
+      pen.beginPath();
+      triangle(pen, state);
+      pen.globalAlpha = 0.25 + 0.7 * Math.max(sure, 0);
+      pen.fillStyle = ACTIONS[best].colour;
+      pen.fill();
+      pen.globalAlpha = 1;
+      const room = side * Math.min(0.15, 0.3 * Math.tan((scene.turn_deg * Math.PI) / 360));
+      if (room < 3) return;
+      const [x, y] = beside(state, 0.32, 0);
+      pen.save();
+      pen.translate(x, y);
+      pen.rotate(((scene.headings_deg[state] + ACTIONS[best].turn) * Math.PI) / 180);
+      pen.beginPath();
+      pen.moveTo(0, -room * 0.8);
+      pen.lineTo(room * 0.7, room * 0.6);
+      pen.lineTo(-room * 0.7, room * 0.6);
+      pen.closePath();
+      pen.fillStyle = "#ffffff";
+      pen.fill();
+      pen.restore();
+    });
+  }
+
+  function draw() {
+    if (!scene || !shown || !width) return;
+    const pen = penOf(canvas, width, height), side = scene.cell_size_m * scale;
+    pen.drawImage(ground, 0, 0, width, height);
+    drawTarget(pen, ...at(shown.target), side * 0.27, scene.headings_deg[shown.target]);
+    const lanes = shown.walkers.map((_, i) => (i - (shown.walkers.length - 1) / 2) * side * 0.13);
+    const thick = Math.min(Math.max(side * 0.08, 2), 5);
+    shown.walkers.forEach((walker, i) => {
+      const look = lookOf(walker, i), steps = walker.steps.slice(0, shown.step + 1);
+      const moved = (state, ahead = 0) => beside(state, ahead, 0).map((value) => value + lanes[i]);
+      const points = steps.map((step) => moved(step.state));
+      if (points.length > 1) drawLine(pen, points, look, thick);
+      dot(pen, points[0], thick * 1.5, look);
+    });
+    shown.walkers.forEach((walker, i) => {
+      const look = lookOf(walker, i), steps = walker.steps.slice(0, shown.step + 1);
+      for (const step of steps.filter((each) => each.blocked)) {
+        const [x, y] = beside(step.state, step.action === 3 ? -0.5 : 0.5, 0);
+        drawBump(pen, x + lanes[i], y + lanes[i], side * 0.09, look);
+      }
+      const last = steps.at(-1), [x, y] = at(last.state);
+      drawAgent(pen, x + lanes[i], y + lanes[i], side * 0.24, scene.headings_deg[last.state], look);
+    });
+    if (cursor !== null && document.activeElement === canvas) drawCursor(pen);
+  }
+
+  function dot(pen, [x, y], radius, look) {
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 2 * Math.PI);
+    pen.fillStyle = look.colour;
+    pen.strokeStyle = look.halo;
+    pen.lineWidth = radius * 0.7;
+    pen.stroke();
+    pen.fill();
+  }
+
+  function drawCursor(pen) {
+    for (const [colour, thick] of [["#ffffff", 5], [INK, 2.5]]) {
+      pen.beginPath();
+      triangle(pen, cursor);
+      pen.lineWidth = thick;
+      pen.lineJoin = "round";
+      pen.strokeStyle = colour;
+      pen.stroke();
+    }
+  }
+
+  // The pose at a point: of the cell there, the heading that the point lies towards.
+  function poseAt(x, y) {
+    const reach = (scene.cell_size_m * scale) / 2;
+    let best = null, least = Infinity;
+    scene.locations_m.forEach((_, state) => {
+      const [cx, cy] = at(state);
+      if (Math.max(Math.abs(x - cx), Math.abs(y - cy)) > reach) return;
+      const towards = (Math.atan2(x - cx, cy - y) * 180) / Math.PI;
+      const apart = Math.abs(((scene.headings_deg[state] - towards + 540) % 360) - 180);
+      if (apart < least) [best, least] = [state, apart];
+    });
+    return best;
+  }
+
+  canvas.addEventListener("click", (event) => {
+    const box = canvas.getBoundingClientRect();
+    const state = poseAt(event.clientX - box.left, event.clientY - box.top);
+    if (state !== null) onPick(state, event.shiftKey ? "target" : null);
+  });
+
+  canvas.addEventListener("keydown", (event) => {
+    const way = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] }[event.key];
+    const turn = { PageUp: -1, PageDown: 1 }[event.key];
+    if (way) moveCursor(...way);
+    else if (turn) turnCursor(turn);
+    else if (event.key === "Enter" && cursor !== null) onPick(cursor, "start");
+    else if (event.key.toLowerCase() === "t" && cursor !== null) onPick(cursor, "target");
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+    draw();
+  });
+  canvas.addEventListener("focus", draw);
+  canvas.addEventListener("blur", draw);
+
+  // To the nearest cell in that direction, keeping the heading.
+  function moveCursor(dx, dz) {
+    const [x, z] = scene.locations_m[cursor];
+    let best = cursor, least = Infinity;
+    scene.locations_m.forEach(([otherX, otherZ], state) => {
+      const along = (otherX - x) * dx + (otherZ - z) * dz, aside = Math.abs((otherX - x) * dz) + Math.abs((otherZ - z) * dx);
+      const apart = along + 2 * aside;
+      if (along > 1e-6 && apart < least && scene.headings_deg[state] === scene.headings_deg[cursor]) [best, least] = [state, apart];
+    });
+    cursor = best;
+  }
+
+  function turnCursor(turn) {
+    const wanted = (scene.headings_deg[cursor] + turn * scene.turn_deg + 360) % 360;
+    const here = scene.cells[cursor];
+    const found = scene.cells.findIndex((cell, state) => cell === here && Math.abs(scene.headings_deg[state] - wanted) < 1);
+    if (found >= 0) cursor = found;
+  }
+
+  function refresh() {
+    if (!scene) return;
+    fit();
+    paintGround();
+    draw();
+  }
+
+  return {
+    async setScene(json, picturePath) {
+      above = null;
+      layer = { kind: "zones" };
+      if (json.has_above) {
+        const picture = new Image();
+        picture.src = picturePath;
+        await picture.decode();
+        above = picture;
+      }
+      scene = { ...json, firstOfCell: [] };
+      json.cells.forEach((cell, state) => (scene.firstOfCell[cell] ??= state));
+      cursor = 0;
+      refresh();
+    },
+    setLayer(next) {
+      layer = next;
+      refresh();
+    },
+    show(next) {
+      if (!shown || next.start !== shown.start) cursor = next.start;
+      shown = next;
+      draw();
+    },
+    refresh,
+  };
+}

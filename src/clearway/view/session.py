@@ -1,0 +1,163 @@
+"""`Session`: the episode that one open page shows. No sockets and no page here: messages in, messages out.
+
+Messages are JSON objects. The page says what to `do`:
+
+    {"do": "begin", "episode": "scene=...&target=..."}    a new episode, see `episode`
+    {"do": "step"}                                        every agent takes a step
+    {"do": "drive", "action": 0, "along": true}           the user takes a step, and the agents too with `along`
+    {"do": "map", "walker": 0}                            values and probabilities of every pose
+
+and gets one answer to each, told apart by its `kind`: "episode", "steps", "map" or "refused" (with a `text`). A refused
+message changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from clearway.errors import ClearwayError
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.graph import UNREACHABLE
+from clearway.scenes.scene import Scene
+from clearway.view.episode import Episode, actions_of, letters, read_episode
+from clearway.view.stage import Stage, agent_world
+from clearway.view.walker import Mind, Walker
+
+Message = dict[str, Any]
+YOU = "you"
+DIGITS = 4  # of probabilities and values that are sent
+
+
+class Session:
+    """One page's episode.
+
+    Args:
+        stage: scenes and agents, shared between sessions and never changed.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.episode = Episode()
+        self.walkers: list[Walker] = []
+
+    def answer(self, message: object) -> Message:
+        """What to answer to a message."""
+        try:
+            return self._answer(message)
+        except ClearwayError as error:
+            return {"kind": "refused", "text": str(error)}
+
+    def _answer(self, message: object) -> Message:
+        match message:
+            case {"do": "begin", "episode": str(query)}:
+                self.begin(read_episode(query))
+                return self._whole_episode()
+            case {"do": "step"} if self.walkers:
+                return self._step([None] * len(self.walkers), set(range(len(self.walkers))))
+            case {"do": "drive", "action": int(action), "along": bool(along)} if 0 <= action < ACTION_COUNT:
+                return self._drive(action, along)
+            case {"do": "map", "walker": int(index)} if 0 <= index < self._agents_walking:
+                return self._map(index)
+        raise ClearwayError("the page sent a message that the viewer does not know. Load the page again")
+
+    @property
+    def _agents_walking(self) -> int:
+        return len(self.stage.agents) if self.walkers else 0
+
+    def begin(self, wanted: Episode) -> None:
+        """Begin an episode; what it leaves open is chosen.
+
+        Raises:
+            ClearwayError: the scene, start or target does not exist or leads nowhere; the old episode stays.
+        """
+        scene = self.stage.scenes[self.stage.index(wanted.scene) if wanted.scene is not None else 0]
+        target = self.stage.targets[scene.name][0] if wanted.target is None else wanted.target
+        world = self.stage.user_world(scene, target)
+        start = _drawn_start(scene, target, wanted.seed) if wanted.start is None else wanted.start
+        if not 0 <= start < scene.state_count:
+            raise ClearwayError(f"start {start}: {scene.name} has states 0 to {scene.state_count - 1}. Choose another")
+        episode = replace(wanted, scene=scene.name, start=start, target=target, drive=wanted.drive or not self.stage.agents)
+        names = self.names(episode)
+        walks = dict(zip(names, map(actions_of, episode.walks), strict=False))
+        walkers = []
+        for shown in self.stage.agents:
+            own_world, index = agent_world(shown, scene.name, target)
+            learner = shown.agent.record.learner
+            critic = shown.agent.critic(own_world)
+            mind = Mind(critic, learner.reward_scale, episode.selection, learner.history_length)
+            recorded = walks.get(shown.name, ())
+            walkers.append(
+                Walker(own_world, index, start, shown.reward, seed=episode.seed, mind=mind, recorded=recorded)
+            )
+        if episode.drive:
+            walk = Walker(world, 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=walks.get(YOU, ()))
+            walkers.append(walk)
+        self.episode, self.walkers = episode, walkers
+
+    def names(self, episode: Episode) -> list[str]:
+        """Of an episode's walkers, in their order."""
+        return [shown.name for shown in self.stage.agents] + [YOU] * episode.drive
+
+    def walked(self) -> Episode:
+        """The episode with all steps taken so far."""
+        return replace(self.episode, walks=tuple(letters(walker.actions) for walker in self.walkers))
+
+    def _step(self, actions: list[int | None], moving: set[int]) -> Message:
+        steps = [
+            walker.step(action) if index in moving else None
+            for index, (walker, action) in enumerate(zip(self.walkers, actions, strict=True))
+        ]
+        sent = [asdict(step) if step else None for step in steps]
+        return {"kind": "steps", "steps": sent, "ended": self._ended(), "link": self.walked().query()}
+
+    def _drive(self, action: int, along: bool) -> Message:
+        if not self.walkers or not self.episode.drive:
+            raise ClearwayError("nobody drives in this episode. Choose Race first")
+        you = len(self.walkers) - 1
+        actions: list[int | None] = [None] * you + [action]
+        return self._step(actions, set(range(len(self.walkers))) if along else {you})
+
+    def _ended(self) -> list[bool]:
+        return [walker.ended for walker in self.walkers]
+
+    def _whole_episode(self) -> Message:
+        episode = self.episode
+        scene = self.stage.scenes[self.stage.index(str(episode.scene))]
+        rewards = [shown.reward.name for shown in self.stage.agents] + [self.stage.reward.name]
+        return {
+            "kind": "episode",
+            "scene": self.stage.index(scene.name),
+            "start": episode.start,
+            "target": episode.target,
+            "selection": episode.selection,
+            "seed": episode.seed,
+            "drive": episode.drive,
+            "recorded": max((len(walker.recorded) for walker in self.walkers), default=0),
+            "walkers": [
+                {"name": name, "agent": walker.mind is not None, "reward": reward, "steps": list(map(asdict, walker.steps))}
+                for name, walker, reward in zip(self.names(episode), self.walkers, rewards, strict=False)
+            ],
+            "ended": self._ended(),
+            "link": self.walked().query(),
+        }
+
+    def _map(self, index: int) -> Message:
+        probabilities, values = self.walkers[index].map_of_mind()
+        return {
+            "kind": "map",
+            "walker": index,
+            "values": np.round(values.double().numpy(), DIGITS).tolist(),
+            "probabilities": np.round(probabilities.double().numpy(), DIGITS).tolist(),
+        }
+
+
+def _drawn_start(scene: Scene, target: int, seed: int) -> int:
+    """A state from which the target can be reached, drawn uniformly; the same for the same seed."""
+    steps = scene.distances_to(np.array([target]))[0]
+    starts = np.flatnonzero((steps != UNREACHABLE) & (steps > 0))
+    return int(np.random.default_rng([seed, target]).choice(starts))
+
+

@@ -1,0 +1,142 @@
+"""What a viewer shows: the scenes, and the agents that walk in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from clearway.choices import ZoneLevel
+from clearway.envs.world import World, make_world
+from clearway.errors import RunError
+from clearway.learn.load import Agent, load_agent, run_scenes
+from clearway.reward import COLLISION_AWARE, Reward
+from clearway.scenes.scene import Scene
+from clearway.scenes.targets import default_targets
+
+
+@dataclass(frozen=True)
+class StageAgent:
+    """An agent with its run's scenes, in the run's order.
+
+    Attributes:
+        name: of its run folder.
+        agent: the network and its record.
+        scenes: all that the run was trained on.
+    """
+
+    name: str
+    agent: Agent
+    scenes: tuple[Scene, ...]
+
+    @property
+    def reward(self) -> Reward:
+        """What it learnt from: with rewards clipped, if its learner clipped them, so that values and rewards compare."""
+        record = self.agent.record
+        return record.reward.with_changes(clip=record.reward.clip or record.learner.clip_rewards)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Scenes and agents.
+
+    Attributes:
+        scenes: those that every agent knows.
+        targets: states to offer as targets, by scene name: those that the first agent was trained on.
+        agents: none, one or two.
+    """
+
+    scenes: tuple[Scene, ...]
+    targets: dict[str, tuple[int, ...]]
+    agents: tuple[StageAgent, ...] = ()
+
+    @property
+    def zone_level(self) -> ZoneLevel:
+        """Whose zones the map shows: those of poses or of cells."""
+        return self.agents[0].agent.record.zone_level if self.agents else "pose"
+
+    @property
+    def reward(self) -> Reward:
+        """What a user who drives earns: as the first agent."""
+        return self.agents[0].reward if self.agents else COLLISION_AWARE
+
+    def index(self, name: str) -> int:
+        """Place of a scene in `scenes`.
+
+        Raises:
+            RunError: there is none of that name.
+        """
+        names = [scene.name for scene in self.scenes]
+        if name not in names:
+            raise RunError(f"scene {name}: not shown here. Choose one of {', '.join(names)}")
+        return names.index(name)
+
+    def user_world(self, scene: Scene, target: int) -> World:
+        """The tables for a walk without an agent: one scene, one target."""
+        return make_world([scene], {scene.name: (target,)}, self.zone_level)
+
+
+def agent_world(shown: StageAgent, scene: str, target: int) -> tuple[World, int]:
+    """The world of an agent's run in which `scene` has the one target given, and that target's index.
+
+    Args:
+        shown: the agent.
+        scene: name of one of its scenes.
+        target: state in the scene's own numbering, trained on or not.
+
+    Raises:
+        SceneError: there is no such state, or none leads to it.
+    """
+    record = shown.agent.record
+    targets = {name: (target,) if name == scene else own[:1] for name, own in record.targets.items()}
+    world = make_world(shown.scenes, targets, record.zone_level)
+    return world, list(targets).index(scene)
+
+
+def scene_stage(scene: Scene) -> Stage:
+    """A scene to walk through without an agent."""
+    return Stage((scene,), {scene.name: default_targets(scene)})
+
+
+def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None) -> Stage:
+    """The agents of one or two runs, in the scenes that they share.
+
+    Args:
+        folders: of the runs.
+        scene_files: where the scenes are, if no longer where they were at training.
+
+    Raises:
+        RunError: a run cannot be used, or the two share no scene.
+    """
+    agents = []
+    for folder, name in zip(folders, _names(folders), strict=True):
+        agent = load_agent(folder)
+        agents.append(StageAgent(name, agent, tuple(run_scenes(agent.record, scene_files))))
+    first, *others = agents
+    scenes = tuple(scene for scene in first.scenes if all(_has(other, scene) for other in others))
+    if not scenes:
+        known = " and ".join(", ".join(scene.name for scene in shown.scenes) for shown in agents)
+        raise RunError(
+            f"{folders[1]}: trained on other rooms than {folders[0]} ({known}). Give runs that share a scene"
+        )
+    trained = first.agent.record.targets
+    return Stage(scenes, {scene.name: trained[scene.name] for scene in scenes}, tuple(agents))
+
+
+def _names(folders: Sequence[Path]) -> list[str]:
+    """The folders' own names, or their whole paths where those are the same."""
+    names = [folder.resolve().name for folder in folders]
+    return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
+
+
+def _has(shown: StageAgent, scene: Scene) -> bool:
+    """The agent knows a scene of that name with the same poses and moves; its features may be others."""
+    return any(
+        own.name == scene.name
+        and np.array_equal(own.graph, scene.graph)
+        and np.array_equal(own.locations_m, scene.locations_m)
+        and np.array_equal(own.headings_deg, scene.headings_deg)
+        for own in shown.scenes
+    )

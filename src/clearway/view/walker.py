@@ -1,0 +1,187 @@
+"""`Walker`: one agent, or the user, on its way through an episode, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from clearway.envs.navigation import Navigation
+from clearway.envs.streams import Streams
+from clearway.envs.world import World
+from clearway.evaluate.episodes import ACTION_STREAM
+from clearway.evaluate.selection import ActionSelection, UntriedActions, sampled
+from clearway.model.policy import Critic
+from clearway.reward import Reward
+from clearway.view.episode import MOST_STEPS
+
+
+@dataclass(frozen=True)
+class Mind:
+    """How an agent decides.
+
+    Attributes:
+        critic: its probabilities and values.
+        reward_scale: what its learner multiplied rewards with; values are shown without it.
+        selection: how it chooses by them.
+        history_length: K, poses that it remembers.
+    """
+
+    critic: Critic
+    reward_scale: float
+    selection: ActionSelection
+    history_length: int
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where a walker stands after a step, or at the start.
+
+    Attributes:
+        state: in the scene's own numbering.
+        action: that led here; None at the start.
+        blocked: it was a blocked move.
+        reward: for it; 0 at the start.
+        earned: sum of all rewards so far.
+        collisions: blocked moves so far.
+        zone: of the pose (`zones.Zone`).
+        reached: this is the target.
+        to_go: steps of a shortest path from here, -1 where there is none.
+        probabilities: of the actions from here; None for the user and at the target.
+        value: discounted sum of the rewards that the agent expects from here; None for the user.
+        next: the action that the agent is about to take; None at the target and for the user.
+    """
+
+    state: int
+    action: int | None
+    blocked: bool
+    reward: float
+    earned: float
+    collisions: int
+    zone: int
+    reached: bool
+    to_go: int
+    probabilities: tuple[float, ...] | None
+    value: float | None
+    next: int | None
+
+
+class Walker:
+    """An episode of one walker.
+
+    Args:
+        world: its tables.
+        target: index of the world's target.
+        start: state in the scene's own numbering.
+        reward: what it earns.
+        seed: of sampled actions.
+        mind: of an agent; None for the user.
+        recorded: actions that it takes before it chooses by itself.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        target: int,
+        start: int,
+        reward: Reward,
+        *,
+        seed: int,
+        mind: Mind | None,
+        recorded: Sequence[int] = (),
+    ) -> None:
+        seeds = torch.tensor([seed])
+        self.world, self.target, self.mind = world, target, mind
+        self.offset = int(world.scene_offset[world.target_scene[target]])
+        self.states_here = int(world.scene_offset[world.target_scene[target] + 1]) - self.offset
+        self.to_go = world.distance_table()[target]
+        history_length = mind.history_length if mind else 1
+        self.env = Navigation(world, reward, seeds, history_length=history_length, reward_dtype=torch.float64)
+        self.env.reset(target=torch.tensor([target]), start=torch.tensor([start + self.offset]))
+        self.chances = Streams(seeds, ACTION_STREAM)
+        self.untried = UntriedActions(1, self.states_here, world.device)
+        self.recorded = list(recorded)
+        reached = int(self.env.state) == int(world.target_state[target])
+        zone = int(world.zone[self.env.state])
+        self.steps = [self._arrived(None, blocked=False, reward=0.0, zone=zone, reached=reached)]
+
+    @property
+    def actions(self) -> list[int]:
+        """Taken so far."""
+        return [step.action for step in self.steps if step.action is not None]
+
+    @property
+    def ended(self) -> bool:
+        """The target is reached, or the walk is as long as a walk may be."""
+        return self.steps[-1].reached or len(self.steps) > MOST_STEPS
+
+    def step(self, action: int | None = None) -> Step | None:
+        """Take the recorded action, else the one given, else the one that the agent has chosen.
+
+        Gives back None, and nothing happens, where the walk has ended or there is no action: the user's turn.
+        """
+        if self.ended:
+            return None
+        if self.recorded:
+            action = self.recorded.pop(0)
+        elif action is None:
+            action = self.steps[-1].next
+        if action is None:
+            return None
+        happened = self.env.step(torch.tensor([action]))
+        self.steps.append(
+            self._arrived(
+                action,
+                blocked=bool(happened.blocked),
+                reward=float(happened.reward),
+                zone=int(happened.zone),
+                reached=bool(happened.reached),
+            )
+        )
+        return self.steps[-1]
+
+    @torch.no_grad()
+    def map_of_mind(self) -> tuple[Tensor, Tensor]:
+        """Probabilities (S, A) and values (S,) of all poses of the scene, each as at the start of an episode."""
+        assert self.mind is not None
+        states = torch.arange(self.states_here) + self.offset
+        history = states[:, None].expand(-1, self.mind.history_length)
+        probabilities, values = self.mind.critic(history, torch.full((len(states),), self.target))
+        return probabilities, values / self.mind.reward_scale
+
+    @torch.no_grad()
+    def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Step:
+        before = self.steps[-1] if action is not None else None
+        probabilities = value = following = None
+        if self.mind is not None:
+            scores, values = self.mind.critic(self.env.history, self.env.target)
+            value = float(values) / self.mind.reward_scale
+            if not reached:
+                probabilities = tuple(scores[0].tolist())
+                following = self._choose(self.mind.selection, scores)
+        return Step(
+            state=int(self.env.state) - self.offset,
+            action=action,
+            blocked=blocked,
+            reward=reward,
+            earned=reward + (before.earned if before else 0.0),
+            collisions=int(blocked) + (before.collisions if before else 0),
+            zone=zone,
+            reached=reached,
+            to_go=int(self.to_go[self.env.state]),
+            probabilities=probabilities,
+            value=value,
+            next=following,
+        )
+
+    def _choose(self, selection: ActionSelection, probabilities: Tensor) -> int:
+        """The action to take: a recorded one, else the agent's own choice, which uses up its chance either way."""
+        if selection == "sampled":
+            own = sampled(probabilities, self.chances.uniform())
+        elif selection == "argmax":
+            own = probabilities.argmax(1)
+        else:
+            own = self.untried.choose(torch.tensor([0]), self.env.state - self.offset, probabilities)
+        return self.recorded[0] if self.recorded else int(own)

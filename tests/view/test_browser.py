@@ -1,0 +1,244 @@
+"""The viewer's page in a real headless Chromium, clicked through; any error on the page fails the test."""
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import av
+import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+CHROMIUM_VARIABLE = "CLEARWAY_CHROMIUM"
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+PATIENCE_MS = 60_000  # others may be using the machine
+PHONE = {"width": 390, "height": 844}
+
+
+def chromium(own: str) -> str:
+    """Path of a Chromium: the one named by the variable, one of the system, or playwright's own."""
+    named = os.environ.get(CHROMIUM_VARIABLE)
+    if named:
+        return named
+    installed = [path for path in map(shutil.which, NAMES) if path]
+    if installed:
+        return installed[0]
+    if Path(own).exists():
+        return own
+    pytest.skip(f"no Chromium found: install one, or name it in ${CHROMIUM_VARIABLE}")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        path = chromium(playwright.chromium.executable_path)
+        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser: Browser, address: str) -> Iterator[Callable[..., Page]]:
+    """Opens the viewer's page at an episode."""
+    contexts, wrong = [], []
+
+    def at(episode: str = "", **looks) -> Page:
+        looks = {"viewport": {"width": 1280, "height": 860}, "reduced_motion": "reduce"} | looks
+        context = browser.new_context(**looks)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE_MS)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("console", lambda message: wrong.append(message.text) if message.type in ("error", "warning") else None)
+        page.goto(f"{address}#{episode}")
+        expect(page.locator(".walker").first).to_be_visible()
+        return page
+
+    yield at
+    for context in contexts:
+        context.close()
+    assert wrong == []
+
+
+@pytest.fixture(autouse=True)
+def _patient() -> None:
+    expect.set_options(timeout=PATIENCE_MS)
+
+
+def number(page: Page, walker: str, field: str) -> str:
+    return page.locator(f'[data-walker="{walker}"] [data-field="{field}"]').inner_text()
+
+
+def shown(page: Page, position: str) -> None:
+    """Wait until the playback stands at, for example, "2 / 2"."""
+    expect(page.locator("#position")).to_have_text(position)
+
+
+def point(page: Page, state: int) -> dict[str, float]:
+    """Where a pose of the scene lies on the map, computed here once more: a third of a cell ahead of its middle."""
+    scene = page.evaluate("fetch(`scenes/${document.querySelector('#scene').selectedIndex}/map.json`).then(r => r.json())")
+    left, right, low, high = scene["extent_m"]
+    box = page.locator("#map").bounding_box()
+    assert box is not None
+    x, z = scene["locations_m"][state]
+    ahead = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}[scene["headings_deg"][state]]
+    x, z = x + ahead[0] * scene["cell_size_m"] / 3, z + ahead[1] * scene["cell_size_m"] / 3
+    return {"x": box["width"] * (x - left) / (right - left), "y": box["height"] * (high - z) / (high - low)}
+
+
+def pixels(page: Page) -> str:
+    """The map as it looks."""
+    return page.locator("#map").evaluate("canvas => canvas.toDataURL()")
+
+
+def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -> None:
+    page = opened("scene=corridor&seed=2")
+    before = pixels(page)
+    page.locator("#map").click(position=point(page, 1))  # the first cell, looking aside
+    shown(page, "0 / 0")
+    expect(page).to_have_url(re.compile("start=1&"))
+    page.get_by_text("the target", exact=True).click()
+    page.locator("#map").click(position=point(page, 12))
+    expect(page.locator("#goal-where")).to_have_text("pose 12, heading 0°, not trained on")
+    page.get_by_role("button", name="Target pose 8,").click()
+    expect(page.locator("#goal-where")).to_have_text("pose 8, heading 0°, trained on")
+    assert pixels(page) != before
+
+    page.get_by_role("button", name="Race").click()
+    expect(page.locator('[data-walker="you"]')).to_be_visible()
+    page.get_by_role("button", name="forward", exact=True).click()
+    shown(page, "1 / 1")
+    assert (number(page, "you", "steps"), number(page, "you", "collisions")) == ("1", "1")
+    expect(page.locator('[data-walker="you"].bumped')).to_be_visible()
+    for name in ("turn left", "forward", "forward"):
+        page.get_by_role("button", name=name, exact=True).click()
+    shown(page, "4 / 4")
+    assert (number(page, "you", "to_go"), number(page, "you", "collisions")) == ("0", "1")
+    assert number(page, "you", "earned") == "9.95"  # 10 - 0.02 - 0.02 - 0.011, by the collision-aware reward
+    expect(page.locator('[data-walker="you"] .badge')).to_have_text("reached")
+    expect(page.locator("#status")).to_contain_text("you: target reached in 4 steps, 1 collision")
+    assert int(number(page, "aware", "steps")) == int(number(page, "plain", "steps")) == 4
+    shares = page.locator('[data-walker="aware"] .share').all_inner_texts()
+    assert sum(float(share.removesuffix(" %")) for share in shares) == pytest.approx(100, abs=2.1)
+
+    page.locator("#timeline").fill("1")
+    shown(page, "1 / 4")
+    assert number(page, "you", "to_go") == "3"
+    page.get_by_role("button", name="Restart").click()
+    shown(page, "0 / 0")
+
+    page.get_by_role("button", name="One step", exact=True).click()
+    shown(page, "1 / 1")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save MP4").click()
+    download.value.save_as(tmp_path / "episode.mp4")
+    with av.open(str(tmp_path / "episode.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == 2 + 6
+    expect(page.locator("#status")).to_contain_text("Film saved")
+
+
+def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor&start=4&target=8&seed=3")
+    page.locator("#speed").fill("5")
+    page.get_by_role("button", name="Play").click()
+    expect(page.locator("body.playing")).to_be_visible()
+    expect(page.locator(".badge.good")).to_have_count(2)
+    expect(page.locator("body.playing")).to_have_count(0)
+    steps = {name: number(page, name, "steps") for name in ("aware", "plain")}
+    assert all(int(count) >= 1 for count in steps.values())
+    assert {number(page, name, "to_go") for name in steps} == {"0"}
+    link = page.url
+    walks = [part for part in link.split("&") if part.startswith("walk=")]
+    assert {name: len(walk) - len("walk=") for name, walk in zip(steps, walks, strict=True)} == {
+        name: int(count) for name, count in steps.items()
+    }
+
+    again = opened(link.partition("#")[2], reduced_motion="no-preference")  # plays by itself
+    expect(again.locator(".badge.good")).to_have_count(2)
+    assert {name: number(again, name, "steps") for name in steps} == steps
+
+
+def test_by_keyboard_alone(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor&start=4&target=16&selection=argmax")
+    page.keyboard.press("n")
+    shown(page, "1 / 1")
+    page.keyboard.press("b")
+    shown(page, "0 / 1")
+    page.keyboard.press("d")
+    expect(page.locator('[data-walker="you"]')).to_be_visible()
+    for key, position in (("ArrowUp", "1 / 1"), ("ArrowUp", "2 / 2"), ("ArrowDown", "3 / 3")):
+        page.keyboard.press(key)
+        shown(page, position)
+    assert number(page, "you", "to_go") == "2"
+    zones = pixels(page)
+    page.keyboard.press("2")
+    expect(page.locator("#legend")).to_contain_text("value")
+    value = pixels(page)
+    page.keyboard.press("3")
+    expect(page.locator("#legend")).to_contain_text("turn left")
+    assert len({zones, value, pixels(page)}) == 3
+    page.keyboard.press("m")
+    expect(page.locator("#map")).to_be_focused()
+    page.keyboard.press("ArrowUp")  # the cursor, not the user
+    page.keyboard.press("PageDown")
+    page.keyboard.press("Enter")
+    shown(page, "0 / 0")
+    expect(page).to_have_url(re.compile("start=9&"))  # one cell on, turned right
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    for _ in range(40):  # every control can be reached, and shows that it is
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "play":
+            break
+    assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    assert page.evaluate("document.activeElement.id") == "play"
+
+
+def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[..., Page]) -> None:
+    page = opened("scene=grid")
+    assert page.locator('[data-walker="aware"] img').evaluate("image => image.decode().then(() => image.naturalWidth)") == 16
+    page.locator("#scene").select_option("bare")
+    expect(page.locator('[data-walker="aware"] .picture')).to_have_text("no pictures in this scene")
+    expect(page.get_by_role("button", name="Target pose 30, heading 180°")).to_have_text("30")
+    plain = pixels(page)
+    for key in ("2", "3"):
+        page.keyboard.press(key)
+        page.wait_for_timeout(50)
+    expect(page.locator("#legend")).to_contain_text("backward")
+    assert pixels(page) != plain
+    page.keyboard.press("n")
+    shown(page, "1 / 1")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: str) -> None:
+    page = opened("scene=grid&drive=1", viewport=PHONE, color_scheme=scheme, has_touch=True, is_mobile=True)
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    play = page.get_by_role("button", name="Play")
+    box = play.bounding_box()
+    assert box is not None and box["y"] + box["height"] <= PHONE["height"]  # at hand without scrolling
+    ink, paper = (page.evaluate(f"getComputedStyle(document.body).{name}") for name in ("color", "backgroundColor"))
+    light_ink, light_paper = (sum(json.loads(f"[{colour[4:-1]}]")) for colour in (ink, paper))
+    assert abs(light_ink - light_paper) > 500
+    assert (light_paper > light_ink) == (scheme == "light")
+    forward = page.get_by_role("button", name="forward", exact=True)
+    forward.tap()
+    shown(page, "1 / 1")
+
+
+def test_a_damaged_link_is_said_and_another_episode_begins(opened: Callable[..., Page]) -> None:
+    page = opened("scene=attic")
+    expect(page.locator("#status")).to_contain_text("scene attic: not shown here")
+    expect(page.locator("#goal-where")).to_contain_text("pose 0")

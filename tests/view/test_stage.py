@@ -1,0 +1,74 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.errors import RunError, SceneError
+from clearway.view.stage import Stage, agent_world, run_stage, scene_stage
+from made import corridor_scene, grid_scene
+from small_runs import FEATURES
+from small_stage import small_agent, write_scenes
+
+
+def test_two_agents_share_the_scenes_that_both_know(stage: Stage) -> None:
+    assert [agent.name for agent in stage.agents] == ["aware", "plain"]
+    assert [agent.reward.name for agent in stage.agents] == ["collision-aware", "shortest"]
+    assert [scene.name for scene in stage.scenes] == ["corridor", "grid", "bare"]
+    assert stage.targets["corridor"] == (0, 8, 16)
+    assert stage.index("bare") == 2
+    with pytest.raises(RunError, match="attic.*corridor, grid, bare"):
+        stage.index("attic")
+
+
+def test_an_agent_of_one_scene_limits_what_is_shown(folder: Path, stage: Stage, tmp_path: Path) -> None:
+    corridor = [corridor_scene(5, feature_count=FEATURES)]
+    alone = small_agent(tmp_path / "alone", scenes=corridor)
+    shown = run_stage([folder / "aware", alone], [folder / f"{name}.h5" for name in ("corridor", "grid", "bare")])
+    assert [scene.name for scene in shown.scenes] == ["corridor"]
+    longer = [corridor_scene(6, feature_count=FEATURES)]
+    other = small_agent(tmp_path / "other", scenes=longer)
+    with pytest.raises(RunError, match=r"missing.*--scenes"):
+        run_stage([alone, other])
+
+
+def test_agents_without_a_scene_in_common_are_refused(tmp_path: Path) -> None:
+    first = small_agent(tmp_path / "first", scenes=[corridor_scene(5, feature_count=FEATURES)])
+    grid = grid_scene(1, width=4, depth=3, feature_count=FEATURES)
+    second = small_agent(tmp_path / "second", scenes=[grid])
+    files = write_scenes(tmp_path, [corridor_scene(5, feature_count=FEATURES), grid])
+    with pytest.raises(RunError, match=r"second: trained on other rooms than .*first \(corridor and grid\)"):
+        run_stage([first, second], files)
+
+
+def test_runs_of_one_name_are_told_apart_by_their_paths(tmp_path: Path) -> None:
+    corridor = [corridor_scene(5, feature_count=FEATURES)]
+    runs = [small_agent(tmp_path / part / "run", scenes=corridor) for part in "ab"]
+    shown = run_stage(runs, write_scenes(tmp_path, corridor))
+    assert [agent.name for agent in shown.agents] == [str(run) for run in runs]
+
+
+def test_an_agent_s_world_has_the_target_asked_for(stage: Stage) -> None:
+    world, index = agent_world(stage.agents[1], "grid", 7)
+    assert world.scene_names == ("corridor", "grid", "bare")
+    assert world.scene_names[int(world.target_scene[index])] == "grid"
+    assert world.scene_state(index) == 7
+    with pytest.raises(SceneError, match="99"):
+        agent_world(stage.agents[0], "corridor", 99)
+
+
+def test_values_and_rewards_are_of_one_scale(stage: Stage) -> None:
+    """A learner that clipped its rewards knows of no reward of 10."""
+    shown = stage.agents[0]
+    record = shown.agent.record
+    clipping = replace(record, learner=replace(record.learner, clip_rewards=True))
+    assert shown.reward.table().max() == 10
+    assert replace(shown, agent=replace(shown.agent, record=clipping)).reward.table().max() == 1
+
+
+def test_a_scene_alone_has_no_agents(stage: Stage) -> None:
+    shown = scene_stage(stage.scenes[1])
+    assert (shown.agents, shown.zone_level, shown.reward.name) == ((), "pose", "collision-aware")
+    world = shown.user_world(shown.scenes[0], 3)
+    assert world.scene_state(0) == 3
+    np.testing.assert_array_equal(world.blocked.numpy(), shown.scenes[0].graph < 0)
