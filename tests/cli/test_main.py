@@ -39,6 +39,9 @@ COMMANDS = {
     "report",
     "video",
     "export",
+    "serve",
+    "view",
+    "scenes view",
 }
 
 
