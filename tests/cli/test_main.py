@@ -42,6 +42,7 @@ COMMANDS = {
     "report",
     "video",
     "export",
+    "serve",
     "view",
 }
 

@@ -8,34 +8,13 @@ import pytest
 from PIL import Image
 
 import clearway
-from clearway.deploy.card import Card
-from clearway.deploy.model import Step
 from clearway.deploy.navigator import choose, open_model
-from clearway.deploy.onnx_file import shifted
 from clearway.envs.navigation import Navigation
 from clearway.errors import DeployError
 from clearway.learn.load import run_world
 from clearway.reward import COLLISION_AWARE
 from imported import imported_by
-
-CARD = Card("attic", ("f", "r", "l", "b"), 4, 2, True, {"name": "sums"}, {}, None, {})
-
-
-class Sums:
-    """An agent whose features are the picture's mean and 1, and whose value is the sum of its history's means."""
-
-    card = CARD
-
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> Step:
-        features = np.stack([seen.mean(axis=(1, 2, 3)), np.ones(len(seen))], axis=1).astype(np.float32)
-        after = shifted(history, features, start)
-        probabilities = np.array([[0.1, 0.2, 0.3, 0.4]], np.float32).repeat(len(seen), axis=0)
-        return Step(probabilities, after[:, :, :1].sum(1) + 1000 * target[:, :1], after)
-
-
-def plain(level: int) -> np.ndarray:
-    """A picture of one grey level."""
-    return np.full((3, 4, 3), level, np.uint8)
+from sums import Sums, plain
 
 
 def values(navigator: clearway.Navigator, levels: list[int]) -> list[float]:

@@ -32,7 +32,9 @@ def test_any_free_port_is_on_the_loopback_address() -> None:
         assert listener.getsockname()[0] == "127.0.0.1"
         assert port_of(listener) > 0
         with socket.create_connection(("127.0.0.1", port_of(listener)), timeout=10):
-            pass  # it waits in line
+            accepted, _ = listener.accept()  # it waited in line
+        with accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)  # no answer waits for another's receipt
 
 
 def test_a_port_that_is_taken_is_refused() -> None:

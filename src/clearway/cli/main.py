@@ -21,6 +21,7 @@ from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.reproduce import Report, Reproduce
 from clearway.cli.scene_imports import ImportScenes
 from clearway.cli.scenes import Build, Export, Inspect
+from clearway.cli.serve import Serve
 from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.cli.view import View, ViewScene
@@ -63,6 +64,7 @@ Command = (
     | Annotated[Video, tyro.conf.subcommand("video")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[ExportAgent, tyro.conf.subcommand("export")]
+    | Annotated[Serve, tyro.conf.subcommand("serve")]
 )
 
 

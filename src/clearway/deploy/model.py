@@ -61,10 +61,11 @@ def checked_seen(seen: object, card: Card) -> np.ndarray:
         DeployError: it is something else, too large, or not finite.
     """
     array = np.asarray(seen)
-    return _checked_picture(array) if card.takes_pictures else _checked_features(array, card)
+    return checked_picture(array) if card.takes_pictures else _checked_features(array, card)
 
 
-def _checked_picture(picture: np.ndarray) -> np.ndarray:
+def checked_picture(picture: np.ndarray) -> np.ndarray:
+    """The picture, (height, width, 3) uint8. Raises DeployError where it is something else, or too large."""
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
         problem = f"the picture is {picture.dtype} {picture.shape}, expected uint8 (height, width, 3)"
         raise DeployError(f"{problem}. Give an RGB picture with values from 0 to 255")

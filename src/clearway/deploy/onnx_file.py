@@ -92,6 +92,7 @@ def _session(content: bytes, path: Path, threads: int | None) -> Any:
         raise DeployError(f"{path}: needs onnxruntime. Install it: pip install 'clearway[onnx]'") from fault
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads or 0
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idle threads leave the processor
     try:
         return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as fault:  # onnxruntime's own errors share no other base

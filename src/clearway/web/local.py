@@ -1,4 +1,4 @@
-"""A service on this machine's loopback address, from start to a clean end. Needs the extra `view`."""
+"""A service on this machine's loopback address, from start to a clean end. Needs the extra `view` or `serve`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 from clearway.errors import ClearwayError
 from clearway.web.guard import Application
@@ -14,7 +15,8 @@ from clearway.web.guard import Application
 try:
     import uvicorn
 except ImportError as error:
-    raise ClearwayError("a local page needs uvicorn. Install it: pip install 'clearway[view]'") from error
+    problem = "a local service needs uvicorn"
+    raise ClearwayError(f"{problem}. Install it: pip install 'clearway[view]' or 'clearway[serve]'") from error
 
 LOOPBACK = "127.0.0.1"
 GRACE_S = 5  # for requests under way when the service is told to end
@@ -22,21 +24,27 @@ LARGEST_MESSAGE_BYTES = 64 * 1024  # that a WebSocket takes
 MOST_PORT = 65_535
 
 
-def listening(port: int) -> socket.socket:
-    """A socket on the loopback address; from here on connections wait in line.
+def listening(port: int, host: str = LOOPBACK) -> socket.socket:
+    """A socket on the loopback address, or on another one; from here on connections wait in line.
 
     Args:
         port: 0 for any that is free.
+        host: address or name of a network interface of this machine.
 
     Raises:
-        ClearwayError: the port is none, is taken or is not allowed.
+        ClearwayError: the port is none, is taken or is not allowed, or the address is not this machine's.
     """
     if not 0 <= port <= MOST_PORT:
         raise ClearwayError(f"--port is {port}, expected 0 to {MOST_PORT}. Give a port in that range")
+    where = f"--port {port}" if host == LOOPBACK else f"--host {host} --port {port}"
     try:
-        return socket.create_server((LOOPBACK, port))
-    except OSError as error:
-        raise ClearwayError(f"--port {port}: {error.strerror}. Give another, or leave it out") from error
+        listener = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except (OSError, UnicodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "no name of a host"
+        raise ClearwayError(f"{where}: {reason}. Give another, or leave it out") from error
+    # Connections inherit it; asyncio sets it where it makes the socket. Without it, answers wait 40 ms for each other.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return listener
 
 
 def port_of(listener: socket.socket) -> int:
@@ -44,22 +52,23 @@ def port_of(listener: socket.socket) -> int:
     return int(listener.getsockname()[1])
 
 
-def serve(app: Application, listener: socket.socket) -> None:
+def serve(app: Application, listener: socket.socket, **settings: Any) -> None:
     """Answer until the process is interrupted or told to end (SIGINT, SIGTERM); what is under way gets a few seconds.
 
     Args:
         app: what answers.
         listener: from `listening`; closed at the end.
+        settings: of `uvicorn.Config`, where a service needs others.
     """
-    config = uvicorn.Config(
-        app,
-        log_level="warning",
-        access_log=False,  # its lines would hold the token
-        lifespan="off",
-        server_header=False,
-        timeout_graceful_shutdown=GRACE_S,
-        ws_max_size=LARGEST_MESSAGE_BYTES,
-    )
+    ours: dict[str, Any] = {
+        "log_level": "warning",
+        "access_log": False,  # its lines would hold the token
+        "lifespan": "off",
+        "server_header": False,
+        "timeout_graceful_shutdown": GRACE_S,
+        "ws_max_size": LARGEST_MESSAGE_BYTES,
+    }
+    config = uvicorn.Config(app, **(ours | settings))
     with listener, _ending_quietly():
         uvicorn.Server(config).run(sockets=[listener])
 

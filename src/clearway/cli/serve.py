@@ -1,0 +1,62 @@
+"""`clearway serve`."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from clearway.cli.console import stderr_console
+from clearway.errors import ClearwayError
+
+TOKEN_VARIABLE = "CLEARWAY_TOKEN"
+FEWEST_TOKEN_LETTERS = 16
+
+
+@dataclass(frozen=True)
+class Serve:
+    """Serve a trained agent over HTTP and WebSocket: pictures in, actions out.
+
+    Every request needs the token that is printed; the variable CLEARWAY_TOKEN sets one of your own.
+
+    Example: clearway serve runs/bathroom --port 8000
+    """
+
+    agent: Annotated[Path, tyro.conf.Positional]
+    """The run folder, or a file that clearway export wrote."""
+    scene: str | None = None
+    """Name of the scene that the agent is for; by default the run's first."""
+    host: str = "127.0.0.1"
+    """Address to listen on. The default is reached from this machine alone; before others, put a proxy with TLS."""
+    port: int = 0
+    """Port to listen on; 0 for any that is free."""
+    sessions: int = 1000
+    """Sessions that may be open at a time."""
+    idle_s: float = 600.0
+    """Seconds after which a session expires that nobody uses."""
+    deadline_s: float = 10.0
+    """Seconds that a request may take."""
+
+    def run(self) -> None:
+        """Load the agent, then answer until interrupted."""
+        from clearway.serve.limits import Limits
+        from clearway.serve.run import run_service, servable_model
+        from clearway.web.guard import new_token
+        from clearway.web.local import listening, port_of
+
+        limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
+        token = os.environ.get(TOKEN_VARIABLE) or new_token()
+        if len(token) < FEWEST_TOKEN_LETTERS or not (token.isascii() and token.isprintable()) or " " in token:
+            problem = f"the variable {TOKEN_VARIABLE} holds no token of at least {FEWEST_TOKEN_LETTERS} plain letters"
+            raise ClearwayError(f"{problem}. Choose another, or unset it for a random one")
+        model = servable_model(self.agent, self.scene)
+        with listening(self.port, self.host) as listener:
+            console = stderr_console()
+            where = f"http://{self.host}:{port_of(listener)}"
+            console.print(f"scene {model.card.scene}: {where}", highlight=False, soft_wrap=True)
+            if TOKEN_VARIABLE not in os.environ:
+                console.print(f"token: {token}", highlight=False, soft_wrap=True)
+            run_service(model, listener, token, limits)

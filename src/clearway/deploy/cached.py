@@ -1,0 +1,43 @@
+"""Runs exported once: onnxruntime runs the encoder in about half of PyTorch's time, see docs/deploy.md."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import clearway.deploy
+from clearway import files
+from clearway.deploy.export import export_onnx
+from clearway.deploy.from_run import SceneAgent
+from clearway.deploy.onnx_file import OnnxModel
+from clearway.errors import DeployError
+
+KEY_LETTERS = 16
+
+
+def cached_model(chosen: SceneAgent) -> OnnxModel:
+    """A run's agent on onnxruntime, exported to the user's cache folder the first time; a damaged file is made again.
+
+    Raises:
+        DeployError, EncoderError: see `export_onnx`.
+    """
+    path = files.cache_dir() / "agents" / f"{chosen.scene.name}-{_key(chosen)}.onnx"
+    with files.locked(path):
+        try:
+            return OnnxModel(path)
+        except DeployError:
+            export_onnx(chosen, path)
+    return OnnxModel(path)
+
+
+def _key(chosen: SceneAgent) -> str:
+    """Hash of all that shapes the file: parameters, scene, encoder and the code that writes it."""
+    agent, digest = chosen.agent, hashlib.sha256()
+    for tensors in (agent.network.state_dict(), agent.feature_map.tensors()):
+        for name, tensor in sorted(tensors.items()):
+            digest.update(f"{name} {tuple(tensor.shape)}\n".encode())
+            digest.update(tensor.detach().contiguous().numpy().tobytes())
+    digest.update(f"{chosen.index} {chosen.scene.name} {chosen.encoder_record.identity}\n".encode())
+    for source in sorted(Path(clearway.deploy.__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:KEY_LETTERS]

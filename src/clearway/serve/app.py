@@ -1,0 +1,300 @@
+"""The service's routes; OpenAPI describes them at /openapi.json."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any
+
+from clearway.deploy.navigator import Selection
+from clearway.errors import ClearwayError
+from clearway.serve.faults import STATUS, Code, Fault, FaultBody
+from clearway.serve.pictures import CONTENT_TYPES
+from clearway.serve.service import Answer, Service
+from clearway.version import __version__
+
+try:
+    from fastapi import FastAPI, Path, Request, Security, WebSocket, WebSocketDisconnect
+    from fastapi.exceptions import RequestValidationError
+    from fastapi.responses import Response
+    from fastapi.security import HTTPBearer
+    from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+    from starlette.exceptions import HTTPException
+except ImportError as error:
+    raise ClearwayError("clearway serve needs FastAPI. Install it: pip install 'clearway[serve]'") from error
+
+DESCRIPTION = """A trained agent: pictures in, actions out.
+
+Open a session, send the picture of its target, then the picture after every step. `GET /sessions/{session_id}/stream`
+is a WebSocket for the steps of a session: every binary message is a picture file, every answer the JSON of a step, or
+of a refusal, after which the session goes on as it was.
+"""
+POLICY, INTERNAL = 1008, 1011  # WebSocket close codes
+ID = r"^[A-Za-z0-9_-]{1,64}$"
+MOST_SEED = (1 << 53) - 1  # JSON's exact whole numbers
+
+
+def _whole(value: object) -> object:
+    """JSON knows no difference between 3 and 3.0."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+class Opening(BaseModel):
+    """How a session chooses its actions."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    selection: Selection = "sampled"
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED), BeforeValidator(_whole)] | None = None
+
+
+class Opened(BaseModel):
+    """An open session."""
+
+    session_id: str
+    expires_after_s: float
+
+
+class StepAnswer(BaseModel):
+    """What the agent does."""
+
+    action: str
+    action_index: int
+    probabilities: list[float]
+    value: float
+    step: int
+
+
+class Agent(BaseModel):
+    """What the agent is."""
+
+    scene: str
+    actions: list[str]
+    history_length: int
+    picture_size: list[int] | None
+    encoder: str
+    version: str
+
+
+class State(BaseModel):
+    """Whether the service is up."""
+
+    status: str
+
+
+def make_app(service: Service) -> FastAPI:
+    """The application, to be put behind `guard.protected`."""
+    app = FastAPI(title="clearway serve", version=__version__, description=DESCRIPTION, docs_url=None, redoc_url=None)
+    token = [Security(HTTPBearer(auto_error=False))]
+    _answer_faults(app, service)
+
+    @app.get("/health", responses=_faults())
+    async def health() -> State:
+        """The process answers."""
+        return State(status="ok")
+
+    @app.get("/ready", responses=_faults("overloaded"))
+    async def ready() -> State:
+        """There is room for another session."""
+        if not service.ready:
+            raise Fault("overloaded", "no room for another session or picture. Try again")
+        return State(status="ready")
+
+    @app.get("/metrics", dependencies=token, response_class=Response, responses=_METRICS)
+    async def metrics() -> Response:
+        """Figures for Prometheus."""
+        return Response(service.metrics.text(), media_type="text/plain; version=0.0.4")
+
+    @app.get("/agent", dependencies=token, responses=_faults("unauthorised"))
+    async def agent() -> Agent:
+        """What the agent is."""
+        card = service.card
+        return Agent(
+            scene=card.scene,
+            actions=list(card.actions),
+            history_length=card.history_length,
+            picture_size=None if card.picture_size is None else list(card.picture_size),
+            encoder=str(card.encoder.get("name")),
+            version=__version__,
+        )
+
+    @app.post("/sessions", status_code=201, dependencies=token, responses=_faults(*OPENING))
+    async def open_session(opening: Opening) -> Opened:
+        """Open a session; it expires when it is not used."""
+        session = service.sessions.open(opening.selection, opening.seed)
+        return Opened(session_id=session.id, expires_after_s=service.limits.idle_s)
+
+    @app.delete("/sessions/{session_id}", status_code=204, dependencies=token, responses=_faults(*CLOSING))
+    async def close_session(session_id: Annotated[str, Path(pattern=ID)]) -> None:
+        """End a session."""
+        service.sessions.close(session_id)
+
+    @app.put(
+        "/sessions/{session_id}/target",
+        status_code=204,
+        dependencies=token,
+        responses=_faults(*PICTURE),
+        openapi_extra=PICTURE_BODY,
+    )
+    async def set_target(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> None:
+        """Begin an episode: the body is the picture of the place to walk to."""
+        await service.set_target(service.sessions.get(session_id), await _picture(request))
+
+    @app.post(
+        "/sessions/{session_id}/steps",
+        dependencies=token,
+        responses=_faults(*PICTURE, "no_target"),
+        openapi_extra=PICTURE_BODY,
+    )
+    async def step(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> StepAnswer:
+        """Decide: the body is what the camera sees now."""
+        return _answer(service, await service.step(service.sessions.get(session_id), await _picture(request)))
+
+    @app.websocket("/sessions/{session_id}/stream")
+    async def stream(socket: WebSocket, session_id: str) -> None:
+        await _stream(service, socket, session_id)
+
+    return app
+
+
+OPENING: tuple[Code, ...] = ("unauthorised", "invalid_request", "too_many_sessions", "body_too_large", "too_slow")
+CLOSING: tuple[Code, ...] = ("unauthorised", "no_such_session", "invalid_request")
+PICTURE: tuple[Code, ...] = (
+    *CLOSING,
+    "unsupported_picture",
+    "unreadable_picture",
+    "picture_too_large",
+    "overloaded",
+    "too_slow",
+    "deadline_passed",
+)
+PICTURE_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in CONTENT_TYPES},
+    }
+}
+
+
+def _faults(*codes: Code) -> dict[int | str, dict[str, Any]]:
+    """How a route's refusals are documented."""
+    found: dict[int | str, dict[str, Any]] = {}
+    for code in (*codes, "internal"):
+        entry = found.setdefault(int(STATUS[code]), {"model": FaultBody, "description": ""})
+        entry["description"] = ", ".join(filter(None, (entry["description"], code)))
+    return found
+
+
+_METRICS = _faults("unauthorised") | {200: {"description": "Figures", "content": {"text/plain": {}}}}
+
+
+def _answer(service: Service, answer: Answer) -> StepAnswer:
+    decision = answer.decision
+    return StepAnswer(
+        action=service.card.actions[decision.action],
+        action_index=int(decision.action),
+        probabilities=decision.probabilities.tolist(),
+        value=decision.value,
+        step=answer.step,
+    )
+
+
+async def _picture(request: Request) -> bytes:
+    """The body of a request that says it is a picture. Raises Fault."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind not in CONTENT_TYPES:
+        raise Fault("unsupported_picture", f"the header Content-Type is not one of {', '.join(CONTENT_TYPES)}")
+    return await request.body()
+
+
+async def _stream(service: Service, socket: WebSocket, session_id: str) -> None:
+    """Answer the pictures of a session, one after the other, until either side ends it."""
+    try:
+        service.sessions.get(session_id)
+        if service.streams.locked():
+            raise Fault("overloaded", f"{service.limits.sessions} streams are open. Try again later")
+    except Fault as fault:
+        return await socket.send_denial_response(_fault_response(fault))
+    async with service.streams:
+        await socket.accept()
+        await _answer_messages(service, socket, session_id)
+
+
+async def _answer_messages(service: Service, socket: WebSocket, session_id: str) -> None:
+    try:
+        while True:
+            async with asyncio.timeout(service.limits.idle_s):
+                message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            try:
+                session = service.sessions.get(session_id)
+                content = message.get("bytes")
+                if content is None:
+                    raise Fault("invalid_request", "send pictures as binary messages")
+                async with asyncio.timeout(service.limits.deadline_s):
+                    answer = await service.step(session, content)
+                await socket.send_text(_answer(service, answer).model_dump_json())
+            except TimeoutError:
+                fault = Fault("deadline_passed", f"not answered within {service.limits.deadline_s:g} s. Try again")
+                await _refuse_message(service, socket, fault)
+            except Fault as fault:
+                await _refuse_message(service, socket, fault)
+                if fault.code == "no_such_session":
+                    return await socket.close(POLICY, "the session has ended")
+    except WebSocketDisconnect:
+        return
+    except TimeoutError:
+        await socket.close(POLICY, "unused for too long")
+    except Exception:
+        logging.getLogger("clearway.serve").exception("a stream failed")
+        await socket.close(INTERNAL, "the service failed. Its log says why")
+
+
+async def _refuse_message(service: Service, socket: WebSocket, fault: Fault) -> None:
+    service.metrics.faults.labels(fault.code).inc()
+    await socket.send_text(fault.body().decode())
+
+
+def _fault_response(fault: Fault) -> Response:
+    return Response(fault.body(), fault.status, fault.headers())
+
+
+def _answer_faults(app: FastAPI, service: Service) -> None:
+    """Give every refusal, ours and the framework's, the same structure."""
+
+    def refuse(fault: Fault, headers: dict[str, str] | None = None) -> Response:
+        service.metrics.faults.labels(fault.code).inc()
+        response = _fault_response(fault)
+        response.headers.update(headers or {})
+        return response
+
+    async def ours(request: Request, fault: Exception) -> Response:
+        assert isinstance(fault, Fault)
+        return refuse(fault)
+
+    async def invalid(request: Request, fault: Exception) -> Response:
+        assert isinstance(fault, RequestValidationError)
+        parts = [f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in fault.errors()]
+        return refuse(Fault("invalid_request", "; ".join(parts)[:500]))
+
+    async def framework_s(request: Request, fault: Exception) -> Response:
+        assert isinstance(fault, HTTPException)
+        if fault.status_code == 404:
+            return refuse(Fault("not_found", "there is nothing here. /openapi.json lists what there is"))
+        if fault.status_code == 405:
+            headers = dict(fault.headers or {})
+            return refuse(Fault("method_not_allowed", "another method is needed here. See /openapi.json"), headers)
+        return refuse(Fault("invalid_request", "the request cannot be read"))
+
+    async def failed(request: Request, fault: Exception) -> Response:
+        return refuse(Fault("internal", "the service failed. Its log says why"))
+
+    handlers: dict[type[Exception], Callable[[Request, Exception], Awaitable[Response]]] = {
+        Fault: ours,
+        RequestValidationError: invalid,
+        HTTPException: framework_s,
+        Exception: failed,
+    }
+    for kind, handler in handlers.items():
+        app.add_exception_handler(kind, handler)

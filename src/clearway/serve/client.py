@@ -1,0 +1,150 @@
+"""A client of `clearway serve`. Needs httpx, NumPy and Pillow, and nothing of the learner.
+
+Use it as the agent itself (`clearway.Navigator`): one session is one navigator.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clearway.deploy.model import checked_picture
+from clearway.deploy.navigator import Decision, Selection
+from clearway.errors import ClearwayError
+from clearway.scenes.actions import Action
+
+TIMEOUT_S = 30.0
+KINDS = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png", b"RIFF": "image/webp"}
+
+
+class ServiceError(ClearwayError):
+    """The service refused, or cannot be reached.
+
+    Args:
+        code: the service's code, for example "too_many_sessions"; "unreachable" where there was no answer.
+        message: what it says.
+    """
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(f"{code}: {message}")
+        self.code, self.message = code, message
+
+    def __reduce__(self) -> tuple:
+        """Pickle by the constructor's arguments."""
+        return type(self), (self.code, self.message)
+
+
+class Client:
+    """A connection to a service; threads may share it. Close it, or use it as a context.
+
+    Args:
+        url: for example "http://127.0.0.1:8000".
+        token: that the service printed when it started.
+        timeout_s: for one answer.
+    """
+
+    def __init__(self, url: str, token: str, timeout_s: float = TIMEOUT_S) -> None:
+        try:
+            import httpx
+        except ImportError as fault:
+            raise ClearwayError("the client needs httpx. Install it: pip install 'clearway[serve]'") from fault
+        headers = {"authorization": f"Bearer {token}"}
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s, trust_env=False)
+        self._unreachable = httpx.HTTPError
+
+    def agent(self) -> dict[str, Any]:
+        """What the agent is."""
+        found: dict[str, Any] = self.ask("GET", "/agent").json()
+        return found
+
+    def session(self, *, selection: Selection = "sampled", seed: int | None = None) -> ClientSession:
+        """Open a session; the arguments are `Navigator`'s. Raises ServiceError."""
+        answer = self.ask("POST", "/sessions", json={"selection": selection, "seed": seed})
+        return ClientSession(self, answer.json()["session_id"])
+
+    def ask(self, method: str, path: str, **content: Any) -> Any:
+        """An answer of the service. Raises ServiceError where it refuses or cannot be reached."""
+        try:
+            answer = self._http.request(method, path, **content)
+        except self._unreachable as fault:
+            raise ServiceError("unreachable", f"{self._http.base_url}: {fault}. Check the address") from fault
+        if answer.is_success:
+            return answer
+        try:
+            kept = answer.json()["error"]
+            code, message = str(kept["code"]), str(kept["message"])
+        except (ValueError, KeyError, TypeError):
+            code, message = f"status {answer.status_code}", "no clearway service answers there. Check the address"
+        raise ServiceError(code, message)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._http.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, kind: object, fault: object, trace: object) -> None:
+        self.close()
+
+
+class ClientSession:
+    """An agent on its way, kept by the service; see `Client.session`. Used as a context, it is closed at the end."""
+
+    def __init__(self, client: Client, session_id: str) -> None:
+        self._client, self.session_id = client, session_id
+
+    def set_target(self, picture: object) -> None:
+        """Begin an episode: walk to where this picture was taken.
+
+        Args:
+            picture: (height, width, 3) uint8 RGB or a Pillow picture, which are sent without loss; a JPEG, PNG or WebP
+                file as bytes or by its path.
+
+        Raises:
+            ServiceError: the service refused it.
+            DeployError: it is no picture.
+        """
+        self._send("PUT", "target", picture)
+
+    def act(self, picture: object) -> Decision:
+        """What to do, seeing a picture; kinds and errors as in `set_target`."""
+        answer = self._send("POST", "steps", picture).json()
+        probabilities = np.array(answer["probabilities"], np.float32)
+        return Decision(Action(answer["action_index"]), probabilities, float(answer["value"]))
+
+    def close(self) -> None:
+        """End the session. Raises ServiceError where it has ended already."""
+        self._client.ask("DELETE", f"/sessions/{self.session_id}")
+
+    def _send(self, method: str, what: str, picture: object) -> Any:
+        content, kind = picture_file(picture)
+        path = f"/sessions/{self.session_id}/{what}"
+        return self._client.ask(method, path, content=content, headers={"content-type": kind})
+
+    def __enter__(self) -> ClientSession:
+        return self
+
+    def __exit__(self, kind: object, fault: object, trace: object) -> None:
+        try:
+            self.close()
+        except ServiceError:
+            if fault is None:
+                raise
+
+
+def picture_file(picture: object) -> tuple[bytes, str]:
+    """A picture as a file's content, and its content type; see `ClientSession.set_target`."""
+    if isinstance(picture, str | Path):
+        picture = Path(picture).read_bytes()
+    if isinstance(picture, bytes):
+        kinds = [kind for begin, kind in KINDS.items() if picture.startswith(begin)]
+        return picture, kinds[0] if kinds else "image/png"
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(checked_picture(np.asarray(picture))).save(file, "PNG", compress_level=1)
+    return file.getvalue(), "image/png"

@@ -1,0 +1,133 @@
+"""Around the application: the token, the size of bodies, deadlines, figures. Nothing inside sees a refused request."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import MutableMapping
+from typing import Any
+
+from clearway.serve.faults import Fault
+from clearway.serve.metrics import Metrics
+from clearway.serve.service import Service
+from clearway.web.guard import HEADERS, Application, Receive, Scope, Send, same_token
+
+OPEN_PATHS = ("/health", "/ready")  # say nothing but whether the service is up
+UNKNOWN = "unknown"
+
+
+def protected(app: Application, service: Service, token: str) -> Application:
+    """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted."""
+    limits, metrics = service.limits, service.metrics
+
+    async def guard(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "websocket":
+            if _authorised(scope, token):
+                return await app(scope, receive, send)
+            return await _refuse_socket(send)
+        if scope["type"] != "http":
+            return await app(scope, receive, send)
+        begun, exchange = time.perf_counter(), _Exchange(scope, receive, send, limits.body_bytes)
+        try:
+            if scope["path"] not in OPEN_PATHS and not _authorised(scope, token):
+                raise _unauthorised()
+            exchange.check_length()
+            async with asyncio.timeout(limits.deadline_s):
+                await app(scope, exchange.receive, exchange.send)
+            if exchange.too_large:
+                raise exchange.too_large
+        except Fault as fault:
+            await exchange.refuse(fault, metrics)
+        except TimeoutError:
+            if exchange.body_complete:
+                late = Fault("deadline_passed", f"not answered within {limits.deadline_s:g} s. Try again")
+            else:
+                late = Fault("too_slow", f"the request did not arrive within {limits.deadline_s:g} s")
+            await exchange.refuse(late, metrics)
+        except Exception:  # the application has answered; whoever runs the service must know
+            logging.getLogger("clearway.serve").exception("a request failed")
+        finally:
+            route = getattr(scope.get("route"), "path", UNKNOWN)
+            metrics.answered(route, exchange.status, time.perf_counter() - begun)
+
+    return guard
+
+
+class _Exchange:
+    """A request and its answer: counts the body, notes the status, adds headers.
+
+    Attributes:
+        body_complete: all of the request's body has been read.
+        status: of the answer; 0 before it begins.
+        too_large: set once the body was; the application's own answer is then kept back.
+    """
+
+    def __init__(self, scope: Scope, receive: Receive, send: Send, most_bytes: int) -> None:
+        self._receive, self._send, self._most_bytes, self._read_bytes = receive, send, most_bytes, 0
+        self._length = int(_header(scope, b"content-length") or 0)  # the server has checked that it is a number
+        self.body_complete = self._length == 0 and _header(scope, b"transfer-encoding") is None
+        self.status = 0
+        self.too_large: Fault | None = None
+
+    def check_length(self) -> None:
+        """Raise Fault where the body is said to be too large."""
+        if self._length > self._most_bytes:
+            raise self._fault()
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        """The next part of the request. Raises Fault where there is too much of it."""
+        message = await self._receive()
+        if message["type"] == "http.request":
+            self._read_bytes += len(message.get("body", b""))
+            self.body_complete = not message.get("more_body", False)
+            if self._read_bytes > self._most_bytes:
+                self.too_large = self._fault()
+                raise self.too_large
+        return message
+
+    def _fault(self) -> Fault:
+        return Fault("body_too_large", f"at most {self._most_bytes} bytes are taken")
+
+    async def send(self, message: MutableMapping[str, Any]) -> None:
+        """Pass a part of the answer on; after it, a connection with an unread body is closed."""
+        if self.too_large and not self.status:
+            return
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            added = HEADERS | {"cache-control": "no-store"} | ({} if self.body_complete else {"connection": "close"})
+            pairs = [(name.encode(), value.encode()) for name, value in added.items()]
+            message = {**message, "headers": [*message.get("headers", ()), *pairs]}
+        await self._send(message)
+
+    async def refuse(self, fault: Fault, metrics: Metrics) -> None:
+        """Answer with a fault, unless an answer has begun."""
+        self.too_large = None
+        if self.status:
+            return
+        metrics.faults.labels(fault.code).inc()
+        body = fault.body()
+        headers = fault.headers() | {"content-length": str(len(body))}
+        pairs = [(name.encode(), value.encode()) for name, value in headers.items()]
+        await self.send({"type": "http.response.start", "status": fault.status, "headers": pairs})
+        await self.send({"type": "http.response.body", "body": body})
+
+
+def _unauthorised() -> Fault:
+    return Fault("unauthorised", "send the header Authorization: Bearer TOKEN with the service's token")
+
+
+def _header(scope: Scope, wanted: bytes) -> str | None:
+    return next((value.decode("latin-1") for name, value in scope["headers"] if name.lower() == wanted), None)
+
+
+def _authorised(scope: Scope, token: str) -> bool:
+    scheme, _, given = (_header(scope, b"authorization") or "").partition(" ")
+    return scheme.lower() == "bearer" and same_token(given.strip(), token)
+
+
+async def _refuse_socket(send: Send) -> None:
+    fault = _unauthorised()
+    pairs = [(name.encode(), value.encode()) for name, value in fault.headers().items()]
+    await send({"type": "websocket.http.response.start", "status": fault.status, "headers": pairs})
+    await send({"type": "websocket.http.response.body", "body": fault.body()})

@@ -1,0 +1,43 @@
+"""What the service allows, all in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clearway.errors import DeployError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds on what strangers can make the service do.
+
+    Raises:
+        DeployError: a bound is not positive, or a session could expire while one of its requests is answered.
+    """
+
+    body_bytes: int = 4 << 20
+    """Of a request, and of a WebSocket message."""
+    picture_pixels: int = 1920 * 1080
+    """Height times width, read from the picture's header before it is decoded."""
+    sessions: int = 1000
+    """That are open at a time."""
+    idle_s: float = 600.0
+    """After which a session expires that nobody uses."""
+    deadline_s: float = 10.0
+    """For a whole request, from its headers to its answer; for a WebSocket message, from its arrival."""
+    patience_s: float = 5.0
+    """For a client to send a request's headers, and to read what waits for it."""
+    waiting: int = 256
+    """Pictures that wait for the model; more are refused at once."""
+    batch: int = 16
+    """Pictures that go through the model together."""
+    connections: int = 1500
+    """That are open at a time."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not value > 0:
+                raise DeployError(f"{name} is {value}, expected more than 0. Give a larger number")
+        if self.idle_s <= 2 * self.deadline_s:
+            problem = f"sessions expire after {self.idle_s:g} s and requests may take {self.deadline_s:g} s"
+            raise DeployError(f"{problem}. Let sessions live more than twice as long as requests")

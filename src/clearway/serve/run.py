@@ -1,0 +1,58 @@
+"""A service from start to a clean end."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+from clearway.deploy.model import AgentModel
+from clearway.deploy.navigator import open_model
+from clearway.serve.app import make_app
+from clearway.serve.guard import protected
+from clearway.serve.limits import Limits
+from clearway.serve.protocol import impatient
+from clearway.serve.service import Service
+from clearway.web.local import serve
+
+SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
+
+
+def servable_model(source: Path, scene: str | None = None) -> AgentModel:
+    """The agent of an exported file, or of a run folder, which is exported to the cache first.
+
+    Raises:
+        ClearwayError: see `open_model` and `cached_model`.
+    """
+    if not source.is_dir():
+        return open_model(source, scene)
+    from clearway.deploy.cached import cached_model
+    from clearway.deploy.from_run import load_scene_agent
+
+    return cached_model(load_scene_agent(source, scene))
+
+
+def run_service(model: AgentModel, listener: socket.socket, token: str, limits: Limits) -> None:
+    """Answer until told to end (SIGINT, SIGTERM); requests under way are answered, streams are closed.
+
+    Args:
+        model: the agent.
+        listener: from `web.local.listening`; closed at the end.
+        token: that every request must hold.
+        limits: what is allowed.
+
+    Raises:
+        DeployError: the agent takes no pictures.
+    """
+    service = Service(model, limits)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+    http, sockets = impatient(limits.patience_s)
+    serve(
+        protected(make_app(service), service, token),
+        listener,
+        http=http,
+        ws=sockets,
+        ws_max_size=limits.body_bytes,
+        ws_per_message_deflate=False,
+        limit_concurrency=limits.connections,
+        timeout_graceful_shutdown=int(limits.deadline_s) + 1,
+    )

@@ -1,0 +1,74 @@
+"""`clearway serve`."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from clearway.serve.client import Client
+from sums import Sums, plain
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("nowhere.onnx",), ("nowhere.onnx", "cannot be read")),
+        (("FOLDER",), ("no run here",)),
+        (("x.onnx", "--sessions", "0"), ("sessions is 0",)),
+        (("x.onnx", "--idle-s", "15"), ("sessions expire after 15 s",)),
+        (("x.onnx", "--deadline-s", "nan"), ("deadline_s is nan",)),
+    ],
+    ids=lambda value: " ".join(value),
+)
+def test_services_that_cannot_be(clearway, tmp_path, words, parts):
+    assert clearway("serve", *(tmp_path if word == "FOLDER" else word for word in words)).refusal(*parts)
+
+
+@pytest.mark.parametrize("token", ["short", "with a space in it", "ümlaut-ümlaut-ümlaut"])
+def test_tokens_that_are_too_weak_or_cannot_be_sent(clearway, monkeypatch, token):
+    monkeypatch.setenv("CLEARWAY_TOKEN", token)
+    line = clearway("serve", "x.onnx").refusal("CLEARWAY_TOKEN", "at least 16 plain letters")
+    assert token not in line
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (("--port", "70000"), "--port is 70000"),
+        (("--host", "192.0.2.1"), "192.0.2.1"),
+        (("--host", "no such host"), "--host no such host --port 0: "),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
+    monkeypatch.setattr("clearway.serve.run.open_model", lambda source, scene: Sums())
+    assert clearway("serve", "x.onnx", *words).refusal(part)
+
+
+PROGRAM = """
+import clearway.serve.run
+from clearway.cli.main import main
+from sums import Sums
+
+clearway.serve.run.open_model = lambda source, scene: Sums()
+main(["serve", "x.onnx"])
+"""
+
+
+def test_a_service_says_where_it_is_and_ends_when_told_to():
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "COLUMNS": "200"}
+    environment.pop("CLEARWAY_TOKEN", None)
+    words, pipe = [sys.executable, "-c", PROGRAM], subprocess.PIPE
+    with subprocess.Popen(words, env=environment, stdout=pipe, stderr=pipe, text=True) as process:
+        assert process.stderr is not None
+        url = re.fullmatch(r"scene attic: (http://127\.0\.0\.1:\d+)\n", process.stderr.readline())[1]
+        token = re.fullmatch(r"token: (\S{32})\n", process.stderr.readline())[1]
+        with Client(url, token) as client, client.session(selection="argmax") as session:
+            session.set_target(plain(1))
+            assert session.act(plain(1)).value == 1004
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (0, "", "")

@@ -1,0 +1,37 @@
+"""A run is exported to the cache once, and again when the file is damaged."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from clearway.deploy import cached
+
+
+def test_a_run_is_exported_once_and_again_when_the_file_is_damaged(deployed, tmp_path, monkeypatch) -> None:
+    exported: list[Path] = []
+
+    def export(chosen, path: Path) -> None:
+        exported.append(path)
+        shutil.copy(deployed.agent, path)
+
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path))
+    monkeypatch.setattr(cached, "export_onnx", export)
+    for _ in range(2):
+        assert cached.cached_model(deployed.chosen).card.scene == "cellar"
+    (path,) = exported
+    assert path.parent == tmp_path / "agents" and path.name.startswith("cellar-")
+    path.write_bytes(path.read_bytes()[:-1])
+    assert cached.cached_model(deployed.chosen).card.scene == "cellar"
+    assert exported == [path, path]
+
+
+def test_another_agent_has_another_file(deployed) -> None:
+    key = cached._key(deployed.chosen)
+    weight = deployed.chosen.agent.network.output_bias.data
+    before = float(weight[0, 0])
+    weight[0, 0] = np.nextafter(np.float32(before), np.float32(1))
+    changed = cached._key(deployed.chosen)
+    weight[0, 0] = before
+    assert changed != key
+    assert cached._key(deployed.chosen) == key

@@ -1,0 +1,261 @@
+"""The service as its clients meet it, in process."""
+
+import json
+
+import numpy as np
+import pytest
+from starlette.websockets import WebSocketDisconnect
+
+import clearway
+from clearway.errors import DeployError
+from clearway.serve.limits import Limits
+from clearway.serve.service import Service
+from serving import TOKEN, grey, picture_bytes
+from sums import CARD, Sums, plain
+
+PNG = {"content-type": "image/png"}
+
+
+def fault(answer) -> str:
+    """The code of a refusal, whose structure is checked."""
+    assert answer.headers["content-type"] == "application/json"
+    error = answer.json()["error"]
+    assert answer.json().keys() == {"error"} and error.keys() == {"code", "message"}
+    assert error["message"] and "Traceback" not in answer.text and ".py" not in answer.text
+    return f"{answer.status_code} {error['code']}"
+
+
+def opened(client, **settings) -> str:
+    answer = client.post("/sessions", json=settings)
+    assert answer.status_code == 201
+    return f"/sessions/{answer.json()['session_id']}"
+
+
+def stepped(client, session: str, level: int):
+    return client.post(f"{session}/steps", content=grey(level), headers=PNG)
+
+
+def test_an_episode_is_a_navigator_s(client) -> None:
+    navigator = clearway.Navigator(Sums(), seed=7)
+    session = opened(client, seed=7)
+    for target, levels in ((2, [1, 10, 20, 30, 40]), (3, [5, 6])):
+        navigator.set_target(plain(target))
+        answer = client.put(f"{session}/target", content=grey(target), headers=PNG)
+        assert (answer.status_code, answer.content) == (204, b"")
+        for number, level in enumerate(levels, 1):
+            expected, found = navigator.act(plain(level)), stepped(client, session, level).json()
+            assert (found["value"], found["step"]) == (expected.value, number)
+            assert found["action_index"] == expected.action
+            assert found["action"] == CARD.actions[expected.action]
+            assert np.array_equal(np.float32(found["probabilities"]), expected.probabilities)
+    assert client.delete(session).status_code == 204
+    assert fault(stepped(client, session, 1)) == "404 no_such_session"
+
+
+def test_sessions_do_not_mix(client) -> None:
+    sessions = [opened(client, selection="argmax") for _ in range(5)]
+    for number, session in enumerate(sessions):
+        client.put(f"{session}/target", content=grey(number), headers=PNG)
+    for level in (1, 2, 3):
+        for number, session in enumerate(sessions):
+            found = stepped(client, session, 10 * number + level).json()
+            passed = [10 * number + 1] * 4 + [10 * number + step for step in range(2, level + 1)]
+            assert found["value"] == 1000 * number + sum(passed[-4:])
+            assert found["action"] == "move backward"
+
+
+@pytest.mark.parametrize(
+    ("kind", "content", "expected"),
+    [
+        ("image/png", b"", "415 unsupported_picture"),
+        ("image/png", b"GIF89a", "415 unsupported_picture"),
+        ("image/gif", grey(1), "415 unsupported_picture"),
+        ("application/json", b"{}", "415 unsupported_picture"),
+        (None, grey(1), "415 unsupported_picture"),
+        ("image/png", grey(1)[:-28], "422 unreadable_picture"),
+        ("image/png", picture_bytes(plain(1, (101, 100))), "413 picture_too_large"),
+        ("image/png", bytes(100_001), "413 body_too_large"),
+    ],
+    ids=["empty", "gif", "said to be gif", "json", "unsaid", "cut off", "pixels", "bytes"],
+)
+def test_pictures_that_are_refused_leave_the_session_as_it_was(client, kind, content, expected) -> None:
+    session = opened(client)
+    client.put(f"{session}/target", content=grey(0), headers=PNG)
+    assert stepped(client, session, 1).json()["value"] == 4
+    headers = {"content-type": kind} if kind else {}
+    assert fault(client.post(f"{session}/steps", content=content, headers=headers)) == expected
+    assert fault(client.put(f"{session}/target", content=content, headers=headers)) == expected
+    again = stepped(client, session, 2).json()
+    assert (again["value"], again["step"]) == (5, 2)
+    assert f'code="{expected[4:]}"' in client.get("/metrics").text
+
+
+def test_a_body_that_does_not_say_its_length_is_cut_off_too(client) -> None:
+    read = []
+
+    def endless():
+        for number in range(1000):
+            read.append(number)
+            yield bytes(10_000)
+
+    session = opened(client)
+    assert fault(client.put(f"{session}/target", content=endless(), headers=PNG)) == "413 body_too_large"
+
+
+@pytest.mark.parametrize("token", [None, "", "x", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "é" * 10])
+def test_wrong_tokens(called, service, token) -> None:
+    client = called(service, None)
+    headers = {} if token is None else {"authorization": f"Bearer {token}".encode()}
+    for method, path in (("GET", "/agent"), ("POST", "/sessions"), ("GET", "/metrics"), ("GET", "/openapi.json")):
+        answer = client.request(method, path, headers=headers)
+        assert fault(answer) == "401 unauthorised"
+        assert answer.headers["www-authenticate"] == "Bearer"
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect("/sessions/x/stream", headers=headers):
+        pass
+    assert len(service.sessions) == 0
+    for other in (f"Basic {TOKEN}", TOKEN):
+        assert fault(client.get("/agent", headers={"authorization": other})) == "401 unauthorised"
+    assert client.get("/health").json() == {"status": "ok"}  # says nothing else
+    assert client.get("/agent", headers={"authorization": f"bearer {TOKEN}"}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/sessions/../../etc/passwd",
+        "/sessions/..%2f..%2fetc%2fpasswd/steps",
+        "/sessions/%2e%2e/steps",
+        "/../etc/passwd",
+        "//etc/passwd",
+        "/static/../../pyproject.toml",
+        "/sessions/%00/steps",
+        "/sessions/" + "a" * 5000 + "/steps",
+        "/docs",
+        "/redoc",
+    ],
+)
+def test_paths_lead_nowhere_else(client, path) -> None:
+    answer = client.post(path, content=grey(1), headers=PNG)
+    assert fault(answer) in ("404 not_found", "422 invalid_request", "405 method_not_allowed")
+    assert fault(client.get(path)) in ("404 not_found", "422 invalid_request", "405 method_not_allowed")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b'"x"',
+        b"\xff\xfe",
+        json.dumps({"selection": "best"}).encode(),
+        json.dumps({"seed": -1}).encode(),
+        json.dumps({"seed": 1.5}).encode(),
+        json.dumps({"seed": 1 << 53}).encode(),
+        json.dumps({"seed": "1"}).encode(),
+        json.dumps({"colour": 1}).encode(),
+        b"[" * 50_000,
+    ],
+    ids=lambda content: content[:30].decode("latin-1"),
+)
+def test_sessions_that_cannot_be_opened(client, service, content) -> None:
+    answer = client.post("/sessions", content=content, headers={"content-type": "application/json"})
+    assert fault(answer) == "422 invalid_request"
+    assert len(service.sessions) == 0
+
+
+def test_limits_of_sessions_and_readiness(client) -> None:
+    assert client.get("/ready").json() == {"status": "ready"}
+    sessions = [opened(client) for _ in range(20)]
+    answer = client.post("/sessions", json={})
+    assert (fault(answer), answer.headers["retry-after"]) == ("429 too_many_sessions", "60")
+    assert fault(client.get("/ready")) == "503 overloaded"
+    assert client.get("/health").status_code == 200
+    client.delete(sessions[0])
+    assert client.get("/ready").status_code == 200
+
+
+def test_a_session_without_a_target_and_methods_that_are_not_there(client) -> None:
+    assert fault(stepped(client, opened(client), 1)) == "409 no_target"
+    answer = client.get(f"{opened(client)}/steps")
+    assert (fault(answer), answer.headers["allow"]) == ("405 method_not_allowed", "POST")
+
+
+def test_what_takes_too_long_is_given_up_and_leaves_the_session_as_it_was(called) -> None:
+    model = Sums()
+    client = called(Service(model, Limits(deadline_s=0.5)))
+    session = opened(client)
+    client.put(f"{session}/target", content=grey(0), headers=PNG)
+    assert stepped(client, session, 1).json()["value"] == 4
+    model.seconds = 1.0
+    assert fault(stepped(client, session, 9)) == "504 deadline_passed"
+    model.seconds = 0.0
+    while (answer := stepped(client, session, 2)).status_code == 504:
+        pass  # the model is still busy with the picture given up
+    assert (answer.json()["value"], answer.json()["step"]) == (5, 2)
+
+
+def test_a_failing_agent_says_nothing_of_itself(called, caplog) -> None:
+    class Broken(Sums):
+        def step(self, seen, start, history, target):
+            raise RuntimeError("secret")
+
+    client = called(Service(Broken(), Limits()))
+    answer = client.put(f"{opened(client)}/target", content=grey(0), headers=PNG)
+    assert fault(answer) == "500 internal"
+    assert "secret" not in answer.text
+    assert "secret" in caplog.text  # the log has it
+
+
+def test_the_stream_of_a_session(client) -> None:
+    session = opened(client, selection="argmax")
+    with client.websocket_connect(f"{session}/stream") as socket:
+        socket.send_bytes(grey(1))
+        assert json.loads(socket.receive_text())["error"]["code"] == "no_target"
+        client.put(f"{session}/target", content=grey(2), headers=PNG)
+        values = []
+        for content in (grey(1), b"nonsense", grey(10), grey(20)[:-28], grey(30)):
+            socket.send_bytes(content)
+            answer = json.loads(socket.receive_text())
+            values.append(answer["error"]["code"] if "error" in answer else answer["value"])
+        assert values == [2004, "unsupported_picture", 2013, "unreadable_picture", 2042]
+        socket.send_text("hello")
+        assert json.loads(socket.receive_text())["error"]["code"] == "invalid_request"
+        assert stepped(client, session, 40).json()["step"] == 4  # the same session
+        client.delete(session)
+        socket.send_bytes(grey(1))
+        assert json.loads(socket.receive_text())["error"]["code"] == "no_such_session"
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_text()
+        assert closed.value.code == 1008
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect(f"{session}/stream"):
+        pass
+
+
+def test_figures_for_prometheus(client) -> None:
+    session = opened(client)
+    client.put(f"{session}/target", content=grey(0), headers=PNG)
+    for level in range(3):
+        stepped(client, session, level)
+    client.get("/nowhere/at/all")
+    lines = client.get("/metrics").text.splitlines()
+    assert 'clearway_requests_total{route="/sessions/{session_id}/steps",status="200"} 3.0' in lines
+    assert 'clearway_requests_total{route="unknown",status="404"} 1.0' in lines
+    assert "clearway_sessions 1.0" in lines
+    assert "clearway_batch_pictures_sum 4.0" in lines
+    assert "clearway_model_seconds_count 4.0" in lines
+    assert session.split("/")[-1] not in "".join(lines)
+
+
+def test_answers_are_not_kept_nor_guessed_at(client) -> None:
+    for path in ("/agent", "/health", "/nowhere"):
+        headers = client.get(path).headers
+        assert (headers["cache-control"], headers["x-content-type-options"]) == ("no-store", "nosniff")
+
+
+def test_an_agent_that_takes_features_is_not_served() -> None:
+    class Features(Sums):
+        card = clearway.deploy.card.Card(**{**vars(CARD), "takes_pictures": False})
+
+    with pytest.raises(DeployError, match="without its encoder"):
+        Service(Features(), Limits())

@@ -1,0 +1,91 @@
+"""Concurrent pictures go through the model together."""
+
+import asyncio
+
+import numpy as np
+import pytest
+
+from clearway.serve.batching import Batcher
+from clearway.serve.faults import Fault
+from clearway.serve.limits import Limits
+from sums import Sums, plain
+
+TARGET = np.array([1.0, 1.0], np.float32)
+
+
+def ignore(pictures: int, seconds: float) -> None:
+    pass
+
+
+def test_everyone_gets_the_own_row_and_waits_for_no_fuller_batch() -> None:
+    model, watched = Sums(0.05), []
+
+    async def ask() -> list[float]:
+        batcher = Batcher(model, Limits(batch=8), lambda *told: watched.append(told))
+        history = np.zeros((4, 2), np.float32)
+        steps = await asyncio.gather(*(batcher.step(plain(level), history, TARGET) for level in range(20)))
+        return [float(step.value[0]) for step in steps]
+
+    assert asyncio.run(ask()) == [1000.0 + level for level in range(20)]
+    assert sum(model.batches) == 20 and max(model.batches) == 8 and len(model.batches) <= 4
+    assert [pictures for pictures, _ in watched] == model.batches
+    assert all(seconds >= 0.05 for _, seconds in watched)
+
+
+def test_pictures_of_different_sizes_share_no_batch_and_none_is_passed_over() -> None:
+    model = Sums(0.01)
+
+    async def ask() -> list[float]:
+        batcher = Batcher(model, Limits(), ignore)
+        sizes = [(3, 4), (5, 6), (3, 4), (5, 6), (7, 7)]
+        steps = [batcher.step(plain(level, size), None, TARGET) for level, size in enumerate(sizes)]
+        return [float(step.value[0]) for step in await asyncio.gather(*steps)]
+
+    assert asyncio.run(ask()) == [1000.0 + 4 * level for level in range(5)]
+    assert sorted(model.batches) == [1, 2, 2]
+
+
+def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:
+    model = Sums(0.05)
+
+    async def ask() -> None:
+        batcher = Batcher(model, Limits(batch=1), ignore)
+        first, *others = [asyncio.create_task(batcher.step(plain(1), None, TARGET)) for _ in range(5)]
+        await asyncio.sleep(0.01)
+        for other in others[:3]:
+            other.cancel()
+        await first
+        await others[3]
+
+    asyncio.run(ask())
+    assert model.batches == [1, 1]
+
+
+def test_too_many_that_wait_are_refused_at_once() -> None:
+    async def ask() -> list[object]:
+        batcher = Batcher(Sums(0.05), Limits(waiting=3, batch=2), ignore)
+        return await asyncio.gather(*(batcher.step(plain(1), None, TARGET) for _ in range(5)), return_exceptions=True)
+
+    found = asyncio.run(ask())
+    refused = [step for step in found if isinstance(step, Fault)]
+    assert [fault.code for fault in refused] == ["overloaded", "overloaded"]
+
+
+def test_a_model_that_fails_fails_its_batch_alone() -> None:
+    class Moody(Sums):
+        def step(self, seen, start, history, target):
+            if seen.max() == 13:
+                raise ZeroDivisionError
+            return super().step(seen, start, history, target)
+
+    async def ask() -> list[object]:
+        batcher = Batcher(Moody(), Limits(batch=1), ignore)
+        return await asyncio.gather(
+            *(batcher.step(plain(level), None, TARGET) for level in (12, 13, 14)), return_exceptions=True
+        )
+
+    found = asyncio.run(ask())
+    assert isinstance(found[1], ZeroDivisionError)
+    assert [float(found[index].value[0]) for index in (0, 2)] == [1048.0, 1056.0]
+    with pytest.raises(ZeroDivisionError):
+        raise found[1]

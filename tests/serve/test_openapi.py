@@ -1,0 +1,64 @@
+"""The service keeps what its OpenAPI document says, whatever is sent to it."""
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, Phase, settings
+
+from clearway.serve.app import make_app
+from clearway.serve.guard import protected
+from clearway.serve.limits import Limits
+from clearway.serve.service import Service
+from serving import TOKEN, grey
+from sums import Sums
+
+HEADERS = {"Authorization": f"Bearer {TOKEN}"}
+SERVICE = Service(Sums(), Limits(sessions=5000, body_bytes=20_000))
+APP = protected(make_app(SERVICE), SERVICE, TOKEN)
+SCHEMA = schemathesis.openapi.from_asgi("/openapi.json", APP, headers=HEADERS)
+KNOWN = SERVICE.sessions.open("sampled", 0)
+SUPPRESSED = list(HealthCheck)
+
+
+def check(case) -> None:
+    if "session_id" in case.path_parameters and case.method != "DELETE" and case.meta.generation.mode.is_positive:
+        case.path_parameters["session_id"] = KNOWN.id  # else no request would get past the session's name
+    case.call_and_validate(headers=HEADERS)
+
+
+@SCHEMA.parametrize()
+@settings(max_examples=15, deadline=None, suppress_health_check=SUPPRESSED, phases=[Phase.explicit, Phase.generate])
+def test_any_request_is_answered_as_documented(case) -> None:
+    check(case)
+
+
+@pytest.mark.slow
+@SCHEMA.parametrize()
+@settings(max_examples=60, deadline=None, suppress_health_check=SUPPRESSED)
+def test_many_requests_are_answered_as_documented(case) -> None:
+    check(case)
+
+
+def test_the_document_names_every_route_and_the_token() -> None:
+    document = SCHEMA.raw_schema
+    assert document["paths"].keys() == {
+        "/health",
+        "/ready",
+        "/metrics",
+        "/agent",
+        "/sessions",
+        "/sessions/{session_id}",
+        "/sessions/{session_id}/target",
+        "/sessions/{session_id}/steps",
+    }
+    assert document["components"]["securitySchemes"] == {"HTTPBearer": {"type": "http", "scheme": "bearer"}}
+    steps = document["paths"]["/sessions/{session_id}/steps"]["post"]
+    assert steps["requestBody"]["content"].keys() == {"image/jpeg", "image/png", "image/webp"}
+    assert {"200", "401", "404", "408", "409", "413", "415", "422", "500", "503", "504"} <= steps["responses"].keys()
+    assert "security" not in document["paths"]["/health"]["get"]
+
+
+def test_a_picture_passes_the_checks_too() -> None:
+    case = SCHEMA["/sessions/{session_id}/target"]["PUT"].Case(
+        path_parameters={"session_id": KNOWN.id}, body=grey(3), media_type="image/png"
+    )
+    assert case.call_and_validate(headers=HEADERS).status_code == 204

@@ -1,0 +1,71 @@
+"""Sessions open, expire and are counted."""
+
+import pytest
+
+from clearway.errors import DeployError
+from clearway.serve.faults import Fault
+from clearway.serve.limits import Limits
+from clearway.serve.sessions import Sessions
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
+    clock = Clock()
+    sessions = Sessions(Limits(idle_s=60), clock)
+    first, second = sessions.open("argmax", None), sessions.open("sampled", 3)
+    clock.now += 59
+    assert sessions.get(first.id) is first  # its time begins anew
+    clock.now += 1
+    assert len(sessions) == 1
+    with pytest.raises(Fault, match="expired") as caught:
+        sessions.get(second.id)
+    assert (caught.value.code, caught.value.status) == ("no_such_session", 404)
+    clock.now += 58
+    assert sessions.get(first.id) is first
+    clock.now += 60
+    assert len(sessions) == 0
+
+
+def test_no_more_sessions_than_allowed_and_room_again_when_one_goes() -> None:
+    clock = Clock()
+    sessions = Sessions(Limits(sessions=2, idle_s=60), clock)
+    first = sessions.open("sampled", None)
+    clock.now += 30
+    sessions.open("sampled", None)
+    with pytest.raises(Fault, match="2 sessions are open") as caught:
+        sessions.open("sampled", None)
+    assert (caught.value.code, caught.value.status) == ("too_many_sessions", 429)
+    sessions.close(first.id)
+    sessions.open("sampled", None)
+    assert sessions.full
+    clock.now += 60
+    assert not sessions.full
+    with pytest.raises(Fault):
+        sessions.close(first.id)
+
+
+def test_names_of_sessions_cannot_be_guessed() -> None:
+    sessions = Sessions(Limits())
+    names = {sessions.open("sampled", None).id for _ in range(200)}
+    assert len(names) == 200
+    assert {len(name) for name in names} == {22}  # 128 bits
+
+
+@pytest.mark.parametrize(
+    ("settings", "part"),
+    [
+        ({"sessions": 0}, "sessions is 0"),
+        ({"deadline_s": -1.0}, "deadline_s is -1.0"),
+        ({"idle_s": float("nan")}, "idle_s is nan"),
+        ({"idle_s": 20.0, "deadline_s": 10.0}, "sessions expire after 20 s and requests may take 10 s"),
+    ],
+)
+def test_limits_that_cannot_be(settings, part) -> None:
+    with pytest.raises(DeployError, match=part):
+        Limits(**settings)

@@ -1,0 +1,24 @@
+"""Pictures to send to a service, and its token."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from PIL import Image
+
+from sums import plain
+
+TOKEN = "a-token-for-the-tests"
+
+
+def picture_bytes(picture: np.ndarray, kind: str = "PNG", **settings: object) -> bytes:
+    """A picture file's content."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, kind, **settings)
+    return file.getvalue()
+
+
+def grey(level: int) -> bytes:
+    """A PNG file of one grey level."""
+    return picture_bytes(plain(level))
