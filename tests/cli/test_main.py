@@ -15,8 +15,8 @@ import pytest
 
 import clearway as package
 from clearway.cli.console import showing_warnings
+from clearway.cli.imports.command import ImportScenes
 from clearway.cli.main import Command, Scenes
-from clearway.cli.scene_imports import ImportScenes
 from clearway.cli.scenes import Inspect
 from clearway.errors import ClearwayError
 from clearway.perception import EncoderWarning

@@ -16,10 +16,10 @@ from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
 from clearway.cli.export import ExportAgent
+from clearway.cli.imports.command import ImportScenes
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.reproduce import Report, Reproduce
-from clearway.cli.scene_imports import ImportScenes
 from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.serve import Serve
 from clearway.cli.train import Train

@@ -1,0 +1,98 @@
+"""Kinds of `clearway scenes import` for a place of one's own: floor-plan, images."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from clearway.cli.arguments import (
+    check_at_least,
+    check_seeds,
+)
+from clearway.cli.imports.writing import Encoding, encode_and_write, write_scenes
+
+if TYPE_CHECKING:
+    from clearway.scenes.floor_plans import FloorPlan
+
+
+@dataclass(frozen=True)
+class ImportFloorPlan:
+    """Make furnished rooms of floor plans: blocked cells become furniture and walls, four views a cell are rendered.
+
+    Example: clearway scenes import floor-plan hall.txt --out scenes
+    """
+
+    file: Annotated[Path, tyro.conf.Positional]
+    """A map seen from above in .txt (# blocked, . reachable) or .csv (0 blocked, 1 reachable), a list of cells in .csv
+    (header x,z), or NumPy arrays of cells in .npz, one a plan."""
+    out: Path
+    """Folder for the scene files."""
+    name: tuple[str, ...] = ()
+    """Which plans of a .npz file; by default all."""
+    features: int | None = None
+    """Render nothing, and give each pose so many made-up features, 2048 for example: smooth random functions of it.
+    Scenes of one number and seed can be trained together."""
+    seed: int = 0
+    """With the plan's name: of the furniture, colours and textures, or of the made-up features."""
+    cell_size: float = 0.25
+    """Side of a cell, metres."""
+    encoding: Encoding = field(default_factory=Encoding)
+
+    def run(self) -> None:
+        """Make and write."""
+        from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
+        from clearway.scenes.floor_plans import floor_plan_scene
+
+        names = self.name or floor_plan_names(self.file)
+        plans = [read_floor_plan(self.file, name, cell_size_m=self.cell_size) for name in names]
+        if self.features is None:
+            self._render(plans)
+            return
+        for plan in plans:
+            write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
+
+    def _render(self, plans: Sequence[FloorPlan]) -> None:
+        """Make rooms, encode their pictures and write."""
+        from clearway.scenes.library import cached_plan_scene
+        from clearway.scenes.rooms.plans.limits import check_can_be_rendered
+
+        check_seeds(encoder_seed=self.encoding.encoder_seed)
+        for plan in plans:  # all of them before anything that takes minutes
+            check_can_be_rendered(plan, self.seed)
+        scenes = [cached_plan_scene(plan, self.seed, progress=True) for plan in plans]
+        encode_and_write(scenes, self.out, self.encoding)
+
+
+@dataclass(frozen=True)
+class ImportImages:
+    """Make a scene of photographs and a table that says where each was taken.
+
+    Example: clearway scenes import images office/poses.csv --step 0.5 --out scenes
+    """
+
+    table: Annotated[Path, tyro.conf.Positional]
+    """CSV file with the columns file, x, z (metres) and heading (degrees, 0 along +z, 90 along +x); files lie beside it
+    or in folders beside it. Every location needs the same evenly spaced headings."""
+    out: Path
+    """Folder for the scene file."""
+    step: float = 0.5
+    """Length of a move: how far neighbouring locations are apart, metres."""
+    blocked: Path | None = None
+    """CSV file with the columns x1, z1, x2, z2: pairs of neighbouring locations without a way between them."""
+    name: str | None = None
+    """Of the scene; by default the table's."""
+    height: int = 300
+    """Of the scene's pictures, pixels; the width follows from the first photograph, others are cut to fit."""
+    encoding: Encoding = field(default_factory=Encoding)
+
+    def run(self) -> None:
+        """Read, encode and write."""
+        from clearway.scenes.importers.images import read_images
+
+        check_at_least(1, height=self.height)
+        scene = read_images(self.table, step_m=self.step, blocked=self.blocked, name=self.name, height_px=self.height)
+        encode_and_write([scene], self.out, self.encoding)

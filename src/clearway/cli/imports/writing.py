@@ -1,0 +1,77 @@
+"""What all imports do with their scenes: encode, and write without losing anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clearway.cli.arguments import check_at_least, check_seeds
+from clearway.cli.console import stderr_console
+from clearway.errors import ClearwayError
+
+if TYPE_CHECKING:
+    from clearway.scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How pictures become features."""
+
+    encoder: str = "auto"
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    encoder_seed: int = 0
+    """Seed of random-resnet50."""
+    workers: int | None = None
+    """Processes that encode, with one thread each; by default one, with as many threads as there are cores."""
+    ray: str | None = None
+    """Encode on a Ray cluster: local, auto or an address."""
+
+
+def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding, files: Sequence[Path] = ()) -> None:
+    """Give scenes features, all by one encoder, and write them into a folder; arguments as of `write_scenes`."""
+    from clearway.perception import encode_scenes
+
+    check_seeds(encoder_seed=encoding.encoder_seed)
+    check_at_least(1, workers=encoding.workers)
+    _paths(scenes, out, files)  # before the minutes that encoding takes
+    encoded = encode_scenes(
+        scenes,
+        encoding.encoder,
+        seed=encoding.encoder_seed,
+        progress=True,
+        workers=encoding.workers,
+        ray=encoding.ray,
+    )
+    write_scenes(encoded, out, files)
+
+
+def write_scenes(scenes: Sequence[Scene], out: Path, files: Sequence[Path] = ()) -> None:
+    """Write each scene into a folder, under its name, and say so.
+
+    Args:
+        scenes: to be written.
+        out: the folder.
+        files: that the scenes were read from, one each, and must not be written over; none where they were not.
+    """
+    from clearway.scenes.thor_v1 import write_scene
+
+    for scene, path in zip(scenes, _paths(scenes, out, files), strict=True):
+        write_scene(scene, path)
+        stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
+
+
+def _paths(scenes: Sequence[Scene], out: Path, files: Sequence[Path]) -> list[Path]:
+    """Where the scenes are to be written, once it is seen that nothing is lost by it and all stay in the folder."""
+    names = [scene.name for scene in scenes]
+    read = {file.resolve() for file in files}
+    paths = [out / f"{name}.h5" for name in names]
+    for source, name, path in zip(files or names, names, paths, strict=True):
+        if Path(name).name != name:
+            raise ClearwayError(f"{name}: a scene's name becomes a file's. Give one without slashes")
+        if path.resolve() in read:
+            raise ClearwayError(f"{path}: would be written over a file to be imported. Give another folder with --out")
+        if names.count(name) > 1:
+            raise ClearwayError(f"{source}: another one to be imported has this name. Import them one by one")
+    return paths
