@@ -55,7 +55,15 @@ def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
         here = {old: new for old, new in changes.items() if old in block.text}
         done = run_block(Block(block.language, shortened(block.text, here)), tmp_path)
         assert done.returncode == 0, f"{block.text}\n{done.stderr}"
-    made = ("demo/index.html", "bathroom.png", "pictures", "episode.mp4", "scenes/office.h5", "runs/office")
+    made = (
+        "demo/index.html",
+        "bathroom.png",
+        "pictures",
+        "episode.mp4",
+        "scenes/office.h5",
+        "runs/office",
+        "office.onnx",
+    )
     assert all((tmp_path / name).exists() for name in made)
 
 
