@@ -48,7 +48,11 @@ def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
     blocks = code_blocks(ROOT / "docs/tutorial.md")
-    changes = {"--frames 320000": "--frames 4000", "demo --out demo": "demo --frames 4000 --out demo"}
+    changes = {
+        "--frames 320000": "--frames 4000",
+        "demo --out demo": "demo --frames 4000 --out demo",
+        "clearway evaluate": "clearway evaluate --episodes 5",
+    }
     whole = "\n".join(block.text for block in blocks)
     assert all(old in whole for old in changes)
     for block in blocks:
