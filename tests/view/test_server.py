@@ -102,7 +102,10 @@ def test_the_stage_and_its_maps(address: str, stage: Stage) -> None:
 def test_pictures_are_those_of_the_scene(address: str, stage: Stage) -> None:
     scene = stage.scenes[1]
     assert scene.observations is not None and scene.top_view is not None
-    for path, expected in {"scenes/1/views/7.jpg": scene.observations[7], "scenes/1/above.jpg": scene.top_view.image}.items():
+    for path, expected in {
+        "scenes/1/views/7.jpg": scene.observations[7],
+        "scenes/1/above.jpg": scene.top_view.image,
+    }.items():
         answer, content = get(address, path)
         assert answer.headers["content-type"] == "image/jpeg"
         found = np.asarray(Image.open(io.BytesIO(content)))
@@ -119,7 +122,9 @@ def test_an_episode_over_the_socket(address: str) -> None:
         assert json.loads(other.recv())["scene"] == 1  # each page has its own episode
 
 
-@pytest.mark.parametrize("text", ["", "{", "[" * 50_000, "null", '"begin"', '{"do": "begin", "episode": "scene=attic"}'])
+@pytest.mark.parametrize(
+    "text", ["", "{", "[" * 50_000, "null", '"begin"', '{"do": "begin", "episode": "scene=attic"}']
+)
 def test_the_socket_refuses_what_it_does_not_know_and_stays(address: str, text: str) -> None:
     with live(address) as socket:
         socket.send(text)
@@ -151,6 +156,7 @@ def test_more_pages_than_anyone_opens_are_turned_away(address: str) -> None:
             pass
 
 
+@pytest.mark.slow
 def test_a_film_of_the_episode(address: str) -> None:
     answer, content = get(address, "film.mp4?scene=corridor&start=1&target=8&drive=1&walk=FR&walk=L&walk=FFF")
     assert (answer.status, answer.headers["content-type"]) == (200, "video/mp4")

@@ -158,6 +158,8 @@ def test_an_unknown_message_is_refused_and_changes_nothing(stage: Stage, message
     assert [len(walker.steps) for walker in session.walkers] == [1, 1]
 
 
-@pytest.mark.parametrize("message", [{"do": "step"}, {"do": "map", "walker": 0}, {"do": "drive", "action": 0, "along": True}])
+@pytest.mark.parametrize(
+    "message", [{"do": "step"}, {"do": "map", "walker": 0}, {"do": "drive", "action": 0, "along": True}]
+)
 def test_nothing_happens_before_an_episode_has_begun(stage: Stage, message: object) -> None:
     assert Session(stage).answer(message)["kind"] == "refused"

@@ -17,7 +17,7 @@ def test_two_agents_share_the_scenes_that_both_know(stage: Stage) -> None:
     assert [scene.name for scene in stage.scenes] == ["corridor", "grid", "bare"]
     assert stage.targets["corridor"] == (0, 8, 16)
     assert stage.index("bare") == 2
-    with pytest.raises(RunError, match="attic.*corridor, grid, bare"):
+    with pytest.raises(RunError, match=r"attic.*corridor, grid, bare"):
         stage.index("attic")
 
 

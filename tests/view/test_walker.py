@@ -51,7 +51,11 @@ def test_blocked_moves_are_counted() -> None:
     walk = walker(0)
     bumped, turned, again = walk.step(BACKWARD), walk.step(RIGHT), walk.step(FORWARD)
     assert bumped is not None and turned is not None and again is not None
-    assert [(s.state, s.blocked, s.collisions) for s in (bumped, turned, again)] == [(0, True, 1), (1, False, 1), (1, True, 2)]
+    assert [(s.state, s.blocked, s.collisions) for s in (bumped, turned, again)] == [
+        (0, True, 1),
+        (1, False, 1),
+        (1, True, 2),
+    ]
     assert again.earned == pytest.approx(-0.06)
     assert walk.actions == [BACKWARD, RIGHT, FORWARD]
 
@@ -93,7 +97,9 @@ def test_argmax_untried_tries_another_action_in_the_same_pose() -> None:
 
 def test_sampled_actions_repeat_with_the_seed_and_follow_the_probabilities() -> None:
     def actions(seed: int) -> list[int]:
-        walk = Walker(corridor_world(), TARGET, 0, COLLISION_AWARE, seed=seed, mind=mind(corridor_world(), "sampled", RIGHT))
+        walk = Walker(
+            corridor_world(), TARGET, 0, COLLISION_AWARE, seed=seed, mind=mind(corridor_world(), "sampled", RIGHT)
+        )
         for _ in range(150):
             walk.step()
         return walk.actions

@@ -67,7 +67,9 @@ def read_episode(text: str) -> Episode:
     """
     query = text.rpartition("#")[2]
     if len(query) > LONGEST_QUERY:
-        raise ClearwayError(f"an episode's link of {len(query)} characters, at most {LONGEST_QUERY} are read. Shorten it")
+        raise ClearwayError(
+            f"an episode's link of {len(query)} characters, at most {LONGEST_QUERY} are read. Shorten it"
+        )
     found: dict[str, list[str]] = {name: [] for name in FIELDS}
     for name, value in parse_qsl(query, keep_blank_values=True):
         if name not in found:

@@ -62,7 +62,9 @@ def _stacked(shown: list[Iterator[np.ndarray]], names: list[str]) -> Iterator[np
     last: list[np.ndarray] = []
     for together in itertools.zip_longest(*shown):
         last = [frame if frame is not None else last[index] for index, frame in enumerate(together)]
-        yield np.concatenate([part for name, frame in zip(names, last, strict=True) for part in (_title(name, frame), frame)])
+        yield np.concatenate(
+            [part for name, frame in zip(names, last, strict=True) for part in (_title(name, frame), frame)]
+        )
 
 
 def _title(name: str, frame: np.ndarray) -> np.ndarray:

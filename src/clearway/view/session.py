@@ -22,7 +22,7 @@ from clearway.errors import ClearwayError
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.graph import UNREACHABLE
 from clearway.scenes.scene import Scene
-from clearway.view.episode import Episode, actions_of, letters, read_episode
+from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
 from clearway.view.stage import Stage, agent_world
 from clearway.view.walker import Mind, Walker
 
@@ -79,21 +79,23 @@ class Session:
         start = _drawn_start(scene, target, wanted.seed) if wanted.start is None else wanted.start
         if not 0 <= start < scene.state_count:
             raise ClearwayError(f"start {start}: {scene.name} has states 0 to {scene.state_count - 1}. Choose another")
-        episode = replace(wanted, scene=scene.name, start=start, target=target, drive=wanted.drive or not self.stage.agents)
-        names = self.names(episode)
-        walks = dict(zip(names, map(actions_of, episode.walks), strict=False))
+        episode = replace(
+            wanted, scene=scene.name, start=start, target=target, drive=wanted.drive or not self.stage.agents
+        )
+        recorded = [actions_of(walk) for walk in episode.walks] + [[]] * MOST_WALKERS
         walkers = []
-        for shown in self.stage.agents:
+        for shown, actions in zip(self.stage.agents, recorded, strict=False):
             own_world, index = agent_world(shown, scene.name, target)
             learner = shown.agent.record.learner
             critic = shown.agent.critic(own_world)
             mind = Mind(critic, learner.reward_scale, episode.selection, learner.history_length)
-            recorded = walks.get(shown.name, ())
             walkers.append(
-                Walker(own_world, index, start, shown.reward, seed=episode.seed, mind=mind, recorded=recorded)
+                Walker(own_world, index, start, shown.reward, seed=episode.seed, mind=mind, recorded=actions)
             )
         if episode.drive:
-            walk = Walker(world, 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=walks.get(YOU, ()))
+            walk = Walker(
+                world, 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=recorded[len(walkers)]
+            )
             walkers.append(walk)
         self.episode, self.walkers = episode, walkers
 
@@ -137,7 +139,12 @@ class Session:
             "drive": episode.drive,
             "recorded": max((len(walker.recorded) for walker in self.walkers), default=0),
             "walkers": [
-                {"name": name, "agent": walker.mind is not None, "reward": reward, "steps": list(map(asdict, walker.steps))}
+                {
+                    "name": name,
+                    "agent": walker.mind is not None,
+                    "reward": reward,
+                    "steps": list(map(asdict, walker.steps)),
+                }
                 for name, walker, reward in zip(self.names(episode), self.walkers, rewards, strict=False)
             ],
             "ended": self._ended(),
@@ -159,5 +166,3 @@ def _drawn_start(scene: Scene, target: int, seed: int) -> int:
     steps = scene.distances_to(np.array([target]))[0]
     starts = np.flatnonzero((steps != UNREACHABLE) & (steps > 0))
     return int(np.random.default_rng([seed, target]).choice(starts))
-
-

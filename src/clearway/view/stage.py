@@ -33,7 +33,7 @@ class StageAgent:
 
     @property
     def reward(self) -> Reward:
-        """What it learnt from: with rewards clipped, if its learner clipped them, so that values and rewards compare."""
+        """What it learnt from: clipped, if its learner clipped rewards, so that values and rewards compare."""
         record = self.agent.record
         return record.reward.with_changes(clip=record.reward.clip or record.learner.clip_rewards)
 

@@ -69,7 +69,7 @@ def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
 
 
 def _with_strip(picture: Image.Image, probabilities: np.ndarray | None, chosen: int | None) -> Image.Image:
-    """The picture with a bar for each action below it, or its name alone; the action taken is named in full strength."""
+    """The picture with a bar for each action, or its name alone, below; the action taken is in full strength."""
     width, height = picture.width // 2 * 2, (picture.height + STRIP_PX) // 2 * 2
     frame = Image.new("RGB", (width, height), colours.PAPER)
     frame.paste(picture, (0, 0))
@@ -100,24 +100,33 @@ def write_video(path: Path, pictures: Iterator[np.ndarray], frames_per_s: int = 
     """
     if path.suffix not in SUFFIXES:
         raise ClearwayError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}. Give another --out")
-    shown = list(pictures)
-    shown += shown[-1:] * LAST_FRAME_TIMES
     with written_whole(path) as part:
         if path.suffix == ".gif":
-            first, *others = [Image.fromarray(frame) for frame in shown]
+            first, *others = [Image.fromarray(frame) for frame in _with_long_end(pictures)]
             first.save(part, "GIF", save_all=True, append_images=others, duration=1000 // frames_per_s, loop=0)
         else:
-            _write_mp4(part, shown, frames_per_s)
+            _write_mp4(part, _with_long_end(pictures), frames_per_s)
 
 
-def _write_mp4(path: Path, shown: Sequence[np.ndarray], frames_per_s: int) -> None:
+def _with_long_end(pictures: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+    """The frames, the last of them several times more."""
+    frame = None
+    for frame in pictures:
+        yield frame
+    assert frame is not None, "a film needs a frame"
+    yield from [frame] * LAST_FRAME_TIMES
+
+
+def _write_mp4(path: Path, pictures: Iterator[np.ndarray], frames_per_s: int) -> None:
+    """Frame by frame, so that a long film needs no more memory than a short one."""
     import av
 
-    height, width, _ = shown[0].shape
     with av.open(str(path), "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(frames_per_s))
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-        for picture in shown:
+        stream.pix_fmt = "yuv420p"
+        for number, picture in enumerate(pictures):
+            if number == 0:  # the encoder opens with the first frame
+                stream.height, stream.width = picture.shape[:2]
             for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")):
                 container.mux(packet)
         for packet in stream.encode():

@@ -15,10 +15,7 @@ let shown = 0; // the step looked at
 let playing = false;
 let turn = 0; // of playing: an older loop notices that it is over
 
-const map = createMap($("map"), (state, put) => {
-  const what = put ?? document.querySelector("input[name=put]:checked").value;
-  begin({ [what]: state, ...(what === "target" ? { start: known.episode.start } : {}) });
-});
+const map = createMap($("map"), pick, (state) => ($("cursor").textContent = state === null ? "" : `Cursor: ${nameOf(state)}`));
 const viewer = connect(() => say("The viewer has ended. Start it again, then load its new address.", true, false));
 
 async function start() {
@@ -46,6 +43,15 @@ async function begin(changes = {}) {
   const next = { scene: known.stage.scenes[scene], start, target, selection, seed, drive: drive ? 1 : 0, ...changes };
   for (const name of Object.keys(next)) if (next[name] === null) delete next[name];
   await ask({ do: "begin", episode: new URLSearchParams(next).toString() });
+}
+
+function pick(state, put) {
+  begin({ [put ?? document.querySelector("input[name=put]:checked").value]: state });
+}
+
+function nameOf(state) {
+  const { headings_deg, zones } = known.scene;
+  return `pose ${state}, heading ${headings_deg[state]}°, ${["free", "precollision", "collision"][zones[state]]} zone`;
 }
 
 // Asks, takes in the answer, and says whether it was not refused.

@@ -67,7 +67,7 @@ export function createCard(walker, index, pictures, onDrive) {
   const header = element("header", {}, swatch, element("h2", { textContent: walker.name, title: `reward ${walker.reward}` }), badge);
   const picture = element("div", { className: pictures.any ? "picture" : "picture empty" }, view, missing);
   const inside = element("div", { className: "inside" }, picture, element("div", {}, numbers, below));
-  const card = element("article", { className: "card walker", "data-walker": walker.name, "aria-label": walker.name }, header, inside);
+  const card = element("article", { className: walker.agent ? "card walker" : "card walker user", "data-walker": walker.name, "aria-label": walker.name }, header, inside);
   const look = lookOf(walker, index);
   swatch.style.width = swatch.style.height = "22px";
   drawAgent(penOf(swatch, 22, 22), 11, 11.5, 7.5, 0, look);

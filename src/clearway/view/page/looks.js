@@ -11,7 +11,7 @@ export const INK = "#22272e";
 export const WALKERS = [
   { colour: "#0b3d91", halo: "#ffffff", dashes: [] },
   { colour: "#3ddc84", halo: "#16351f", dashes: [9, 5] },
-  { colour: "#c04bd0", halo: "#ffffff", dashes: [2.5, 5] },
+  { colour: "#8e2c9c", halo: "#ffffff", dashes: [2.5, 5] },
 ];
 
 export function lookOf(walker, index) {

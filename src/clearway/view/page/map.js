@@ -5,7 +5,9 @@ const VEIL = "rgb(255 255 255 / 45%)"; // over the cells in the picture from abo
 const CELL_SHARE = 0.94;
 const LOWEST_PX = 220, LARGEST_CELL_PX = 90;
 
-export function createMap(canvas, onPick) {
+// `onPick(state, what)` is told of a pose chosen as "start" or "target" (null: as the page says); `onCursor(state)` of
+// the pose that the keyboard's cursor is on, null when the map loses the focus.
+export function createMap(canvas, onPick, onCursor) {
   const ground = document.createElement("canvas"); // all that stays the same from step to step
   let scene = null, above = null, layer = { kind: "zones" }, shown = null, cursor = null;
   let scale = 1, width = 0, height = 0;
@@ -186,10 +188,17 @@ export function createMap(canvas, onPick) {
     else return;
     event.preventDefault();
     event.stopPropagation();
+    onCursor(cursor);
     draw();
   });
-  canvas.addEventListener("focus", draw);
-  canvas.addEventListener("blur", draw);
+  canvas.addEventListener("focus", () => {
+    onCursor(cursor);
+    draw();
+  });
+  canvas.addEventListener("blur", () => {
+    onCursor(null);
+    draw();
+  });
 
   // To the nearest cell in that direction, keeping the heading.
   function moveCursor(dx, dz) {
