@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import socket
+import warnings
 from pathlib import Path
+
+from PIL import Image
 
 from clearway.deploy.model import AgentModel
 from clearway.deploy.navigator import open_model
@@ -44,6 +47,7 @@ def run_service(model: AgentModel, listener: socket.socket, token: str, limits: 
         DeployError: the agent takes no pictures.
     """
     service = Service(model, limits)
+    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `pictures` refuses by a limit of our own
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     http, sockets = impatient(limits.patience_s)
     serve(
