@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 found[clients].append(asyncio.run(measured(url, clients, options.seconds)))
         for clients, rows in found.items():
             row = sorted(rows)[len(rows) // 2]
-            figures = f"{row.per_s:.1f} | {row.p50_ms:.0f} | {row.p99_ms:.0f} | {row.batch:.1f} | {100 * row.share:.0f} %"
+            figures = f"{row.per_s:.1f} | {row.p50_ms:.0f} | {row.p99_ms:.0f} | {row.batch:.1f} | {row.share:.0%}"
             print(f"| {clients} | {figures} |")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image
@@ -20,8 +21,13 @@ from clearway.web.local import serve
 SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
 
 
-def servable_model(source: Path, scene: str | None = None) -> AgentModel:
+def servable_model(source: Path, scene: str | None, tell: Callable[[str], object]) -> AgentModel:
     """The agent of an exported file, or of a run folder, which is exported to the cache first.
+
+    Args:
+        source: the file or the folder.
+        scene: see `open_model`.
+        tell: see `cached_model`.
 
     Raises:
         ClearwayError: see `open_model` and `cached_model`.
@@ -31,7 +37,7 @@ def servable_model(source: Path, scene: str | None = None) -> AgentModel:
     from clearway.deploy.cached import cached_model
     from clearway.deploy.from_run import load_scene_agent
 
-    return cached_model(load_scene_agent(source, scene))
+    return cached_model(load_scene_agent(source, scene), tell)
 
 
 def run_service(model: AgentModel, listener: socket.socket, token: str, limits: Limits) -> None:
