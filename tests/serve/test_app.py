@@ -189,6 +189,9 @@ def test_what_takes_too_long_is_given_up_and_leaves_the_session_as_it_was(called
     assert stepped(client, session, 1).json()["value"] == 4
     model.seconds = 1.0
     assert fault(stepped(client, session, 9)) == "504 deadline_passed"
+    with client.websocket_connect(f"{session}/stream") as socket:
+        socket.send_bytes(grey(9))
+        assert json.loads(socket.receive_text())["error"]["code"] == "deadline_passed"
     model.seconds = 0.0
     while (answer := stepped(client, session, 2)).status_code == 504:
         pass  # the model is still busy with the picture given up

@@ -52,11 +52,14 @@ class Serve:
         if len(token) < FEWEST_TOKEN_LETTERS or not (token.isascii() and token.isprintable()) or " " in token:
             problem = f"the variable {TOKEN_VARIABLE} holds no token of at least {FEWEST_TOKEN_LETTERS} plain letters"
             raise ClearwayError(f"{problem}. Choose another, or unset it for a random one")
-        model = servable_model(self.agent, self.scene)
+        console = stderr_console()
+
+        def say(line: str) -> None:
+            console.print(line, highlight=False, soft_wrap=True)
+
+        model = servable_model(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener:
-            console = stderr_console()
-            where = f"http://{self.host}:{port_of(listener)}"
-            console.print(f"scene {model.card.scene}: {where}", highlight=False, soft_wrap=True)
+            say(f"scene {model.card.scene}: http://{self.host}:{port_of(listener)}")
             if TOKEN_VARIABLE not in os.environ:
-                console.print(f"token: {token}", highlight=False, soft_wrap=True)
+                say(f"token: {token}")
             run_service(model, listener, token, limits)

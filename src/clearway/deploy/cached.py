@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
 
 import clearway.deploy
@@ -15,8 +16,12 @@ from clearway.errors import DeployError
 KEY_LETTERS = 16
 
 
-def cached_model(chosen: SceneAgent) -> OnnxModel:
+def cached_model(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxModel:
     """A run's agent on onnxruntime, exported to the user's cache folder the first time; a damaged file is made again.
+
+    Args:
+        chosen: the agent and its scene.
+        tell: called with a line before an export, which takes its time.
 
     Raises:
         DeployError, EncoderError: see `export_onnx`.
@@ -26,6 +31,7 @@ def cached_model(chosen: SceneAgent) -> OnnxModel:
         try:
             return OnnxModel(path)
         except DeployError:
+            tell(f"exporting the agent for scene {chosen.scene.name}, once ...")
             export_onnx(chosen, path)
     return OnnxModel(path)
 

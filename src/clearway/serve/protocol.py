@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import struct
 from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+
+def reset(transport: asyncio.Transport) -> None:
+    """Cut a connection off and let the system forget what it still had to send, which it would else keep trying to."""
+    plug = transport.get_extra_info("socket")
+    if plug is not None and not transport.is_closing():
+        plug.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    transport.abort()
 
 
 class _Impatient(asyncio.Protocol):
@@ -20,7 +30,7 @@ class _Impatient(asyncio.Protocol):
 
     def pause_writing(self) -> None:
         super().pause_writing()
-        self._unread = self.loop.call_later(self.patience_s, self.transport.abort)
+        self._unread = self.loop.call_later(self.patience_s, reset, self.transport)
 
     def resume_writing(self) -> None:
         self._stop_waiting()
@@ -68,11 +78,11 @@ class ImpatientHttp(_Impatient, H11Protocol):
     def timeout_keep_alive_handler(self) -> None:
         """End an idle connection; at once where its client has left an answer unread all the while."""
         if self.transport.get_write_buffer_size():
-            self.transport.abort()
+            reset(self.transport)
         super().timeout_keep_alive_handler()
 
     def _await_headers(self) -> None:
-        self._headers = self.loop.call_later(self.patience_s, self.transport.abort)
+        self._headers = self.loop.call_later(self.patience_s, reset, self.transport)
 
     def _have_headers(self) -> None:
         if self._headers is not None:

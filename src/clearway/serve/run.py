@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import socket
+import warnings
+from collections.abc import Callable
 from pathlib import Path
+
+from PIL import Image
 
 from clearway.deploy.model import AgentModel
 from clearway.deploy.navigator import open_model
@@ -17,8 +21,13 @@ from clearway.web.local import serve
 SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
 
 
-def servable_model(source: Path, scene: str | None = None) -> AgentModel:
+def servable_model(source: Path, scene: str | None, tell: Callable[[str], object]) -> AgentModel:
     """The agent of an exported file, or of a run folder, which is exported to the cache first.
+
+    Args:
+        source: the file or the folder.
+        scene: see `open_model`.
+        tell: see `cached_model`.
 
     Raises:
         ClearwayError: see `open_model` and `cached_model`.
@@ -28,7 +37,7 @@ def servable_model(source: Path, scene: str | None = None) -> AgentModel:
     from clearway.deploy.cached import cached_model
     from clearway.deploy.from_run import load_scene_agent
 
-    return cached_model(load_scene_agent(source, scene))
+    return cached_model(load_scene_agent(source, scene), tell)
 
 
 def run_service(model: AgentModel, listener: socket.socket, token: str, limits: Limits) -> None:
@@ -44,6 +53,7 @@ def run_service(model: AgentModel, listener: socket.socket, token: str, limits: 
         DeployError: the agent takes no pictures.
     """
     service = Service(model, limits)
+    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `pictures` refuses by a limit of our own
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     http, sockets = impatient(limits.patience_s)
     serve(
