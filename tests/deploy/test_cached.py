@@ -3,7 +3,6 @@
 import shutil
 from pathlib import Path
 
-
 from clearway.deploy import cached
 
 
