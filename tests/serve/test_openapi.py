@@ -33,7 +33,7 @@ def test_any_request_is_answered_as_documented(case) -> None:
 
 @pytest.mark.slow
 @SCHEMA.parametrize()
-@settings(max_examples=200, deadline=None, suppress_health_check=SUPPRESSED)
+@settings(max_examples=100, deadline=None, suppress_health_check=SUPPRESSED)
 def test_many_requests_are_answered_as_documented(case) -> None:
     check(case)
 

@@ -163,6 +163,7 @@ PICTURE: tuple[Code, ...] = (
     *CLOSING,
     "unsupported_picture",
     "unreadable_picture",
+    "body_too_large",
     "picture_too_large",
     "overloaded",
     "too_slow",
