@@ -241,8 +241,18 @@ def write_array(
     HDF5 offers checksums for neither scalars nor empty arrays: they stand in the dataset's header, which has one.
     """
     if values.size == 0 or values.ndim == 0:
-        plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-        plan.set_layout(h5py.h5d.COMPACT)
-        return parent.create_dataset(name, data=values, dcpl=plan)
+        return _written_in_header(parent, name, values)
     packing = {"compression": "gzip", "compression_opts": gzip_level, "fletcher32": True}
     return parent.create_dataset(name, data=values, chunks=chunks, shuffle=values.itemsize > 1, **packing)
+
+
+def _written_in_header(parent: h5py.Group, name: str, values: np.ndarray) -> h5py.Dataset:
+    """Store a small array in its dataset's header. `create_dataset` would keep a scalar outside, unchecked."""
+    plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plan.set_layout(h5py.h5d.COMPACT)
+    space = h5py.h5s.create_simple(values.shape) if values.ndim else h5py.h5s.create(h5py.h5s.SCALAR)
+    kind = h5py.h5t.py_create(values.dtype, logical=True)
+    dataset = h5py.Dataset(h5py.h5d.create(parent.id, name.encode(), kind, space, plan))
+    if values.size:
+        dataset[...] = values
+    return dataset

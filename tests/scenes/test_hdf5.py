@@ -1,0 +1,49 @@
+"""Arrays of our files stand under a checksum, whatever their size."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from clearway.errors import SceneError
+from clearway.scenes import hdf5
+from clearway.scenes.thor_v1 import HDF5_VERSION
+
+VALUE = 0x1122334455667788  # bytes that stand nowhere else in a small file
+
+
+def with_scalar(path: Path) -> bytes:
+    with h5py.File(path, "w", libver=HDF5_VERSION) as file:
+        hdf5.write_array(file, "count", np.array(VALUE))
+    return path.read_bytes()
+
+
+def read_scalar(path: Path) -> int:
+    with hdf5.opened(path) as file:
+        return int(hdf5.read_values(hdf5.need_dataset(file, "count", path), path))
+
+
+@pytest.mark.parametrize("values", [np.array(1.5), np.array(VALUE), np.zeros((0, 3))], ids=["float", "int", "empty"])
+def test_small_arrays_come_back_from_their_headers(tmp_path: Path, values: np.ndarray) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver=HDF5_VERSION) as file:
+        dataset = hdf5.write_array(file, "a", values)
+        assert dataset.id.get_create_plist().get_layout() == h5py.h5d.COMPACT
+    with h5py.File(path) as file:
+        found = file["a"][()]
+        assert found.dtype == values.dtype and found.shape == values.shape
+        assert np.array_equal(found, values)
+
+
+def test_no_bit_of_a_scalar_changes_unnoticed(tmp_path: Path) -> None:
+    path = tmp_path / "scalar.h5"
+    content = with_scalar(path)
+    assert read_scalar(path) == VALUE
+    first = content.index(VALUE.to_bytes(8, "little"))
+    for bit in range(64):
+        hurt = bytearray(content)
+        hurt[first + bit // 8] ^= 1 << bit % 8
+        path.write_bytes(hurt)
+        with pytest.raises(SceneError):
+            read_scalar(path)
