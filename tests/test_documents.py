@@ -8,6 +8,7 @@ import pytest
 
 from documents import ROOT, Block, code_blocks, run_block, shortened
 
+UNTIL_STOPPED = "timeout 30 clearway "
 ROOM = """
 <mujoco>
   <worldbody>
@@ -76,20 +77,29 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
     first, watching, commands, program = code_blocks(ROOT / "README.md")
     programs = [line.partition("#")[0].strip() for line in first.text.splitlines()]
     assert programs == ["scripts/demo", "scripts/test"]  # CI runs the second, and with it this test
-    assert watching.text.splitlines()[1].startswith("clearway view ")  # tests/view clicks through what it shows
     changes = {
         ". .venv/bin/activate\n": "",
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
+        "evaluate runs/rooms --targets": "evaluate runs/rooms --episodes 5 --targets",
         "--live --sweep": "--live --sweep --strengths 1 --episodes 1 --step-cap 3",
         "--scene kitchen --out episode.mp4": "--scene bathroom --out episode.mp4",
         "--scene kitchen --out kitchen.onnx": "--scene bathroom --out kitchen.onnx",
-        "clearway serve kitchen.onnx ": "timeout 20 clearway serve kitchen.onnx || test $? = 124 ",  # until stopped
+        "clearway serve kitchen.onnx ": f"{UNTIL_STOPPED}serve kitchen.onnx || test $? = 124 ",
         "reproduce all": "reproduce fig3 --rooms bathroom --frames 4000",
     }
     prepare_stand_ins(tmp_path)
     done = run_block(Block("sh", shortened(commands.text, changes)), tmp_path)
     assert done.returncode == 0, done.stderr
+    changes = {
+        "pip install 'clearway[view]'\n": "",
+        "clearway view demo/runs/shortest demo/runs/collision-aware ": (
+            f"{UNTIL_STOPPED}view runs/rooms runs/rooms || test $? = 124 "
+        ),
+    }
+    done = run_block(Block("sh", shortened(watching.text, changes)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("http://127.0.0.1:")
     done = run_block(program, tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[0] in ("True", "False")
