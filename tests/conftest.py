@@ -16,6 +16,6 @@ def _one_thread() -> Iterator[None]:
 
 @pytest.fixture(autouse=True, scope="session")
 def _interruptible() -> None:
-    """A shell lets what it starts with & ignore Ctrl+C, and so would every process that a test starts and interrupts."""
+    """A shell lets what it starts with & ignore Ctrl+C, and so would every process that a test interrupts."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
