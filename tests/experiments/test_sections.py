@@ -177,7 +177,7 @@ def test_the_report_is_complete_and_stands_alone(
     html = page.read_text(encoding="utf-8")
     assert page.name == HTML
     assert "clearway &lt;reproduce&gt;" in html and "Only smoke." in html
-    assert "http" not in html.replace("http-equiv", "")  # nothing is loaded from elsewhere
+    assert "://" not in html  # nothing is loaded from elsewhere; pictures inside may spell anything but a colon
     markdown = (tmp_path / MARKDOWN).read_text(encoding="utf-8")
     content = json.loads((tmp_path / JSON).read_text(encoding="utf-8"))
     assert [section["name"] for section in content["sections"]] == list(sections)
