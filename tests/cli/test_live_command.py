@@ -93,12 +93,12 @@ def test_a_sweep_has_a_row_a_setting(clearway, runs):
     ids=" ".join,
 )
 def test_flags_that_cannot_be_used(clearway, runs, words, parts):
-    clearway("evaluate", runs.bold, *words).refusal(*parts)
+    assert clearway("evaluate", runs.bold, *words).refusal(*parts)
 
 
 def test_the_same_run_twice_is_refused(clearway, runs):
-    clearway("evaluate", runs.bold, *SHORT, "--against", runs.bold).refusal("--against", "the same run")
+    assert clearway("evaluate", runs.bold, *SHORT, "--against", runs.bold).refusal("--against", "the same run")
 
 
 def test_a_run_on_an_imported_scene_is_refused(clearway, trained):
-    clearway("evaluate", trained.run, "--live").refusal("bathroom_02", "thor_v1", "scenes build")
+    assert clearway("evaluate", trained.run, "--live").refusal("bathroom_02", "thor_v1", "scenes build")

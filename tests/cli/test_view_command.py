@@ -43,7 +43,7 @@ def test_it_opens_the_browser_only_when_asked_to(clearway, trained, served, monk
     ],
 )
 def test_runs_that_cannot_be_shown(clearway, served, words, parts):
-    clearway("view", *words).refusal(*parts)
+    assert clearway("view", *words).refusal(*parts)
     assert served == []
 
 
@@ -58,22 +58,22 @@ def test_runs_that_cannot_be_shown(clearway, served, words, parts):
     ],
 )
 def test_words_that_do_not_fit_the_run(clearway, trained, served, words, parts):
-    clearway("view", trained.run, *words).refusal(*parts)
+    assert clearway("view", trained.run, *words).refusal(*parts)
     assert served == []
 
 
 def test_a_port_that_is_taken(clearway, trained, served):
     with listening(0) as listener:
-        clearway("scenes", "view", trained.scene, "--port", port_of(listener)).refusal(
+        assert clearway("scenes", "view", trained.scene, "--port", port_of(listener)).refusal(
             f"--port {port_of(listener)}", "in use"
         )
 
 
 def test_files_that_are_no_scene(clearway, trained, served, tmp_path):
-    clearway("scenes", "view", tmp_path / "none.h5").refusal("none.h5", "no such file")
+    assert clearway("scenes", "view", tmp_path / "none.h5").refusal("none.h5", "no such file")
     for name in ("a.h5", "b.h5"):
         (tmp_path / name).write_bytes(trained.scene.read_bytes())
-    clearway("scenes", "view", tmp_path).refusal("a folder of 2 scene files")
+    assert clearway("scenes", "view", tmp_path).refusal("a folder of 2 scene files")
 
 
 @pytest.mark.parametrize(
@@ -82,4 +82,4 @@ def test_files_that_are_no_scene(clearway, trained, served, tmp_path):
 def test_a_missing_package_names_the_extra(clearway, trained, monkeypatch, package, module):
     monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setitem(sys.modules, package, None)
-    clearway("scenes", "view", trained.scene).refusal("pip install 'clearway[view]'")
+    assert clearway("scenes", "view", trained.scene).refusal("pip install 'clearway[view]'")
