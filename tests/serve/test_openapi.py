@@ -19,23 +19,26 @@ KNOWN = SERVICE.sessions.open("sampled", 0)
 SUPPRESSED = list(HealthCheck)
 
 
-def check(case) -> None:
+def answered_as_documented(case) -> bool:
+    """The answer has a documented status, kind and body; otherwise schemathesis raises what is wrong with it."""
     if "session_id" in case.path_parameters and case.method != "DELETE" and case.meta.generation.mode.is_positive:
         case.path_parameters["session_id"] = KNOWN.id  # else no request would get past the session's name
-    case.call_and_validate(headers=HEADERS)
+    response = case.call_and_validate(headers=HEADERS)
+    documented = SCHEMA.raw_schema["paths"][case.path].get(case.method.lower(), {"responses": ["405"]})
+    return str(response.status_code) in documented["responses"]
 
 
 @SCHEMA.parametrize()
 @settings(max_examples=15, deadline=None, suppress_health_check=SUPPRESSED, phases=[Phase.explicit, Phase.generate])
 def test_any_request_is_answered_as_documented(case) -> None:
-    check(case)
+    assert answered_as_documented(case)
 
 
 @pytest.mark.slow
 @SCHEMA.parametrize()
 @settings(max_examples=100, deadline=None, suppress_health_check=SUPPRESSED)
 def test_many_requests_are_answered_as_documented(case) -> None:
-    check(case)
+    assert answered_as_documented(case)
 
 
 def test_the_document_names_every_route_and_the_token() -> None:

@@ -79,10 +79,10 @@ def hasty() -> Iterator[Running]:
         yield found
 
 
-def still_serves(service: Running) -> None:
+def still_serves(service: Running) -> bool:
     with service.client() as client, client.session(selection="argmax") as session:
         session.set_target(plain(1))
-        assert session.act(plain(2)).value == 1008
+        return session.act(plain(2)).value == 1008
 
 
 def until_closed(connection: socket.socket) -> bytes:
@@ -119,7 +119,7 @@ def test_headers_that_do_not_come_and_headers_that_trickle(hasty) -> None:
             assert answer.count(b"HTTP/1.1") == begin.count(b"\r\n\r\n")
         if begin:
             sender.join()
-    still_serves(hasty)
+    assert still_serves(hasty)
 
 
 def test_an_upload_that_trickles_is_refused_and_one_cut_off_changes_nothing(hasty) -> None:
@@ -169,7 +169,7 @@ def test_a_client_that_does_not_read_is_cut_off(hasty) -> None:
             with pytest.raises((ConnectionClosed, OSError)):
                 for _ in range(10**6):
                     stream.send(b"no picture: the answer is longer than this")
-    still_serves(hasty)
+    assert still_serves(hasty)
 
 
 def test_connections_are_limited(hasty) -> None:
@@ -185,7 +185,7 @@ def test_connections_are_limited(hasty) -> None:
     while time.monotonic() < deadline:
         if httpx.get(f"{hasty.url}/health", timeout=PATIENT_S).status_code == 200:
             break
-    still_serves(hasty)
+    assert still_serves(hasty)
 
 
 def test_what_is_no_http_and_what_is_no_websocket(hasty) -> None:
@@ -201,7 +201,7 @@ def test_what_is_no_http_and_what_is_no_websocket(hasty) -> None:
             stream.send(bytes(100_001))
             stream.recv(timeout=PATIENT_S)
         assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009  # message too big
-    still_serves(hasty)
+    assert still_serves(hasty)
 
 
 async def walk(http: httpx.AsyncClient, number: int, until: float, least: int) -> int:
@@ -296,7 +296,7 @@ def test_a_client_that_resets_its_connection_harms_nobody(hasty) -> None:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         connection.sendall(b"POST /sessions HTTP/1.1\r\n" + HEAD + b"Content-Length: 50\r\n\r\n{")
         connection.close()
-    still_serves(hasty)
+    assert still_serves(hasty)
 
 
 def test_a_picture_file_as_it_is(hasty, tmp_path) -> None:

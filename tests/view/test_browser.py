@@ -251,3 +251,4 @@ def test_a_damaged_link_is_said_and_another_episode_begins(opened: Callable[...,
     page = opened("scene=attic")
     expect(page.locator("#status")).to_contain_text("scene attic: not shown here")
     expect(page.locator("#goal-where")).to_contain_text("pose 0")
+    assert "attic" not in page.locator("#goal-where").inner_text()
