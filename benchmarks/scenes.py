@@ -2,6 +2,7 @@
 
     python benchmarks/scenes.py                                        # 4 and 40 rooms, a minute or two
     python benchmarks/scenes.py --rooms 4 100 1000 --store float16     # up to a million states, half an hour
+    python benchmarks/scenes.py --rooms 1000 --at-once 0 8             # all rooms at the same time, and eight in turn
     python benchmarks/scenes.py --rooms 1000 --basis 256               # features in 256 principal directions
 
 Rooms are random floor plans of about `--states` states, made on the spot with `--features` made-up features, and
@@ -17,6 +18,7 @@ run, a process for each size, updates of both sizes in turn, so that whatever el
     of 4 rooms   that, as a share of four rooms' frames/s: the median of pairs of updates, one after the other
     by CPU       the same by the processor time of the updates, which other programs on the machine disturb less
 
+`at once`: scenes that are walked at the same time, in turn with the others; by default all.
 `heads`: whether every scene has its own last layers, as published, or all share one (see `clearway.learn.config`).
 """
 
@@ -33,6 +35,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from itertools import product
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -67,6 +70,7 @@ class Costs:
     """One row of the table; see the head of the file for units."""
 
     rooms: int
+    at_once: int
     states: int
     heads: str
     store: str
@@ -115,7 +119,14 @@ def worker(connection: Connection, size: Size, paths: Sequence[Path], threads: i
     tables = clock.lap()
     trainer = Trainer(world, size.learner, COLLISION_AWARE, seed=0)
     costs = Costs(
-        size.rooms, world.state_count, size.learner.heads, size.store, 1000 * opened / size.rooms, tables, clock.lap()
+        rooms=size.rooms,
+        at_once=min(size.learner.scenes_at_once or size.rooms, size.rooms),
+        states=world.state_count,
+        heads=size.learner.heads,
+        store=size.store,
+        open_ms=1000 * opened / size.rooms,
+        world_s=tables,
+        ready_s=clock.lap(),
     )
     connection.send(costs)
     while connection.recv():
@@ -199,10 +210,22 @@ def measured(
 
 def table(rows: Sequence[Costs]) -> str:
     """The rows as text."""
-    line = "{:>6} {:>10} {:>7} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8} {:>9} {:>17} {:>11} {:>7}"
+    line = "{:>6} {:>7} {:>10} {:>7} {:>8} {:>8} {:>8} {:>8} {:>7} {:>8} {:>9} {:>17} {:>11} {:>7}"
     text = [
         line.format(
-            *("rooms", "states", "heads", "store", "open ms", "world s", "ready s", "memory", "largest", "frames/s"),
+            *(
+                "rooms",
+                "at once",
+                "states",
+                "heads",
+                "store",
+                "open ms",
+                "world s",
+                "ready s",
+                "memory",
+                "largest",
+                "frames/s",
+            ),
             *("min - max", "of 4 rooms", "by CPU"),
         )
     ]
@@ -210,6 +233,7 @@ def table(rows: Sequence[Costs]) -> str:
         text.append(
             line.format(
                 row.rooms,
+                row.at_once,
                 f"{row.states:,}",
                 row.heads,
                 row.store,
@@ -235,6 +259,7 @@ def main() -> None:
     parser.add_argument("--files", type=int, default=8, help="different rooms")
     parser.add_argument("--store", nargs="+", default=["float16"], help="stores of the features: memory float16 mapped")
     parser.add_argument("--heads", nargs="+", default=["shared"], help="of the network: shared scene")
+    parser.add_argument("--at-once", type=int, nargs="+", default=[0], help="rooms walked at the same time; 0: all")
     parser.add_argument("--basis", type=int, default=0, help="principal directions of the features; 0: features as is")
     parser.add_argument("--envs", type=int, default=1600, help="environments, at least as many as rooms")
     parser.add_argument("--steps", type=int, default=20, help="of every environment between updates")
@@ -255,13 +280,11 @@ def main() -> None:
                 for _ in range(options.warm):
                     updated(few)
                 row_of_few = len(rows)
-                for store in options.store:
-                    for rooms in options.rooms:
-                        many, seconds = measured(
-                            Size(rooms, store, learner), few, paths, options.threads, options.warm, options.repeats
-                        )
-                        rows.append(many)
-                        beside += seconds
+                for store, rooms, at_once in product(options.store, options.rooms, options.at_once):
+                    size = Size(rooms, store, replace(learner, scenes_at_once=at_once))
+                    many, seconds = measured(size, few, paths, options.threads, options.warm, options.repeats)
+                    rows.append(many)
+                    beside += seconds
                 rows.insert(row_of_few, finished(few, costs, learner.envs * learner.rollout_steps, beside))
     machine = {"cores": os.cpu_count(), "threads": options.threads, "load": os.getloadavg()[0]}
     if options.json:

@@ -40,11 +40,13 @@ def test_the_paper_s_settings() -> None:
         "width": 512,
         "history_length": 4,
         "heads": "scene",
+        "scenes_at_once": 0,
         "frames": 10_000_000,
         "envs": 100,
         "envs_by": "scenes",
     }
-    without_meaning = {"ratio_clip", "siamese_step", "lookahead_temperature"}  # there is one pass, of one minibatch
+    # there is one pass, of one minibatch, over all scenes
+    without_meaning = {"ratio_clip", "siamese_step", "lookahead_temperature", "scene_updates"}
     assert {name: value for name, value in asdict(PAPER_A2C).items() if name not in without_meaning} == published
 
 
@@ -131,6 +133,7 @@ def test_a2c_with_several_passes_is_refused() -> None:
 
 
 def test_a_setting_that_came_later_renames_no_older_run() -> None:
-    assert DEFAULT.told_apart_by().keys() == asdict(DEFAULT).keys() - {"heads"}
-    assert replace(DEFAULT, heads="shared").told_apart_by() == asdict(replace(DEFAULT, heads="shared"))
+    assert DEFAULT.told_apart_by().keys() == asdict(DEFAULT).keys() - {"heads", "scenes_at_once", "scene_updates"}
+    changed = replace(DEFAULT, heads="shared", scenes_at_once=4, scene_updates=3)
+    assert changed.told_apart_by() == asdict(changed)
     assert (DEFAULT.head_count(1000), replace(DEFAULT, heads="shared").head_count(1000)) == (1000, 1)

@@ -160,18 +160,23 @@ def test_the_siamese_gradient_is_the_mean_over_the_batches_since_the_last_one() 
 
 def test_without_the_siamese_weight_refresh_follows_all_other_parameters() -> None:
     network, lookup = made_network()
-    before = lookup.first_layer.projected.clone()
+    every = torch.arange(len(TARGET_STATE))
+
+    def target_branch() -> tuple[Tensor, Tensor]:
+        term = lookup._target_terms(every).clone()
+        return lookup.wanted.clone(), term
+
+    before, stale = lookup.first_layer.projected.clone(), target_branch()
     with torch.no_grad():
         for name, parameter in network.named_parameters():
             parameter.mul_(1 if name == "siamese_weight" else 0.5)
-    every = torch.arange(len(TARGET_STATE))
-    wanted, term = lookup.wanted, lookup._target_terms(every)
     lookup.refresh(siamese_weight=False)
-    partly = lookup.wanted, lookup._target_terms(every)
+    partly = target_branch()
     lookup.refresh()
+    fresh = target_branch()
     assert torch.equal(before, lookup.first_layer.projected)
-    assert all(torch.equal(a, b) for a, b in zip(partly, (lookup.wanted, lookup._target_terms(every)), strict=True))
-    assert not torch.equal(wanted, lookup.wanted) and not torch.equal(term, lookup._target_terms(every))
+    assert all(torch.equal(a, b) for a, b in zip(partly, fresh, strict=True))
+    assert not any(torch.equal(a, b) for a, b in zip(stale, fresh, strict=True))
 
 
 def test_features_of_another_size_are_refused() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
 from clearway.envs.feature_store import all_finite, evenly_spaced
@@ -46,26 +45,6 @@ def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
     return FeatureMap.fitted(
         sample, centre=learner.centre_features, directions=learner.feature_basis, whiten=learner.whiten_features
     )
-
-
-def divided_envs(world: World, learner: Learner) -> tuple[int, ...]:
-    """Environments of each scene.
-
-    Raises:
-        RunError: too few for the number of scenes or minibatches.
-    """
-    states = torch.diff(world.scene_offset).double()
-    share = states / states.sum() if learner.envs_by == "states" else torch.full_like(states, 1 / len(states))
-    upto = (share.cumsum(0) * learner.envs).round().long()
-    counts = tuple(torch.diff(upto, prepend=upto.new_zeros(1)).tolist())
-    if min(counts) < 1:
-        raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments")
-    if min(counts) * learner.rollout_steps < learner.minibatches:
-        raise RunError(
-            f"{learner.minibatches} minibatches of {min(counts) * learner.rollout_steps} rows of a scene. "
-            "Give fewer minibatches, or more environments"
-        )
-    return counts
 
 
 def optimisers(network: SiameseActorCritic, learner: Learner) -> tuple[Optimiser, Optimiser]:

@@ -44,6 +44,11 @@ class EpisodeStatistics:
         self.open_steps *= 1 - ended
         self.open_collisions *= 1 - ended
 
+    def drop_open(self) -> None:
+        """Forget the episodes under way, which do not go on."""
+        self.open_steps.zero_()
+        self.open_collisions.zero_()
+
     def refresh_success(self) -> None:
         """Take the success rate anew for targets whose window is full."""
         full = self.window[:, EPISODES] >= WINDOW

@@ -6,7 +6,7 @@ Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -23,7 +23,8 @@ from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient,
 from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
-from clearway.learn.setup import check_seed, checked_features, divided_envs, fitted_features, optimisers
+from clearway.learn.rotation import Rotation, check_division, divided_envs
+from clearway.learn.setup import check_seed, checked_features, fitted_features, optimisers
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
@@ -77,7 +78,9 @@ class Trainer:
         self.feature_map = fitted_features(checked_features(world), learner)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
-        envs_per_scene = divided_envs(world, learner)
+        self.rotation = Rotation(world.scene_count, learner.scenes_at_once, learner.scene_updates, seed)
+        check_division(world, learner, self.rotation)
+        envs_per_scene = divided_envs(world, learner, self.rotation.scenes(0))
         self.env_count = sum(envs_per_scene)
         device = world.device
         heads = learner.head_count(world.scene_count)
@@ -86,13 +89,11 @@ class Trainer:
         self.lookup = LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state)
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
-        counts = torch.tensor(envs_per_scene, device=device)
-        scenes = torch.arange(world.scene_count, device=device).repeat_interleave(counts)
         self.navigation = Navigation(
             world,
             replace(reward, clip=reward.clip or learner.clip_rewards),
             seeds,
-            choice=TargetChoice.by_scene(world, scenes),
+            choice=TargetChoice.by_scene(world, scene_of_envs(envs_per_scene, device)),
             step_limit=learner.step_limit,
             history_length=learner.history_length,
         )
@@ -122,6 +123,10 @@ class Trainer:
             RunError: the loss or a gradient is not finite.
         """
         learner = self.learner
+        if self.updates and self.rotation.begins(self.updates):
+            self._seat(self.updates)
+            self.statistics.drop_open()
+            self._begin_staggered()
         lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
         rollout = self.collector.collect(self.statistics)
@@ -148,6 +153,12 @@ class Trainer:
         )
         check_finite(result, self.frames)
         return result
+
+    def _seat(self, update: int) -> None:
+        """Put the environments into the scenes of that update."""
+        counts = divided_envs(self.world, self.learner, self.rotation.scenes(update))
+        self.navigation.choice.groups = scene_of_envs(counts, self.world.device)
+        self.collector.rows_per_scene = counts
 
     def _begin_staggered(self) -> None:
         """Begin all episodes, targets in turn, with clocks spread so that cuts do not fall together."""
@@ -321,7 +332,14 @@ class Trainer:
         self.observed.next_state = tensors["observed.next_state"].to(self.world.device).clone()
         self.navigation.choice.reweigh(tensors["choice.weights"].to(self.world.device).clone())
         self.frames, self.updates = frames, updates
+        self._seat(max(updates - 1, 0))
         self.lookup.refresh()
+
+
+def scene_of_envs(envs_per_scene: Sequence[int], device: torch.device) -> Tensor:
+    """The scene of every environment, (N,) int64; environments are ordered by scene."""
+    counts = torch.tensor(envs_per_scene, device=device)
+    return torch.arange(len(counts), device=device).repeat_interleave(counts)
 
 
 def _mean(scalars: list[Tensor]) -> float:

@@ -27,8 +27,8 @@ class FirstLayer(Protocol):
     def seen(self, history: Tensor) -> Tensor:
         """(B, H) of histories (B, K) int64."""
 
-    def wanted(self) -> Tensor:
-        """(M, H) of all targets, each in every slot."""
+    def wanted(self, targets: Tensor) -> Tensor:
+        """(U, H) of targets (U,) int64, each in every slot."""
 
     def starts(self, state: Tensor) -> tuple[Tensor, Tensor]:
         """Sums (U, H) of states in every slot, and which of them is that of each state (B,) int64: (B,) int64."""
@@ -68,9 +68,9 @@ class AllStates:
         """(B, H) of histories (B, K) int64."""
         return embedding_bag(self._table_row(history), self.projected.view(-1, self.width), mode="sum")
 
-    def wanted(self) -> Tensor:
-        """(M, H) of all targets, each in every slot."""
-        return self.projected[self.target_state].view(-1, self.history_length, self.width).sum(1)
+    def wanted(self, targets: Tensor) -> Tensor:
+        """(U, H) of targets (U,) int64, each in every slot."""
+        return self.projected[self.target_state[targets]].view(-1, self.history_length, self.width).sum(1)
 
     def starts(self, state: Tensor) -> tuple[Tensor, Tensor]:
         """Sums (S, H) of all states in every slot, and `state` (B,) int64 as it is."""
@@ -130,16 +130,15 @@ class VisitedStates:
             self._forget()
         self.by_state = self.by_state[:0]
         self.slots_together = self.weight.sum(0)  # (H, F)
-        self.wanted_rows = self.targets @ self.slots_together.T
 
     def seen(self, history: Tensor) -> Tensor:
         """(B, H) of histories (B, K) int64."""
         row = self._table_row(history)
         return embedding_bag(row, self.projected[: self.known].view(-1, self.width), mode="sum")
 
-    def wanted(self) -> Tensor:
-        """(M, H) of all targets, each in every slot."""
-        return self.wanted_rows.clone()
+    def wanted(self, targets: Tensor) -> Tensor:
+        """(U, H) of targets (U,) int64, each in every slot."""
+        return self.targets[targets] @ self.slots_together.T
 
     def starts(self, state: Tensor) -> tuple[Tensor, Tensor]:
         """Sums (U, H) of the states that occur, in every slot, and the row of each state (B,) int64 among them."""
@@ -163,7 +162,8 @@ class VisitedStates:
     def gradient(self, out: Tensor) -> None:
         """Write the weight's gradient (K, H, F), of all that was added."""
         torch.mm(self.by_state.T, self.rows[: len(self.by_state)], out=out.flatten(0, 1))
-        out.add_(self.by_target.T @ self.targets)
+        occurred = self.by_target.any(1).nonzero()[:, 0]
+        out.add_(self.by_target[occurred].T @ self.targets[occurred])
 
     def _table_row(self, states: Tensor) -> Tensor:
         """Row of `projected`, seen as (U * K, H), for states (B, K) in their slots; projects what is missing."""

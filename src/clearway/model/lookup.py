@@ -98,6 +98,11 @@ class LookupNetwork:
         layer = AllStates if len(features) <= FEW_STATES else VisitedStates
         self.first_layer: FirstLayer = layer(network.siamese_weight.data, features, target_state)
         self.workspace, self.batches = torch.empty(0, self.width, device=features.device), 0
+        goals = len(target_state)
+        self.all_targets = torch.arange(goals, device=features.device)
+        self.known = torch.zeros(goals, dtype=torch.bool, device=features.device)  # whose rows below are up to date
+        self.wanted = network.siamese_bias.new_zeros(goals, self.width)
+        self.target_term = torch.zeros_like(self.wanted)  # of the fusion layer, before its ReLU
         for parameter in network.parameters():
             parameter.grad = torch.zeros_like(parameter)
         self.refresh()
@@ -116,9 +121,9 @@ class LookupNetwork:
         self.fusion_in, self.scene_in = net.fusion_weight[0].T, net.scene_weight.transpose(1, 2)
         if few_rows:
             self.fusion_in, self.scene_in = self.fusion_in.contiguous(), self.scene_in.contiguous()
-        self.wanted = self.first_layer.wanted().add_(net.siamese_bias).relu_()  # (M, H)
-        if len(self.wanted) <= FEW_TARGETS:
-            self.target_term = torch.addmm(net.fusion_bias, self.wanted, net.fusion_weight[1].T)  # (M, H)
+        self.known.zero_()
+        if len(self.known) <= FEW_TARGETS:
+            self._know(self.all_targets)
 
     @torch.no_grad()
     def forward(
@@ -181,7 +186,7 @@ class LookupNetwork:
         _relu_backward_(grad_fused, kept.fused)
         torch.sum(grad_fused, 0, out=grad_of(net.fusion_bias))
         torch.mm(grad_fused.T, kept.seen, out=grad_of(net.fusion_weight)[0])
-        goals = target.unique() if len(self.wanted) > FEW_TARGETS else slice(None)
+        goals = self.all_targets if len(self.known) <= FEW_TARGETS else target.unique()
         wanted, grad_term = self.wanted[goals], self._sum_by_target(target, grad_fused)[goals]  # (M, H) or fewer
         torch.mm(grad_term.T, wanted, out=grad_of(net.fusion_weight)[1])
         grad_wanted = torch.zeros_like(self.wanted)
@@ -236,11 +241,18 @@ class LookupNetwork:
 
     def _target_terms(self, target: Tensor) -> Tensor:
         """The target's part of the fusion layer, before its ReLU, for targets (B,): (B, H)."""
+        if len(self.known) > FEW_TARGETS:
+            self._know(target[~self.known[target]].unique())
+        return self.target_term[target]
+
+    @torch.no_grad()
+    def _know(self, targets: Tensor) -> None:
+        """Compute the target branch of targets (U,) int64."""
         net = self.network
-        if len(self.wanted) <= FEW_TARGETS:
-            return self.target_term[target]
-        goals, row = torch.unique(target, return_inverse=True)
-        return torch.addmm(net.fusion_bias, self.wanted[goals], net.fusion_weight[1].T)[row]
+        wanted = self.first_layer.wanted(targets).add_(net.siamese_bias).relu_()
+        self.wanted[targets] = wanted
+        self.target_term[targets] = torch.addmm(net.fusion_bias, wanted, net.fusion_weight[1].T)
+        self.known[targets] = True
 
     def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:
         """Rows (B, H) added up by target, (M, H)."""

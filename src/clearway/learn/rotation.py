@@ -1,0 +1,87 @@
+"""Which scenes are walked at which time: all of them, or in large sets some, in turn.
+
+With some at a time a batch holds many rows of few scenes: fewer distinct states and targets, each of which costs the
+same however many rows it has. Simulators that load one scene at a time train in the same way.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from clearway.envs.world import World
+from clearway.errors import RunError
+from clearway.learn.config import Learner
+
+ROTATION_SALT = 1_000_033
+
+
+class Rotation:
+    """Every cycle the scenes are dealt anew, at random, into sets of nearly the same size; each set has its updates.
+
+    A pure function of the number of updates, so that a resumed run goes on with the same scenes.
+
+    Args:
+        scene_count: C.
+        at_once: most scenes of a set; 0 for all.
+        updates_each: updates that a set lasts.
+        seed: of the order.
+    """
+
+    def __init__(self, scene_count: int, at_once: int, updates_each: int, seed: int) -> None:
+        self.scene_count, self.updates_each, self.seed = scene_count, updates_each, seed
+        self.sets = -(-scene_count // at_once) if at_once else 1
+
+    def begins(self, update: int) -> bool:
+        """Whether another set begins with the update, counted from 0."""
+        return self.sets > 1 and update % self.updates_each == 0
+
+    def scenes(self, update: int) -> Tensor:
+        """Scenes of that update, ascending, int64."""
+        cycle, number = divmod(update // self.updates_each, self.sets)
+        if self.sets == 1:
+            return torch.arange(self.scene_count)
+        generator = torch.Generator().manual_seed(self.seed * ROTATION_SALT + cycle)
+        order = torch.randperm(self.scene_count, generator=generator)
+        return order[number * self.scene_count // self.sets : (number + 1) * self.scene_count // self.sets].sort()[0]
+
+
+def divided_envs(world: World, learner: Learner, scenes: Tensor) -> tuple[int, ...]:
+    """Environments of each scene, (C,); 0 of all but `scenes`, which share them.
+
+    Raises:
+        RunError: too few for the number of scenes or minibatches.
+    """
+    states = torch.zeros(world.scene_count, dtype=torch.float64)
+    states[scenes] = torch.diff(world.scene_offset).cpu().double()[scenes]
+    share = states / states.sum() if learner.envs_by == "states" else (states > 0).double() / len(scenes)
+    upto = (share.cumsum(0) * learner.envs).round().long()
+    counts = torch.diff(upto, prepend=upto.new_zeros(1))
+    fewest = int(counts[scenes].min())
+    if fewest < 1:
+        raise RunError(f"{learner.envs} environments for {len(scenes)} scenes. {_remedy(learner)}")
+    if fewest * learner.rollout_steps < learner.minibatches:
+        raise RunError(
+            f"{learner.minibatches} minibatches of {fewest * learner.rollout_steps} rows of a scene. "
+            "Give fewer minibatches, or more environments"
+        )
+    return tuple(counts.tolist())
+
+
+def check_division(world: World, learner: Learner, rotation: Rotation) -> None:
+    """Check that environments suffice for every set that the rotation could deal: the smallest scene with the largest.
+
+    Raises:
+        RunError: they do not.
+    """
+    if rotation.sets == 1:
+        return
+    order = torch.diff(world.scene_offset).cpu().argsort(descending=True)
+    most = -(-world.scene_count // rotation.sets)
+    divided_envs(world, learner, torch.cat([order[: most - 1], order[-1:]]).sort()[0])
+
+
+def _remedy(learner: Learner) -> str:
+    if learner.scenes_at_once:
+        return "Give more environments (envs), or fewer scenes_at_once"
+    return "Give more environments (envs), or walk some scenes at a time (scenes_at_once)"
