@@ -6,12 +6,13 @@ import json
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from clearway.live.episodes import LiveProtocol, LiveTable
 from clearway.live.layout import Layout
 from clearway.live.report import LiveResult, summarise
 from clearway.live.settings import Perturbations
-from clearway.live.tables import agent_rows, compared_rows, markdown_tables
+from clearway.live.tables import agent_rows, compared_rows, markdown_tables, rich_tables
 
 PROTOCOL = LiveProtocol(2, 10, 0, "sampled", 4)
 
@@ -91,6 +92,16 @@ def test_tables_show_figures_with_intervals_and_say_what_success_means(result):
     text = markdown_tables([result], PROTOCOL, "tiny")
     assert "| none | wary | 100 (100–100) |" in text
     assert "wary less bold" in text and "within 25 cm and 45°" in text and "Encoder: tiny" in text
+
+
+def test_a_terminal_of_80_columns_shows_every_figure_whole(result):
+    console = Console(width=80, record=True)
+    for table in rich_tables([result], PROTOCOL, "tiny"):
+        console.print(table)
+    text = console.export_text()
+    assert "…" not in text and max(map(len, text.splitlines())) <= 80
+    for _, _, cells in (*agent_rows([result]), *compared_rows([result])):
+        assert all(word in text for value, ends in cells for word in (value, *ends.split(" to ")))
 
 
 def test_results_are_json(result):

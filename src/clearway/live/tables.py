@@ -11,6 +11,7 @@ from clearway.live.report import Figures, LiveResult
 
 if TYPE_CHECKING:
     from rich.table import Table
+    from rich.text import Text
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,8 @@ class _Column:
     metric: str
     digits: int
     scale: float = 1
+    short: str = ""
+    """Heading where there is little room; the heading itself by default."""
 
     def cell(self, figures: Figures) -> tuple[str, str]:
         """The figure and its interval."""
@@ -30,23 +33,23 @@ class _Column:
 
 
 COLUMNS = (
-    _Column("success %", "success", 0, 100),
+    _Column("success %", "success", 0, 100, "success\n%"),
     _Column("steps", "steps", 1),
     _Column("contacts", "contacts", 2),
-    _Column("least clearance cm", "min_clearance_m", 1, 100),
-    _Column("mean clearance cm", "mean_clearance_m", 1, 100),
-    _Column("time within 10 cm %", "share_within_10cm", 0, 100),
-    _Column("time within 30 cm %", "share_within_30cm", 0, 100),
+    _Column("least clearance cm", "min_clearance_m", 1, 100, "least\ncm"),
+    _Column("mean clearance cm", "mean_clearance_m", 1, 100, "mean\ncm"),
+    _Column("time within 10 cm %", "share_within_10cm", 0, 100, "≤10 cm\n%"),
+    _Column("time within 30 cm %", "share_within_30cm", 0, 100, "≤30 cm\n%"),
 )
 COMPARED = (
-    _Column("success, points", "success", 0, 100),
+    _Column("success, points", "success", 0, 100, "success"),
     _Column("contacts", "contacts", 2),
-    _Column("least clearance cm", "min_clearance_m", 1, 100),
-    _Column("mean clearance cm", "mean_clearance_m", 1, 100),
-    _Column("time within 10 cm, points", "share_within_10cm", 0, 100),
-    _Column("time within 30 cm, points", "share_within_30cm", 0, 100),
+    _Column("least clearance cm", "min_clearance_m", 1, 100, "least\ncm"),
+    _Column("mean clearance cm", "mean_clearance_m", 1, 100, "mean\ncm"),
+    _Column("time within 10 cm, points", "share_within_10cm", 0, 100, "≤10 cm"),
+    _Column("time within 30 cm, points", "share_within_30cm", 0, 100, "≤30 cm"),
 )
-LARGER = _Column("P(larger least clearance)", "probability_of_larger_clearance", 2)
+LARGER = _Column("P(larger least clearance)", "probability_of_larger_clearance", 2, 1, "P\n(larger)")
 
 Rows = list[tuple[str, str, list[tuple[str, str]]]]
 
@@ -102,26 +105,43 @@ def _pipes(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
+LABEL_WIDTH = 16
+TERMINAL_NOTE = (
+    "Least and mean: clearance. ≤10 cm, ≤30 cm: share of the time that near. P(larger): probability of the larger "
+    "least clearance."
+)
+
+
 def rich_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> list[Table]:
-    """Both tables for the terminal, intervals dim below the figures, notes as the last one's caption."""
-    tables = [_rich([column.heading for column in COLUMNS], agent_rows(results))]
+    """Both tables for a terminal of 80 columns, intervals dim below the figures, notes as the last one's caption."""
+    of_agents = _rich("", COLUMNS)
+    rows = agent_rows(results)
+    for number, (label, name, cells) in enumerate(rows):
+        if not number or rows[number - 1][0] != label:
+            of_agents.add_row(label, style="bold")
+        of_agents.add_row(f" {name}", *_with_intervals(cells))
+    tables = [of_agents]
     if compared := compared_rows(results):
-        tables.append(_rich([column.heading for column in (*COMPARED, LARGER)], compared))
-    tables[-1].caption = "\n".join(notes(protocol, encoder))
+        tables.append(_rich(f"\n{compared[0][1]}, shares in points", (*COMPARED, LARGER)))
+        for label, _, cells in compared:
+            tables[-1].add_row(label, *_with_intervals(cells))
+    tables[-1].caption = "\n" + "\n".join([TERMINAL_NOTE, *notes(protocol, encoder)])
     return tables
 
 
-def _rich(headings: Sequence[str], rows: Rows) -> Table:
-    from rich.box import SIMPLE_HEAD
+def _rich(title: str, columns: Sequence[_Column]) -> Table:
     from rich.table import Table
+
+    table = Table(
+        title=title, box=None, padding=(0, 1, 0, 0), pad_edge=False, title_justify="left", caption_justify="left"
+    )
+    table.add_column("", width=LABEL_WIDTH)
+    for column in columns:
+        table.add_column(column.short or column.heading, justify="right")
+    return table
+
+
+def _with_intervals(cells: Sequence[tuple[str, str]]) -> list[Text]:
     from rich.text import Text
 
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), caption_justify="left")
-    for heading in ("setting", "agent"):
-        table.add_column(heading)
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    for label, name, cells in rows:
-        texts = [Text(value).append(f"\n{ends}", style="dim") for value, ends in cells]
-        table.add_row(label, name, *texts)
-    return table
+    return [Text(value).append(f"\n{ends}", style="dim") for value, ends in cells]
