@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from clearway.errors import RunError
+from clearway.errors import ClearwayError, RunError
 
 LOCAL = "local"
 
@@ -48,3 +48,34 @@ def connected(address: str, cores: int | None = None) -> Iterator[Any]:
     finally:
         if not started_before:
             ray.shutdown()
+
+
+@contextmanager
+def kept_connected(address: str | None, cores: int | None = None) -> Iterator[None]:
+    """One connection for all that connects within; none where there is no address. Arguments as of `connected`."""
+    if address is None:
+        yield
+        return
+    with connected(address, cores):
+        yield
+
+
+def result(ray: Any, reference: object, died: Callable[[str], ClearwayError]) -> Any:
+    """What a task gave.
+
+    Args:
+        ray: as `connected` gives it.
+        reference: of the task.
+        died: makes the error for a reason, where the task's worker or node died.
+
+    Raises:
+        ClearwayError: the one that the task raised, or `died`'s.
+    """
+    try:
+        return ray.get(reference)
+    except ray.exceptions.RayTaskError as error:
+        if isinstance(error.cause, ClearwayError):
+            raise error.cause from None
+        raise
+    except ray.exceptions.RayError as error:
+        raise died(str(error).strip().splitlines()[0]) from error

@@ -40,7 +40,7 @@ def note(line):
     if line == {slow_when!r}:
         time.sleep({seconds})
 
-def build(name, seed, *, workers, progress):
+def build(name, seed, *, workers, ray, progress):
     note("built")
     scene = grid_scene(seed)
     return replace(scene, observations=SlowPictures(scene.observations))
@@ -61,7 +61,7 @@ class CountingBuilder:
     def __init__(self) -> None:
         self.built = 0
 
-    def __call__(self, name: str, seed: int, *, workers: int | None, progress: bool) -> Scene:
+    def __call__(self, name: str, seed: int, *, workers: int | None, ray: str | None, progress: bool) -> Scene:
         self.built += 1
         return grid_scene(seed)
 
@@ -172,7 +172,7 @@ def test_names_cannot_lead_out_of_the_cache(cache):
 def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     built = []
 
-    def build(plan, seed, *, workers, progress):
+    def build(plan, seed, *, workers, ray, progress):
         built.append((plan.name, seed))
         return replace(grid_scene(seed), name=plan.name)
 

@@ -12,6 +12,7 @@ from clearway.choices import RoomName
 from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, stderr_console
 from clearway.errors import ClearwayError
+from clearway.ray_cluster import kept_connected
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Build:
     """Processes that render, and then encode with one thread each; by default one a core renders, and one encodes with
     as many threads as there are cores."""
     ray: str | None = None
-    """Encode on a Ray cluster: local, auto or an address."""
+    """Render and encode on a Ray cluster: local, auto or an address."""
 
     def run(self) -> None:
         """Build and write."""
@@ -49,10 +50,12 @@ class Build:
         if self.room == "all" and self.out.suffix:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
         names = ROOM_NAMES if self.room == "all" else (self.room,)
-        scenes = [cached_room_scene(name, self.seed, workers=self.workers, progress=True) for name in names]
-        encoded = encode_scenes(
-            scenes, self.encoder, seed=self.encoder_seed, progress=True, workers=self.workers, ray=self.ray
-        )
+        workers, ray = self.workers, self.ray
+        with kept_connected(ray, workers):
+            scenes = [cached_room_scene(name, self.seed, workers=workers, ray=ray, progress=True) for name in names]
+            encoded = encode_scenes(
+                scenes, self.encoder, seed=self.encoder_seed, progress=True, workers=workers, ray=ray
+            )
         for scene in encoded:
             path = self.out if self.out.suffix else self.out / f"{scene.name}.h5"
             write_scene(scene, path)

@@ -24,7 +24,7 @@ _A3C_NEEDS: dict[str, object] = {
     "optimiser": "rmsprop",
 }
 
-ADDED_LATER: dict[str, object] = {"heads": "scene", "scenes_at_once": 0, "scene_updates": 10}
+ADDED_LATER: dict[str, object] = {"heads": "scene", "scenes_at_once": 0, "scene_updates": 2}
 """Settings that runs may have been made without, and what holds for those."""
 
 
@@ -46,7 +46,7 @@ class Learner:
     scenes_at_once: int = 0
     """Scenes that are walked at the same time, in turn with the others, see `rotation`; 0: all. With few, training on
     hundreds of scenes is as fast as on few, and needs no environment for every scene."""
-    scene_updates: int = 10
+    scene_updates: int = 2
     """Updates after which other scenes have their turn."""
     bootstrap_cut: bool = True
     """Add the value of the pose where an episode was cut; False treats the cut as an end, as Zhu's code does."""

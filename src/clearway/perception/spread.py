@@ -11,13 +11,12 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
-from clearway.errors import ClearwayError, EncoderError
+from clearway.errors import EncoderError
 from clearway.perception.encoder import Encoder
-from clearway.ray_cluster import connected
+from clearway.ray_cluster import connected, result
 from clearway.scenes.scene import EncoderRecord, Observations
 
 Loader = Callable[[EncoderRecord], Encoder]
@@ -84,26 +83,13 @@ def cluster(address: str, workers: int | None) -> Iterator[Encode]:
         def encode(load: Loader, record: EncoderRecord, pictures: Observations, batch: int) -> Iterator[np.ndarray]:
             kept = ray.put(record)
             for reference in [remote.remote(load, kept, *part) for part in batches(pictures, batch)]:
-                yield _result(ray, reference)
+                yield result(ray, reference, _died)
 
         yield encode
 
 
-def _result(ray: Any, reference: object) -> np.ndarray:
-    """What a task gave.
-
-    Raises:
-        ClearwayError: what it raised, or its worker died.
-    """
-    try:
-        return ray.get(reference)
-    except ray.exceptions.RayTaskError as error:
-        if isinstance(error.cause, ClearwayError):
-            raise error.cause from None
-        raise
-    except ray.exceptions.RayError as error:
-        reason = str(error).strip().splitlines()[0]
-        raise EncoderError(f"an encoding worker or its node died ({reason}). Run the command again") from error
+def _died(reason: str) -> EncoderError:
+    return EncoderError(f"an encoding worker or its node died ({reason}). Run the command again")
 
 
 def _leave_interrupts_to_parent() -> None:

@@ -16,13 +16,16 @@ from clearway.scenes.scene import Provenance, Scene
 from clearway.version import __version__
 
 
-def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progress: bool = False) -> Scene:
+def build_scene(
+    name: str, seed: int = 0, *, workers: int | None = None, ray: str | None = None, progress: bool = False
+) -> Scene:
     """One of our own rooms as a scene with pictures, held in memory, and without features.
 
     Args:
         name: of the room, one of `clearway.scenes.rooms.ROOM_NAMES`.
         seed: 0 is the default room; another gives other colours, pictures and small furniture.
         workers: number of renderer processes; None: one a core.
+        ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
 
     Raises:
@@ -34,7 +37,7 @@ def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progres
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.navigation import find_grid
     from clearway.scenes.rooms.obstacles import AgentShape
-    from clearway.scenes.rooms.render import render
+    from clearway.scenes.rooms.render_cluster import render_at
     from clearway.scenes.rooms.topview import render_top_view
 
     title, agent = scene_name(name, seed), AgentShape()
@@ -44,7 +47,7 @@ def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progres
         model = room.spec.compile()
     top_view = render_top_view(model, room.width_m, room.depth_m)
     view = first_person_view(grid.state_locations_m, grid.state_headings_deg)
-    pictures = render(model, view, workers=workers, progress=progress, label=f"rendering {title}")
+    pictures = render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {title}")
     return Scene(
         name=title,
         observations=pictures,
@@ -58,7 +61,9 @@ def build_scene(name: str, seed: int = 0, *, workers: int | None = None, progres
     )
 
 
-def build_floor_plan(plan: FloorPlan, seed: int = 0, *, workers: int | None = None, progress: bool = False) -> Scene:
+def build_floor_plan(
+    plan: FloorPlan, seed: int = 0, *, workers: int | None = None, ray: str | None = None, progress: bool = False
+) -> Scene:
     """A floor plan as a furnished room: its cells and edges exactly, with pictures, and without features.
 
     The pictures are held in memory, 1.4 MB a cell.
@@ -67,6 +72,7 @@ def build_floor_plan(plan: FloorPlan, seed: int = 0, *, workers: int | None = No
         plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
         seed: with the plan's name chooses furniture, colours and textures.
         workers: number of renderer processes; None: one a core.
+        ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
 
     Raises:
@@ -76,7 +82,7 @@ def build_floor_plan(plan: FloorPlan, seed: int = 0, *, workers: int | None = No
     check_mujoco()
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.plans.plan_room import build_plan_room
-    from clearway.scenes.rooms.render import render
+    from clearway.scenes.rooms.render_cluster import render_at
     from clearway.scenes.rooms.topview import render_top_view
 
     with _status(f"furnishing and lighting {plan.name}", progress):
@@ -86,7 +92,7 @@ def build_floor_plan(plan: FloorPlan, seed: int = 0, *, workers: int | None = No
     top_view = render_top_view(model, room.width_m, room.depth_m)
     x_m, z_m = layout.origin_m
     view = first_person_view(locations_m - np.array(layout.origin_m), headings_deg)
-    pictures = render(model, view, workers=workers, progress=progress, label=f"rendering {plan.name}")
+    pictures = render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {plan.name}")
     return Scene(
         name=plan.name,
         observations=pictures,

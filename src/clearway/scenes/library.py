@@ -24,7 +24,7 @@ KEY_LENGTH = 16
 class Builder(Protocol):
     """What makes a scene that is not in the cache: `build_scene`, or a stand-in."""
 
-    def __call__(self, name: str, seed: int, *, workers: int | None, progress: bool) -> Scene:
+    def __call__(self, name: str, seed: int, *, workers: int | None, ray: str | None, progress: bool) -> Scene:
         """The scene of a room."""
 
 
@@ -33,6 +33,7 @@ def cached_room_scene(
     seed: int = 0,
     *,
     workers: int | None = None,
+    ray: str | None = None,
     progress: bool = False,
     build: Builder = build_scene,
 ) -> Scene:
@@ -46,6 +47,7 @@ def cached_room_scene(
         name: of the room, one of `clearway.scenes.rooms.ROOM_NAMES`.
         seed: 0 is the default room.
         workers: number of renderer processes; None: one a core.
+        ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
         build: makes the scene.
 
@@ -53,18 +55,19 @@ def cached_room_scene(
         SceneError: there is no such room, or the agent fits nowhere in it.
         RenderError: MuJoCo cannot render on this machine.
     """
-    make = partial(build, name, seed, workers=workers, progress=progress)
+    make = partial(build, name, seed, workers=workers, ray=ray, progress=progress)
     return _cached(scene_path(name, seed), scene_name(name, seed), make)
 
 
-def cached_plan_scene(plan: FloorPlan, seed: int = 0, *, workers: int | None = None, progress: bool = False) -> Scene:
+def cached_plan_scene(
+    plan: FloorPlan, seed: int = 0, *, workers: int | None = None, ray: str | None = None, progress: bool = False
+) -> Scene:
     """A floor plan's furnished room from the user's cache, kept like those of `cached_room_scene`.
 
     Args and errors: those of `build_floor_plan`.
     """
-    return _cached(
-        plan_path(plan, seed), plan.name, partial(build_floor_plan, plan, seed, workers=workers, progress=progress)
-    )
+    make = partial(build_floor_plan, plan, seed, workers=workers, ray=ray, progress=progress)
+    return _cached(plan_path(plan, seed), plan.name, make)
 
 
 def scene_path(name: str, seed: int) -> Path:

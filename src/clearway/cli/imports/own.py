@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.cli.arguments import (
-    check_at_least,
-    check_seeds,
-)
+from clearway.cli.arguments import check_at_least, check_seeds
 from clearway.cli.imports.writing import Encoding, encode_and_write, write_scenes
+from clearway.ray_cluster import kept_connected
 
 if TYPE_CHECKING:
     from clearway.scenes.floor_plans import FloorPlan
@@ -63,8 +61,10 @@ class ImportFloorPlan:
         check_seeds(encoder_seed=self.encoding.encoder_seed)
         for plan in plans:  # all of them before anything that takes minutes
             check_can_be_rendered(plan, self.seed)
-        scenes = [cached_plan_scene(plan, self.seed, progress=True) for plan in plans]
-        encode_and_write(scenes, self.out, self.encoding)
+        workers, ray = self.encoding.workers, self.encoding.ray
+        with kept_connected(ray, workers):
+            scenes = [cached_plan_scene(plan, self.seed, workers=workers, ray=ray, progress=True) for plan in plans]
+            encode_and_write(scenes, self.out, self.encoding)
 
 
 @dataclass(frozen=True)

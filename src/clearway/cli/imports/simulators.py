@@ -4,20 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
-from clearway.cli.arguments import (
-    check_at_least,
-    check_finite,
-    check_positive,
-    check_seeds,
-)
+from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds
 from clearway.cli.imports.writing import Encoding, encode_and_write
-
-if TYPE_CHECKING:
-    pass
+from clearway.ray_cluster import kept_connected
 
 
 @dataclass(frozen=True)
@@ -101,16 +94,20 @@ class ImportMjcf:
         from clearway.scenes.importers.mjcf_floor import World
         from clearway.scenes.rooms.obstacles import AgentShape
 
-        scene = read_mjcf(
-            self.file,
-            World(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
-            AgentShape(self.agent_radius, self.agent_height, self.step),
-            name=self.name,
-            height_px=self.height,
-            width_px=self.width,
-            progress=True,
-        )
-        encode_and_write([scene], self.out, self.encoding)
+        workers, ray = self.encoding.workers, self.encoding.ray
+        with kept_connected(ray, workers):
+            scene = read_mjcf(
+                self.file,
+                World(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
+                AgentShape(self.agent_radius, self.agent_height, self.step),
+                name=self.name,
+                height_px=self.height,
+                width_px=self.width,
+                workers=workers,
+                ray=ray,
+                progress=True,
+            )
+            encode_and_write([scene], self.out, self.encoding)
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,10 @@ class Encoding:
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None
-    """Processes that encode, with one thread each; by default one, with as many threads as there are cores."""
+    """Processes that render, where pictures are rendered, and then encode with one thread each; by default one a core
+    renders, and one encodes with as many threads as there are cores."""
     ray: str | None = None
-    """Encode on a Ray cluster: local, auto or an address."""
+    """Render, where pictures are rendered, and encode on a Ray cluster: local, auto or an address."""
 
 
 def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding, files: Sequence[Path] = ()) -> None:

@@ -130,6 +130,21 @@ def studio(model: mujoco.MjModel, view: View, *, workers: int | None = None) -> 
                 worker.process.kill()  # the threads then find their pipes at an end
 
 
+def take_alone(head: bytes, pictures: np.ndarray, shots: Sequence[Shot]) -> None:
+    """Fill pictures (shots, height_px, width_px, 3) uint8 by one renderer process with one thread.
+
+    Args:
+        head: lens and room, see `job_head`.
+        pictures: what to fill.
+        shots: to be taken.
+
+    Raises:
+        RenderError: as of `render`.
+    """
+    with _started_workers(1, threads=1) as (worker,):
+        worker.do_job(head, pictures, shots, _nothing)
+
+
 def _nothing() -> None:
     """Called after each picture where nobody counts them."""
 
@@ -139,10 +154,10 @@ def _core_count() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _worker_environment(workers: int) -> dict[str, str]:
-    """The caller's environment; what it leaves open: EGL (no screen) on Linux, and no more threads than cores."""
+def _worker_environment(threads: int) -> dict[str, str]:
+    """The caller's environment; what it leaves open: EGL (no screen) on Linux, and so many threads a process."""
     environment = dict(os.environ)
-    environment.setdefault(MESA_THREADS_VARIABLE, str(max(1, _core_count() // workers)))
+    environment.setdefault(MESA_THREADS_VARIABLE, str(threads))
     if sys.platform == "linux":
         environment.setdefault(BACKEND_VARIABLE, "egl")
     return environment
@@ -235,13 +250,14 @@ class _Worker:
 
 
 @contextmanager
-def _started_workers(count: int) -> Iterator[list[_Worker]]:
-    """Renderer processes, ended and closed on the way out."""
+def _started_workers(count: int, threads: int | None = None) -> Iterator[list[_Worker]]:
+    """Renderer processes, ended and closed on the way out; by default no more threads than cores in all."""
+    threads = threads or max(1, _core_count() // max(count, 1))
     with ExitStack() as stack:
         workers: list[_Worker] = []
         for _ in range(count):
             messages = stack.enter_context(tempfile.TemporaryFile())
-            workers.append(_Worker.start(messages, _worker_environment(count)))
+            workers.append(_Worker.start(messages, _worker_environment(threads)))
             stack.callback(workers[-1].close)
         yield workers
 
