@@ -30,6 +30,7 @@ def test_the_paper_s_settings() -> None:
         "entropy_start": 0.01,
         "entropy_end": 0.01,
         "log_barrier": 0.0,
+        "settle": 0.0,
         "lookahead": 0.0,
         "sum_loss": True,
         "optimiser": "rmsprop",
@@ -67,6 +68,7 @@ def test_the_default_is_the_recipe() -> None:
         "entropy_start": 0.02,
         "entropy_end": 0.002,
         "log_barrier": 1e-3,
+        "settle": 0.15,
         "lookahead": 0.04,
         "lookahead_temperature": 0.005,
         "optimiser": "adam",
@@ -119,6 +121,11 @@ def test_as_a2c_makes_one_pass_and_changes_nothing_else() -> None:
         ("balance", -1.0),
         ("ratio_clip", -0.2),
         ("value_weight", -0.5),
+        ("settle", -0.1),
+        ("settle", 1.0),
+        ("settle", float("nan")),
+        ("scenes_at_once", -1),
+        ("scene_updates", 0),
     ],
 )
 def test_settings_out_of_range_are_refused_by_name(name: str, value: float) -> None:
@@ -134,6 +141,7 @@ def test_a2c_with_several_passes_is_refused() -> None:
 
 def test_a_setting_that_came_later_renames_no_older_run() -> None:
     assert DEFAULT.told_apart_by().keys() == asdict(DEFAULT).keys() - {"heads", "scenes_at_once", "scene_updates"}
+    assert PAPER_A2C.told_apart_by().keys() == DEFAULT.told_apart_by().keys() - {"settle"}
     changed = replace(DEFAULT, heads="shared", scenes_at_once=4, scene_updates=3)
     assert changed.told_apart_by() == asdict(changed)
     assert (DEFAULT.head_count(1000), replace(DEFAULT, heads="shared").head_count(1000)) == (1000, 1)

@@ -131,11 +131,10 @@ def test_schedules_run_from_start_to_end() -> None:
     assert trainer.finished
     assert [u.lr for u in updates] == pytest.approx([1e-2 - 9e-4 * k for k in range(10)])
     assert learner.barrier_weight_at(0) == learner.log_barrier
-    assert learner.barrier_weight_at(learner.frames // 2) == pytest.approx(learner.log_barrier / 2)
-    assert learner.barrier_weight_at(2 * learner.frames) == 0
-    ahead = replace(learner, lookahead=0.02)
-    weights = [ahead.lookahead_weight_at(frames) for frames in (0, ahead.frames // 2, 2 * ahead.frames)]
-    assert weights == pytest.approx([0.02, 0.01, 0])
+    ahead = replace(learner, lookahead=0.02, log_barrier=0.4, settle=0.2)
+    moments = [0, 320, 639, 640, 800, 1600]  # of 800 frames
+    assert [ahead.lookahead_weight_at(n) for n in moments] == pytest.approx([0.02, 0.01, 0.02 / 640, 0, 0, 0])
+    assert [ahead.barrier_weight_at(n) for n in moments] == pytest.approx([0.4, 0.2, 0.4 / 640, 0, 0, 0])
     assert [u.entropy_weight for u in updates] == pytest.approx([0.1 * 0.01 ** (k / 10) for k in range(10)])
     assert trainer.frames == 800
     assert trainer.updates == 10

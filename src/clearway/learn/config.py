@@ -24,7 +24,7 @@ _A3C_NEEDS: dict[str, object] = {
     "optimiser": "rmsprop",
 }
 
-ADDED_LATER: dict[str, object] = {"heads": "scene", "scenes_at_once": 0, "scene_updates": 2}
+ADDED_LATER: dict[str, object] = {"heads": "scene", "scenes_at_once": 0, "scene_updates": 2, "settle": 0.0}
 """Settings that runs may have been made without, and what holds for those."""
 
 
@@ -70,7 +70,7 @@ class Learner:
     """Learn also from passing other targets of the scene by, with truncated importance ratios."""
     lookahead: float = 0.04
     """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better, at the start;
-    falls linearly to 0. 0: none."""
+    falls linearly to 0, see `settle`. 0: none."""
     lookahead_temperature: float = 0.005
     """How much better counts: probabilities grow by exp(advantage / temperature) at most."""
     balance: float = 3.0
@@ -95,8 +95,10 @@ class Learner:
     entropy_end: float = 0.002
     """The entropy bonus falls geometrically from start to end."""
     log_barrier: float = 1e-3
-    """Weight of the mean log-probability of all actions at the start; falls linearly to 0. It keeps every action
-    possible, where the entropy bonus lets one become certain (Agarwal et al., JMLR 2021, section 5.2)."""
+    """Weight of the mean log-probability of all actions at the start; falls linearly to 0, see `settle`. It keeps
+    every action possible, where the entropy bonus lets one become certain (Agarwal et al., JMLR 2021, section 5.2)."""
+    settle: float = 0.15
+    """The last share of the frames, in which look-ahead and barrier are 0, so that idle actions die out."""
     sum_loss: bool = False
     """Sum the loss over a batch, as A3C does, rather than average it."""
 
@@ -146,6 +148,8 @@ class Learner:
         for name in (*not_negative, "feature_basis"):
             if not getattr(self, name) >= 0:
                 raise RunError(f"{name} is {getattr(self, name)}, expected at least 0. Give a larger {name}")
+        if not 0 <= self.settle < 1:
+            raise RunError(f"settle is {self.settle}, expected 0 to 1, 1 excluded. Give a value in that range")
         if self.algorithm == "a2c" and (self.epochs, self.minibatches) != (1, 1):
             raise RunError("a2c makes one pass over each rollout. Set epochs and minibatches to 1, or use ppo")
         if self.algorithm == "a3c":
@@ -179,11 +183,15 @@ class Learner:
 
     def barrier_weight_at(self, frames: int) -> float:
         """Weight of the log barrier after that many frames."""
-        return self.log_barrier * (1 - min(frames / self.frames, 1.0))
+        return self.log_barrier * self._left_at(frames)
 
     def lookahead_weight_at(self, frames: int) -> float:
         """Weight of look-ahead after that many frames."""
-        return self.lookahead * (1 - min(frames / self.frames, 1.0))
+        return self.lookahead * self._left_at(frames)
+
+    def _left_at(self, frames: int) -> float:
+        """What is left of the aids that fall to 0, from 1 to 0."""
+        return 1 - min(frames / ((1 - self.settle) * self.frames), 1.0)
 
     def as_a2c(self) -> Learner:
         """The same settings with one update a rollout."""
@@ -217,6 +225,7 @@ PAPER_A2C = Learner(
     entropy_start=0.01,
     entropy_end=0.01,
     log_barrier=0.0,
+    settle=0.0,
     sum_loss=True,
     optimiser="rmsprop",
     lr_start=7.0e-4,
