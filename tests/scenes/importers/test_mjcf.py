@@ -66,7 +66,7 @@ def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
 
 
 def test_more_than_fits_is_refused_before_any_picture_is_taken(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importer, "render", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(importer, "render_at", lambda *_, **__: pytest.fail("rendered"))
     monkeypatch.setattr(limits, "MAX_PICTURE_BYTES", 20 << 20)
     problem = r"\d+ pictures of 400 x 300 pixels take \d+ MiB of memory, expected at most 20\. .*--step"
     with pytest.raises(SceneError, match=problem):
