@@ -261,7 +261,7 @@ def main() -> None:
     parser.add_argument("--heads", nargs="+", default=["shared"], help="of the network: shared scene")
     parser.add_argument("--at-once", type=int, nargs="+", default=[0], help="rooms walked at the same time; 0: all")
     parser.add_argument("--basis", type=int, default=0, help="principal directions of the features; 0: features as is")
-    parser.add_argument("--envs", type=int, default=1600, help="environments, at least as many as rooms")
+    parser.add_argument("--envs", type=int, default=1600, help="environments, at least as many as rooms at once")
     parser.add_argument("--steps", type=int, default=20, help="of every environment between updates")
     parser.add_argument("--warm", type=int, default=2, help="updates before measuring")
     parser.add_argument("--repeats", type=int, default=5, help="updates measured")

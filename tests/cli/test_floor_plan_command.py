@@ -32,6 +32,14 @@ def test_a_plan_too_large_to_render_is_refused_before_any_is_rendered(clearway, 
     assert not (tmp_path / "scenes").exists()
 
 
+@pytest.mark.parametrize("words", [("--workers", 0), ("--workers", 0, "--ray", "local"), ("--encoder-seed", -1)])
+def test_flags_of_encoding_are_refused_before_anything_is_rendered(clearway, plans, tmp_path, monkeypatch, words):
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    answer = clearway("scenes", "import", "floor-plan", plans, *words, "--out", tmp_path / "scenes")
+    assert answer.refusal(f"{words[0]} is {words[1]}")
+    assert not (tmp_path / "scenes").exists() and not (tmp_path / "cache" / "scenes").exists()
+
+
 def test_every_plan_becomes_a_scene_that_can_be_trained(clearway, plans, tmp_path, small):
     answer = clearway("scenes", "import", "floor-plan", plans, "--out", tmp_path / "scenes", "--features", 24)
     assert answer.code == 0, answer

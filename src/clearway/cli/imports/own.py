@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.cli.arguments import check_at_least, check_seeds
+from clearway.cli.arguments import check_at_least
 from clearway.cli.imports.writing import Encoding, encode_and_write, write_scenes
 from clearway.ray_cluster import kept_connected
 
@@ -58,7 +58,7 @@ class ImportFloorPlan:
         from clearway.scenes.library import cached_plan_scene
         from clearway.scenes.rooms.plans.limits import check_can_be_rendered
 
-        check_seeds(encoder_seed=self.encoding.encoder_seed)
+        self.encoding.check()
         for plan in plans:  # all of them before anything that takes minutes
             check_can_be_rendered(plan, self.seed)
         workers, ray = self.encoding.workers, self.encoding.ray

@@ -38,7 +38,7 @@ class ImportAi2Thor:
 
         check_at_least(1, width=self.width, height=self.height)
         check_positive(step=self.step)
-        check_seeds(encoder_seed=self.encoding.encoder_seed)  # before anything that takes minutes
+        self.encoding.check()  # before anything that takes minutes
         scenes = []
         for name in self.rooms:
             with started(name, self.step, self.width, self.height) as controller:
@@ -88,7 +88,7 @@ class ImportMjcf:
 
         check_positive(step=self.step, agent_radius=self.agent_radius, agent_height=self.agent_height)
         check_finite(floor_height=self.floor_height, camera_height=self.camera_height)
-        check_seeds(encoder_seed=self.encoding.encoder_seed)
+        self.encoding.check()
         check_mujoco()
         from clearway.scenes.importers.mjcf import read_mjcf
         from clearway.scenes.importers.mjcf_floor import World
@@ -137,7 +137,8 @@ class ImportMiniWorld:
         from clearway.scenes.importers.miniworld import photographed, started
 
         check_positive(step=self.step)
-        check_seeds(seed=self.seed, encoder_seed=self.encoding.encoder_seed)
+        check_seeds(seed=self.seed)
+        self.encoding.check()
         scenes = []
         for environment in self.environments:
             name = scene_name(environment.rpartition(":")[2], self.seed)

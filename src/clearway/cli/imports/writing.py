@@ -29,13 +29,17 @@ class Encoding:
     ray: str | None = None
     """Render, where pictures are rendered, and encode on a Ray cluster: local, auto or an address."""
 
+    def check(self) -> None:
+        """Check the flags. Raises ClearwayError."""
+        check_seeds(encoder_seed=self.encoder_seed)
+        check_at_least(1, workers=self.workers)
+
 
 def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding, files: Sequence[Path] = ()) -> None:
     """Give scenes features, all by one encoder, and write them into a folder; arguments as of `write_scenes`."""
     from clearway.perception import encode_scenes
 
-    check_seeds(encoder_seed=encoding.encoder_seed)
-    check_at_least(1, workers=encoding.workers)
+    encoding.check()
     _paths(scenes, out, files)  # before the minutes that encoding takes
     encoded = encode_scenes(
         scenes,
