@@ -9,17 +9,18 @@ hits all alike. Worlds are made up on the spot: four random floor plans with as 
 
 What is counted. A multiplication with its addition is 2 FLOP; only matrix products that the algorithm needs count, so
 the share of the peak falls with every row looked up, action drawn and parameter stepped. With S states, F features,
-K history, H width, M targets, O = 5 outputs, one update of `rows` rows needs
+K history, H width, M targets, O = 5 outputs, one update of `histories` histories in `rows` rows needs
 
     tables      2 S F K H + 2 M H H                   project all states; targets through their half of fusion
-    forward     rows (2 H H + 2 H H + 2 H O)          observation half of fusion, scene layer, outputs
+    forward     histories 2 H H + rows (2 H H + 2 H O)    observation half of fusion; scene layer, outputs
     backward    2 x forward + 2 S F K H + 4 M H H     dX and dW of those; dW of the siamese layer; targets
 
 A2C: tables once, forward for the rollout's rows and the values after its last step, backward once (the rollout's
 activations are used again). PPO: the same forward, then forward and backward for every minibatch, with the rows that
-hindsight adds; states are projected, and dW of the siamese layer is computed, as often as `siamese_step` says: once a
-pass (the first finds the tables ready) or once a minibatch. Look-ahead's forward pass, a row for each next pose and
-target that occur, is timed but not counted.
+hindsight adds, of which only distinct ones are counted, as only they are computed; states are projected, and dW of the
+siamese layer is computed, as often as `siamese_step` says: once a pass (the first finds the tables ready) or once a
+minibatch. Look-ahead's forward pass, a row for each next pose and target that occur, is timed but not counted. The
+agents are untrained, and walk at random; trained ones repeat themselves, so their rows cost half of that.
 
 The share of the peak. The machine's speed may change from minute to minute, so each timing of a case stands between two
 of a matrix product, of the size that was fastest at the start, and is divided by the faster of them; the share is the
@@ -39,7 +40,7 @@ import platform
 import re
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
@@ -54,7 +55,7 @@ from clearway.learn.config import DEFAULT, Learner
 from clearway.learn.losses import Batch, LossSettings, actor_critic_loss
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
-from clearway.learn.trainer import Trainer
+from clearway.learn.trainer import Trainer, Update
 from clearway.model.feature_map import FeatureMap
 from clearway.model.network import OUTPUTS
 from clearway.reward import COLLISION_AWARE
@@ -256,34 +257,38 @@ class Case:
         return statistics.median(rates), rates[0], rates[-1]
 
 
-def needed_gflop(world: World, learner: Learner, hindsight_rows: float) -> float:
-    """GFLOP of one update, by the formulas above."""
-    width, history, targets = learner.width, learner.history_length, world.target_count
-    projection = 2 * world.state_count * FEATURES * history * width
+def needed_gflop(world: World, learner: Learner, updates: Sequence[Update]) -> float:
+    """GFLOP of one update, by the formulas above; mean over some updates."""
+    width, targets = learner.width, world.target_count
+    projection = 2 * world.state_count * FEATURES * learner.history_length * width
     tables = projection + 2 * targets * width * width
-    forward_row = 4 * width * width + 2 * width * OUTPUTS
+    of_history, of_row = 2 * width * width, 2 * width * width + 2 * width * OUTPUTS
     rows = learner.envs * learner.rollout_steps
-    gathered = tables + (rows + learner.envs) * forward_row
+    gathered = tables + (rows + learner.envs) * (of_history + of_row)
     extra_targets = 4 * targets * width * width
     if learner.algorithm == "a2c":
-        return (gathered + rows * 2 * forward_row + projection + extra_targets) / 1e9
+        return (gathered + rows * 2 * (of_history + of_row) + projection + extra_targets) / 1e9
     passes, parts = learner.epochs, learner.epochs * learner.minibatches
-    siamese_steps = parts // learner.siamese_minibatches
-    learnt = passes * (rows + hindsight_rows) * 3 * forward_row + parts * extra_targets + siamese_steps * projection
+    siamese_steps = passes if learner.siamese_step == "pass" else parts
     renewed = (siamese_steps - 1) * projection + (parts - 1) * (tables - projection)
-    return (gathered + hindsight_rows * forward_row + renewed + learnt) / 1e9
+    told = statistics.fmean(update.hindsight_rows for update in updates)
+    learnt = statistics.fmean(
+        (rows + u.hindsight_rows) * (u.distinct_histories * of_history + u.distinct_pairs * of_row) for u in updates
+    )
+    stepped = 3 * passes * learnt + parts * extra_targets + siamese_steps * projection
+    return (gathered + told * (of_history + of_row) + renewed + stepped) / 1e9
 
 
 def fast_case(world: World, learner: Learner) -> Case:
     """The learner of the package."""
     trainer = Trainer(world, learner, COLLISION_AWARE, seed=0)
-    added: list[int] = []
+    updates: list[Update] = []
 
     def update() -> None:
-        added.append(trainer.update().hindsight_rows)
+        updates.append(trainer.update())
 
     def gflop() -> float:
-        return needed_gflop(world, learner, statistics.fmean(added))
+        return needed_gflop(world, learner, updates)
 
     return Case(learner.algorithm, learner.envs, learner.rollout_steps, update, gflop)
 

@@ -12,7 +12,7 @@ from clearway.errors import RunError
 from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
 from clearway.learn.losses import Batch, merged
 from clearway.learn.rollout import Rollout
-from clearway.learn.trainer import Trainer
+from clearway.learn.trainer import Step, Trainer
 from clearway.model import lookup
 from clearway.model.first_layer import AllStates, VisitedStates
 from clearway.model.network import SiameseActorCritic
@@ -140,23 +140,6 @@ def test_schedules_run_from_start_to_end() -> None:
     assert trainer.updates == 10
 
 
-def test_a_pass_deals_every_row_out_once() -> None:
-    trainer = small_trainer(small_learner(epochs=3, minibatches=4))
-    rows = torch.arange(21)
-    batch = Batch(rows[:, None], rows, rows, rows, rows, rows, (15, 6))
-    parts = list(trainer._minibatches(batch))
-    assert len(parts) == 12
-    epochs = [torch.cat([part.action for part in parts[4 * e : 4 * e + 4]]) for e in range(3)]
-    assert all(sorted(epoch.tolist()) == rows.tolist() for epoch in epochs)
-    assert not torch.equal(epochs[0], epochs[1])
-    for part in parts:
-        first, second = part.rows_per_scene
-        assert (part.action[:first] < 15).all()
-        assert (part.action[first:] >= 15).all()
-        assert 3 <= first <= 4
-        assert 1 <= second <= 2
-
-
 def test_merged_keeps_the_order_of_scenes() -> None:
     def batch(first: int, rows_per_scene: tuple[int, ...]) -> Batch:
         rows = torch.arange(first, first + sum(rows_per_scene))
@@ -166,6 +149,33 @@ def test_merged_keeps_the_order_of_scenes() -> None:
     assert joined.action.tolist() == [0, 1, 100, 101, 102, 2, 3, 4]
     assert joined.history[:, 0].tolist() == joined.target.tolist() == joined.action.tolist()
     assert joined.rows_per_scene == (3, 2, 3)
+
+
+def test_the_first_layer_moves_once_a_pass_or_with_every_minibatch(monkeypatch: pytest.MonkeyPatch) -> None:
+    def moves(**settings: object) -> list[bool]:
+        trainer = small_trainer(small_learner(epochs=2, minibatches=3, **settings))
+        found = []
+
+        def after_step(self: Trainer, *arguments: object) -> Step:
+            before = trainer.network.siamese_weight.clone()
+            step = whole_step(self, *arguments)
+            found.append(not torch.equal(trainer.network.siamese_weight, before))
+            return step
+
+        monkeypatch.setattr(Trainer, "_step", after_step)
+        trainer.update()
+        return found
+
+    whole_step = Trainer._step
+    assert moves(siamese_step="pass") == [False, False, True, False, False, True]
+    assert moves(siamese_step="minibatch") == [True] * 6
+
+
+def test_what_repeats_is_counted_once() -> None:
+    update = small_trainer(small_learner(epochs=2, minibatches=2)).update()
+    assert 0 < update.distinct_histories < update.distinct_pairs < 1
+    whole = small_trainer(small_learner(PAPER_A2C)).update()
+    assert whole.distinct_histories == whole.distinct_pairs == 1
 
 
 def test_hindsight_adds_rows_only_when_asked() -> None:

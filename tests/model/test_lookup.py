@@ -101,6 +101,24 @@ def test_in_float64_they_agree_to_rounding(rows_per_scene: tuple[int, ...], any_
     assert largest_difference_from_autograd(rows_per_scene, any_target) < 1e-13
 
 
+@pytest.mark.usefixtures("float64")
+def test_rows_that_share_a_history_are_as_they_are_by_themselves() -> None:
+    network, lookup = made_network()
+    history, _, _ = made_rows((3, 0, 4), False)
+    history_of = torch.tensor([0, 0, 1, 2, 2, 2, 3, 4, 4, 5, 6, 6])
+    target, rows_per_scene = torch.tensor([0, 1, 1, 0, 1, 1, 3, 3, 4, 3, 3, 4]), (6, 0, 6)
+    grad_output = torch.randn(len(target), 5, generator=torch.Generator().manual_seed(5))
+    found = []
+    for seen, shared in ((history, history_of), (history[history_of], None)):
+        kept = lookup.forward(seen, target, rows_per_scene, history_of=shared)
+        lookup.backward(seen, target, rows_per_scene, kept, grad_output, shared)
+        lookup.siamese_gradient()
+        found.append([kept.output.clone(), *(parameter.grad.clone() for parameter in network.parameters())])
+    for shared, alone in zip(*found, strict=True):
+        torch.testing.assert_close(shared, alone, rtol=1e-12, atol=1e-13)
+    assert found[0][1].abs().max() > 0.1
+
+
 def test_forward_follows_the_parameters_after_refresh() -> None:
     network, lookup = made_network()
     history, target, scene = made_rows((5, 5, 5), False)

@@ -168,11 +168,6 @@ class Learner:
         """Heads of a network for so many scenes."""
         return scenes if self.heads == "scene" else 1
 
-    @property
-    def siamese_minibatches(self) -> int:
-        """Minibatches between two steps of the first layer's weight."""
-        return self.minibatches if self.siamese_step == "pass" else 1
-
     def lr_at(self, frames: int) -> float:
         """Learning rate after that many frames."""
         return self.lr_start + (self.lr_end - self.lr_start) * min(frames / self.frames, 1.0)

@@ -6,7 +6,7 @@ Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -20,6 +20,7 @@ from clearway.learn.config import Learner
 from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.lookahead import Observed, better_policy
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient, merged
+from clearway.learn.minibatches import Minibatch, dealt_epochs
 from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
@@ -44,6 +45,8 @@ class Update:
         gradient_norm: before clipping.
         explained_variance: 1 - Var(R - V) / Var(R) of the rollout.
         hindsight_rows: rows that hindsight added.
+        distinct_pairs, distinct_histories: pairs of a history and a target, and histories, that the network computed
+            for a row learnt from, see `minibatches`.
         lr, entropy_weight: as used.
     """
 
@@ -55,8 +58,21 @@ class Update:
     gradient_norm: float
     explained_variance: float
     hindsight_rows: int
+    distinct_pairs: float
+    distinct_histories: float
     lr: float
     entropy_weight: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """What came of a minibatch: its loss, the gradient's norm before clipping, and how much it was."""
+
+    loss: LossTerms
+    norm: Tensor
+    rows: int
+    pairs: int
+    histories: int
 
 
 class Trainer:
@@ -135,19 +151,21 @@ class Trainer:
         if learner.hindsight:
             batch = self._with_hindsight(rollout, batch)
         kept = self.collector.kept if self.one_pass and len(batch) == rows else None
-        terms, norms = self._learn(batch, kept, lr, settings)
+        steps = self._learn(batch, kept, lr, settings)
         self.frames += self.frames_per_update
         self.updates += 1
         self._rebalance()
         result = Update(
-            loss=_mean([loss.total for loss in terms]),
-            policy_loss=_mean([loss.policy for loss in terms]),
-            value_loss=_mean([loss.value for loss in terms]),
-            entropy=_mean([loss.entropy for loss in terms]),
-            clipped=_mean([loss.clipped for loss in terms]),
-            gradient_norm=_mean(norms),
+            loss=_mean([step.loss.total for step in steps]),
+            policy_loss=_mean([step.loss.policy for step in steps]),
+            value_loss=_mean([step.loss.value for step in steps]),
+            entropy=_mean([step.loss.entropy for step in steps]),
+            clipped=_mean([step.loss.clipped for step in steps]),
+            gradient_norm=_mean([step.norm for step in steps]),
             explained_variance=explained,
             hindsight_rows=len(batch) - rows,
+            distinct_pairs=sum(step.pairs for step in steps) / sum(step.rows for step in steps),
+            distinct_histories=sum(step.histories for step in steps) / sum(step.rows for step in steps),
             lr=lr,
             entropy_weight=settings.entropy_weight,
         )
@@ -248,47 +266,45 @@ class Trainer:
         )
         return batch if told is None else merged(batch, told)
 
-    def _learn(
-        self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings
-    ) -> tuple[list[LossTerms], list[Tensor]]:
+    def _learn(self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings) -> list[Step]:
         """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
-        learner = self.learner
-        together = learner.siamese_minibatches
-        terms, norms = [], []
-        for number, part in enumerate(self._minibatches(batch)):
-            if number:
-                self.lookup.refresh(siamese_weight=number % together == 0, few_rows=False)
-            rows = part.history, part.target, part.rows_per_scene
-            activations = kept or self.lookup.forward(*rows)
-            loss, gradient = loss_gradient(activations.output, part, settings)
-            self.lookup.backward(*rows, activations, gradient)
-            siamese_moves = (number + 1) % together == 0
-            if siamese_moves:
-                self.lookup.siamese_gradient()
-            gradients = self.network.layer_gradients()[0 if siamese_moves else 1 :]
-            norms.append(clip_gradients(gradients, learner.clip_norm, learner.clip_each_tensor))
-            self.optimiser.step(lr)
-            if siamese_moves:
-                self.siamese_optimiser.step(lr * learner.siamese_lr)
-            terms.append(loss)
-        return terms, norms
+        learner, world = self.learner, self.world
+        generator = torch.Generator(world.device).manual_seed(self.seed * SHUFFLE_SALT + self.updates)
+        epochs = dealt_epochs(
+            batch,
+            world.state_count,
+            world.target_count,
+            epochs=learner.epochs,
+            parts=learner.minibatches,
+            generator=generator,
+        )
+        steps: list[Step] = []
+        siamese_moved = False
+        for minibatches in epochs:
+            for number, part in enumerate(minibatches, start=1):
+                if steps:
+                    self.lookup.refresh(siamese_weight=siamese_moved, few_rows=False)
+                siamese_moved = learner.siamese_step == "minibatch" or number == len(minibatches)
+                steps.append(self._step(part, kept, lr, settings, siamese_moved))
+        return steps
 
-    def _minibatches(self, batch: Batch) -> Iterator[Batch]:
-        """Every epoch's minibatches: each scene's rows shuffled and dealt out evenly."""
-        if self.one_pass:
-            yield batch
-            return
-        device, parts = self.world.device, self.learner.minibatches
-        generator = torch.Generator(device).manual_seed(self.seed * SHUFFLE_SALT + self.updates)
-        for _ in range(self.learner.epochs):
-            first, orders = 0, []
-            for count in batch.rows_per_scene:
-                orders.append(first + torch.randperm(count, generator=generator, device=device))
-                first += count
-            for part in range(parts):
-                cuts = [(rows * part // parts, rows * (part + 1) // parts) for rows in batch.rows_per_scene]
-                dealt = torch.cat([order[a:b] for order, (a, b) in zip(orders, cuts, strict=True)])
-                yield batch.rows(dealt, tuple(b - a for a, b in cuts))
+    def _step(
+        self, part: Minibatch, kept: Activations | None, lr: float, settings: LossSettings, siamese_moves: bool
+    ) -> Step:
+        """One step of the optimisers, of the first layer's weight where it moves."""
+        learner = self.learner
+        known = part.history, part.target, part.pairs_per_scene
+        activations = kept or self.lookup.forward(*known, history_of=part.history_of)
+        loss, gradient = loss_gradient(part.by_row(activations.output), part.rows, settings)
+        self.lookup.backward(*known, activations, part.by_pair(gradient), part.history_of)
+        if siamese_moves:
+            self.lookup.siamese_gradient()
+        gradients = self.network.layer_gradients()[0 if siamese_moves else 1 :]
+        norm = clip_gradients(gradients, learner.clip_norm, learner.clip_each_tensor)
+        self.optimiser.step(lr)
+        if siamese_moves:
+            self.siamese_optimiser.step(lr * learner.siamese_lr)
+        return Step(loss, norm, len(part.rows), len(part.target), len(part.history))
 
     def _rebalance(self) -> None:
         """Draw targets more often that are reached less often."""

@@ -15,6 +15,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import embedding_bag
 
+from clearway.model.sums import sum_listed
+
 MOST_ROWS = 131_072  # projected states kept while nothing is being learnt from them: 1 GiB at the published size
 
 
@@ -81,7 +83,7 @@ class AllStates:
         bag = self._table_row(history).flatten()
         count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
         sample = torch.argsort(bag) // self.history_length
-        by_state = embedding_bag(sample, grad_seen, count.cumsum(0) - count, mode="sum")  # (S * K, H)
+        by_state = sum_listed(grad_seen, sample, count)  # (S * K, H)
         columns = by_state.view(len(self.features), -1)
         self.by_state = columns if begin else self.by_state.add_(columns)
         self.by_state.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
@@ -150,7 +152,7 @@ class VisitedStates:
         bag = self._table_row(history).flatten()
         order = torch.argsort(bag)
         occupied, count = torch.unique_consecutive(bag[order], return_counts=True)
-        sums = embedding_bag(order // self.history_length, grad_seen, count.cumsum(0) - count, mode="sum")
+        sums = sum_listed(grad_seen, order // self.history_length, count)
         before = 0 if begin else len(self.by_state)
         if before < self.known:
             grown = torch.zeros(self.known, self.projected.shape[1], dtype=grad_seen.dtype, device=bag.device)

@@ -4,6 +4,7 @@ Features are frozen and states finite, so the first layer needs no picture twice
 
     W_k f(s)             one matrix product of the states' features an update, then K rows are summed per sample;
     target branch        one row a target (M of them, or those that occur), not one a sample;
+    observation branch   one row a history (U of them), where samples share them;
     dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once; several
                          batches may be added up before that, as long as W_k stays what it is.
 
@@ -11,7 +12,7 @@ The first layer is computed of all states, or in large worlds of those that occu
 
 Nothing is approximated. Gradients are written by hand into `.grad`; the tests hold them against autograd on `network`.
 
-Axis letters: B rows, K history, S states, F features, H width, M targets, C scenes, A actions.
+Axis letters: B rows, U histories, K history, S states, F features, H width, M targets, C scenes, A actions.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-from torch.nn.functional import embedding_bag
 
 from clearway.envs.feature_store import FEW_STATES
 from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
+from clearway.model.sums import sum_ascending, sum_listed
 from clearway.scenes.actions import ACTION_COUNT
 
 FEW_TARGETS = 1_024  # up to so many, the target branch is computed of all, beyond of those that occur
@@ -41,7 +42,7 @@ class Activations:
     """What the forward pass leaves for the backward pass; rows are ordered by scene.
 
     Attributes:
-        seen: (B, H) observation branch after ReLU.
+        seen: (U, H) observation branch after ReLU; B = U where rows share no history.
         fused: (B, H).
         special: (B, H) the scene layer.
         output: (B, A + 1) action scores and value.
@@ -63,9 +64,10 @@ class Activations:
         return self.output[:, ACTION_COUNT]
 
     @classmethod
-    def empty(cls, rows: int, width: int, device: torch.device) -> Activations:
-        """Memory for `rows` rows."""
-        seen, fused, special = (torch.empty(rows, width, device=device) for _ in range(3))
+    def empty(cls, rows: int, width: int, device: torch.device, histories: int | None = None) -> Activations:
+        """Memory for `rows` rows, of as many histories by default."""
+        seen = torch.empty(rows if histories is None else histories, width, device=device)
+        fused, special = (torch.empty(rows, width, device=device) for _ in range(2))
         return cls(seen, fused, special, torch.empty(rows, OUTPUTS, device=device))
 
     def rows(self, first: int, last: int) -> Activations:
@@ -127,20 +129,30 @@ class LookupNetwork:
 
     @torch.no_grad()
     def forward(
-        self, history: Tensor, target: Tensor, rows_per_scene: Sequence[int], out: Activations | None = None
+        self,
+        history: Tensor,
+        target: Tensor,
+        rows_per_scene: Sequence[int],
+        out: Activations | None = None,
+        history_of: Tensor | None = None,
     ) -> Activations:
         """Policy and value of B rows, with all that the backward pass needs.
 
         Args:
-            history: (B, K) int64 states, newest last.
+            history: (U, K) int64 states, newest last.
             target: (B,) int64 index of the target.
             rows_per_scene: number of rows of each scene, in order; rows are ordered by scene.
             out: where to write; new memory by default.
+            history_of: (B,) int64, ascending, the history of each row; None: every row has its own, U = B.
         """
         net = self.network
-        out = out or Activations.empty(len(history), self.width, history.device)
+        out = out or Activations.empty(len(target), self.width, history.device, len(history))
         torch.add(self.first_layer.seen(history), net.siamese_bias, out=out.seen).relu_()
-        torch.addmm(self._target_terms(target), out.seen, self.fusion_in, out=out.fused).relu_()
+        if history_of is None:
+            torch.addmm(self._target_terms(target), out.seen, self.fusion_in, out=out.fused).relu_()
+        else:
+            observed = out.seen @ self.fusion_in
+            torch.add(observed[history_of], self._target_terms(target), out=out.fused).relu_()
         self._forward_scenes(rows_per_scene, out)
         return out
 
@@ -175,23 +187,25 @@ class LookupNetwork:
         rows_per_scene: Sequence[int],
         kept: Activations,
         grad_output: Tensor,
+        history_of: Tensor | None = None,
     ) -> None:
         """Set `.grad` from the loss's gradient with respect to the output, (B, A + 1).
 
-        Of siamese_weight what is needed is added up, for `siamese_gradient`.
+        Of siamese_weight what is needed is added up, for `siamese_gradient`. Arguments as in `forward`.
         """
         net = self.network
-        grad_fused, grad_seen = self._work(2, len(history))
-        self._backward_scenes(rows_per_scene, kept, grad_output, grad_seen, grad_fused)
+        grad_fused, spare = self._work(2, len(target))
+        self._backward_scenes(rows_per_scene, kept, grad_output, spare, grad_fused)
         _relu_backward_(grad_fused, kept.fused)
         torch.sum(grad_fused, 0, out=grad_of(net.fusion_bias))
-        torch.mm(grad_fused.T, kept.seen, out=grad_of(net.fusion_weight)[0])
+        grad_observed = grad_fused if history_of is None else sum_ascending(grad_fused, history_of, len(history))
+        torch.mm(grad_observed.T, kept.seen, out=grad_of(net.fusion_weight)[0])
         goals = self.all_targets if len(self.known) <= FEW_TARGETS else target.unique()
         wanted, grad_term = self.wanted[goals], self._sum_by_target(target, grad_fused)[goals]  # (M, H) or fewer
         torch.mm(grad_term.T, wanted, out=grad_of(net.fusion_weight)[1])
         grad_wanted = torch.zeros_like(self.wanted)
         grad_wanted[goals] = _relu_backward_(grad_term @ net.fusion_weight[1], wanted)
-        torch.mm(grad_fused, net.fusion_weight[0], out=grad_seen)
+        grad_seen = torch.mm(grad_observed, net.fusion_weight[0], out=spare[: len(history)])
         _relu_backward_(grad_seen, kept.seen)
         torch.sum(grad_seen, 0, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
         self.first_layer.add(history, grad_seen, grad_wanted, begin=not self.batches)
@@ -256,5 +270,4 @@ class LookupNetwork:
 
     def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:
         """Rows (B, H) added up by target, (M, H)."""
-        count = torch.bincount(target, minlength=len(self.target_state))
-        return embedding_bag(torch.argsort(target), rows, count.cumsum(0) - count, mode="sum")
+        return sum_listed(rows, torch.argsort(target), torch.bincount(target, minlength=len(self.target_state)))

@@ -138,6 +138,8 @@ class WorkerGroup:
             gradient_norm=norm,
             explained_variance=explained,
             hindsight_rows=0,
+            distinct_pairs=1.0,
+            distinct_histories=1.0,
             lr=rates[0],
             entropy_weight=settings.entropy_weight,
         )
