@@ -111,12 +111,12 @@ def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Secti
 
 def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
-    assert len(claims) == 2 + 4 * 4  # tables 1 to 3 and figure 4, two learners, two claims; one more learner in table 1
+    assert len(claims) == 2 + 5 * 4  # tables 1 to 3, figures 4 and 5, two learners, two claims; one more in table 1
     assert all(claim.text.startswith(("published: ", "published, unclipped: ", "default: ")) for claim in claims)
 
 
 def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
-    for name, places in (("fig5", 4), ("fig6", 1)):
+    for name, places in (("fig5", 5), ("fig6", 1)):
         (table,) = sections[name].tables
         assert column(table, "agent" if name == "fig5" else "learner").count("random walk") == places
         assert all(0 <= value <= 1 for value in column(table, "sc"))
@@ -124,6 +124,16 @@ def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dic
             strict <= loose
             for strict, loose in zip(column(table, "sc within 4 x shortest"), column(table, "sc"), strict=True)
         )
+
+
+def test_figure_5_averages_over_the_distances(sections: dict[str, Section]) -> None:
+    (table,) = sections["fig5"].tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    for kind in {(row["learner"], row["agent"]) for row in rows}:
+        own = [row for row in rows if (row["learner"], row["agent"]) == kind]
+        assert [row["steps away"] for row in own] == [1, 2, 4, 8, "average"]
+        for metric in ("sc", "sc within 4 x shortest", "SPL"):
+            assert own[-1][metric] == pytest.approx(sum(row[metric] for row in own[:-1]) / 4)
 
 
 def test_accumulated_steps_end_at_the_mean_over_targets_of_the_sums(setting: Setting) -> None:

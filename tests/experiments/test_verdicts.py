@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from clearway.experiments.verdicts import judged_less, judged_no_more
+from clearway.experiments.verdicts import judged_less, judged_more, judged_no_more
 
 SCENE = np.array([0, 0])
 
@@ -38,3 +38,14 @@ def test_no_more(first: np.ndarray, verdict: str) -> None:
     claim = judged_no_more("no more", "steps", first, scores(10, 10, 10), SCENE)
     assert claim.verdict == verdict
     assert "3 and 3 seeds" in claim.evidence
+
+
+def test_more_is_fewer_the_other_way_round() -> None:
+    low, high = scores(1, 1.1, 0.9), scores(2, 2.1, 1.9)
+    claim = judged_more("more", "sc", high, low, SCENE)
+    assert claim.verdict == "holds"
+    assert "probability that a run has more: 1 [1, 1]" in claim.evidence
+    assert "difference 1 [" in claim.evidence
+    assert judged_more("more", "sc", low, high, SCENE).verdict == "does not hold"
+    assert judged_more("more", "sc", scores(1, 3, 2), scores(2, 1, 3), SCENE).verdict == "undecided"
+    assert judged_more("more", "sc", scores(1), scores(2), SCENE).verdict == "undecided"

@@ -29,6 +29,10 @@ class Estimate:
         low, high = self.interval
         return f"{self.value:.3g} [{low:.3g}, {high:.3g}]"
 
+    def __neg__(self) -> Estimate:
+        """Of the figure with the other sign."""
+        return Estimate(-self.value, None if self.interval is None else (-self.interval[1], -self.interval[0]))
+
     @property
     def ends(self) -> str | None:
         """The interval alone, to three significant digits."""

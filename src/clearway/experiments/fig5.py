@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from clearway.experiments import generalisation
-from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.generalisation import HEADINGS, NOTE, Tried, line, together
+from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC
 from clearway.experiments.plan import Job, TargetSets
-from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
+from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_more
+from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.scene import Scene
 
 DISTANCES = (1, 2, 4, 8)
+AVERAGE = "average"
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -23,26 +28,29 @@ def jobs(setting: Setting) -> list[Job]:
 def section(setting: Setting) -> Section:
     """What came of it."""
     rows: list[tuple[Value, ...]] = []
-    points: dict[str, list] = {}
+    kinds: dict[tuple[str | None, str], list[Tried]] = {}
     missing: dict[str, None] = {}
     for steps in DISTANCES:
         groups = _groups(setting, steps)
         world = setting.world(groups[0].trial.targets)
-        walked = random_walk(world, groups[0].trial)
-        found = [(f"{g.learner}, {g.agent}", g, g.scores(setting.out, world.target_count)) for g in groups]
-        for label, group, values in found:
-            rows.append((steps, group.learner, group.agent, len(values), *generalisation.cells(values, world)))
-            points.setdefault(label, []).append((steps, values, world))
-        rows.append((steps, None, RANDOM_WALK, None, *generalisation.cells(walked, world)))
-        points.setdefault(RANDOM_WALK, []).append((steps, walked, world))
+        target_scene = world.target_scene.numpy()
+        found: dict[tuple[str | None, str], Scores] = {
+            (group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups
+        }
+        found[None, RANDOM_WALK] = random_walk(world, groups[0].trial)
+        for kind, values in found.items():
+            tried = Tried(values, target_scene)
+            kinds.setdefault(kind, []).append(tried)
+            rows.append(_row(steps, kind, tried))
         missing.update(dict.fromkeys(all_missing(groups, setting.out)))
-    lines = [generalisation.line(label, own) for label, own in points.items()]
-    headings = ("steps away", "learner", "agent", "seeds", *generalisation.HEADINGS)
+    averages = {kind: together(parts) for kind, parts in kinds.items()}
+    rows += [_row(AVERAGE, kind, tried) for kind, tried in averages.items()]
+    lines = [
+        line(", ".join(filter(None, kind)), list(zip(DISTANCES, parts, strict=True))) for kind, parts in kinds.items()
+    ]
+    headings = ("steps away", "learner", "agent", "seeds", *HEADINGS)
     of_paper = ", ".join(f"{name} {100 * value:.1f} %" for name, value in FIGURE_5_AVERAGE_SC.items())
-    notes = (
-        generalisation.NOTE,
-        f"The paper's averages over all four distances, other scenes and features: {of_paper}.",
-    )
+    notes = (NOTE, f"The paper's averages over all four distances, other scenes and features: {of_paper}.")
     return Section(
         name="fig5",
         title="Unseen targets near the trained ones (the paper's figure 5)",
@@ -51,8 +59,26 @@ def section(setting: Setting) -> Section:
         figures=(
             ReportFigure("fig5", "Unseen targets", "steps from the trained target", "success score", _known(lines)),
         ),
+        claims=tuple(_claims(setting, averages)),
         missing=tuple(missing),
     )
+
+
+def _row(steps: Value, kind: tuple[str | None, str], tried: Tried) -> tuple[Value, ...]:
+    learner, agent = kind
+    return (steps, learner, agent, None if learner is None else len(tried.scores), *tried.cells())
+
+
+def _claims(setting: Setting, averages: Mapping[tuple[str | None, str], Tried]) -> list[Claim]:
+    """The collision-aware agent reaches more of the unseen targets."""
+    found = []
+    for learner in setting.learners:
+        ours, baseline = (averages[learner, reward.name] for reward in (COLLISION_AWARE, SHORTEST))
+        for metric, what in (("sc", "sc"), ("spl", "SPL")):
+            text = f"{learner}: generalises better (higher {what} on unseen targets)"
+            scores = ours.scores.of(metric), baseline.scores.of(metric)
+            found.append(judged_more(text, what, *scores, ours.target_scene))
+    return found
 
 
 def _known(lines: list[Series | None]) -> tuple[Series, ...]:

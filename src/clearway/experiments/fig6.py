@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clearway.experiments import generalisation
+from clearway.experiments.generalisation import HEADINGS, NOTE, Tried, line
 from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, compared, random_walk
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Value
@@ -24,20 +24,22 @@ def section(setting: Setting) -> Section:
     """What came of it."""
     held_out = held_out_targets(setting)
     world = setting.world(held_out)
-    walked = random_walk(world, setting.trial(held_out))
+    target_scene = world.target_scene.numpy()
+    walked = Tried(random_walk(world, setting.trial(held_out)), target_scene)
     rows: list[tuple[Value, ...]] = []
-    points: dict[str, list] = {RANDOM_WALK: []}
+    points: dict[str, list[tuple[float, Tried]]] = {RANDOM_WALK: []}
     missing: dict[str, None] = {}
     for count in TRAINED:
         for group in _groups(setting, count):
             values = group.scores(setting.out, world.target_count)
-            rows.append((count, group.learner, len(values), *generalisation.cells(values, world)))
-            points.setdefault(group.learner, []).append((count, values, world))
+            tried = Tried(values, target_scene)
+            rows.append((count, group.learner, len(values), *tried.cells()))
+            points.setdefault(group.learner, []).append((count, tried))
             missing.update(dict.fromkeys(group.missing(setting.out)))
-        points[RANDOM_WALK].append((count, walked, world))
-    rows.append((None, RANDOM_WALK, None, *generalisation.cells(walked, world)))
-    lines = [generalisation.line(label, own) for label, own in points.items()]
-    headings = ("targets a scene", "learner", "seeds", *generalisation.HEADINGS)
+        points[RANDOM_WALK].append((count, walked))
+    rows.append((None, RANDOM_WALK, None, *walked.cells()))
+    lines = [line(label, own) for label, own in points.items()]
+    headings = ("targets a scene", "learner", "seeds", *HEADINGS)
     return Section(
         name="fig6",
         title="Held-out targets against the number of trained ones (the paper's figure 6)",
@@ -45,14 +47,14 @@ def section(setting: Setting) -> Section:
             "Collision-aware agents trained on growing sets of targets, which never contain the 5 held-out ones of a "
             "scene; every set contains the smaller ones."
         ),
-        tables=(ReportTable("fig6", "Held-out targets", headings, tuple(rows), (generalisation.NOTE,)),),
+        tables=(ReportTable("fig6", "Held-out targets", headings, tuple(rows), (NOTE,)),),
         figures=(
             ReportFigure(
                 "fig6",
                 "Held-out targets",
                 "training targets a scene",
                 "success score",
-                tuple(line for line in lines if line is not None),
+                tuple(each for each in lines if each is not None),
             ),
         ),
         missing=tuple(missing),

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from clearway.envs.world import World
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
 from clearway.evaluate.across_seeds import mean_estimate
 from clearway.experiments.groups import Scores
 from clearway.experiments.section import Series, Value
@@ -15,20 +19,36 @@ NOTE = (
 )
 
 
-def cells(values: Scores, world: World) -> tuple[Value, ...]:
-    """The figures of some agents under `HEADINGS`."""
-    if not len(values):
-        return (None,) * len(HEADINGS)
-    estimates = [mean_estimate(values.of(metric), world.target_scene.numpy()) for metric in METRICS]
-    first, *rest = estimates
-    return (first.value, first.ends, *(estimate.value for estimate in rest))
+@dataclass(frozen=True)
+class Tried:
+    """Figures of some agents on targets that they were not trained on; `target_scene`: (M,) int."""
+
+    scores: Scores
+    target_scene: np.ndarray
+
+    def cells(self) -> tuple[Value, ...]:
+        """The figures under `HEADINGS`."""
+        if not len(self.scores):
+            return (None,) * len(HEADINGS)
+        estimates = [mean_estimate(self.scores.of(metric), self.target_scene) for metric in METRICS]
+        first, *rest = estimates
+        return (first.value, first.ends, *(estimate.value for estimate in rest))
 
 
-def line(label: str, points: list[tuple[float, Scores, World]]) -> Series | None:
+def together(parts: Sequence[Tried]) -> Tried:
+    """Several sets of targets as one, each counting alike, of the seeds that all of them have."""
+    seeds = tuple(seed for seed in parts[0].scores.seeds if all(seed in part.scores.seeds for part in parts))
+    values = [part.scores.values[[part.scores.seeds.index(seed) for seed in seeds]] for part in parts]
+    scenes = 1 + max(int(part.target_scene.max()) for part in parts)
+    return Tried(
+        Scores(seeds, np.concatenate(values, axis=1)),
+        np.concatenate([number * scenes + part.target_scene for number, part in enumerate(parts)]),
+    )
+
+
+def line(label: str, points: Sequence[tuple[float, Tried]]) -> Series | None:
     """The success score over something, with intervals where there are several seeds; None without any runs."""
-    known = [
-        (x, mean_estimate(values.of("sc"), world.target_scene.numpy())) for x, values, world in points if len(values)
-    ]
+    known = [(x, mean_estimate(own.scores.of("sc"), own.target_scene)) for x, own in points if len(own.scores)]
     if not known:
         return None
     ends = [found.interval for _, found in known]

@@ -27,6 +27,15 @@ def judged_less(text: str, what: str, first: np.ndarray, second: np.ndarray, tar
     return Claim(text, _side(found, 0.0), _evidence(what, first, second, target_scene, found))
 
 
+def judged_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
+    """The claim that the first kind of agent has more of something than the second; as in `judged_less`."""
+    if not len(first) or not len(second):
+        return Claim(text, "undecided", "No complete runs.")
+    found = difference(first, second, target_scene)
+    evidence = _evidence(what, first, second, target_scene, found, more=True)
+    return Claim(text, _side(-found, 0.0), evidence)
+
+
 def judged_no_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
     """The claim that the first kind has no more of something: at most 2 % more than the second."""
     if not len(first) or not len(second):
@@ -45,10 +54,18 @@ def _side(found: Estimate, allowed: float) -> Verdict:
     return "holds" if high <= allowed else "does not hold" if low > allowed else "undecided"
 
 
-def _evidence(what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, found: Estimate) -> str:
+def _evidence(
+    what: str,
+    first: np.ndarray,
+    second: np.ndarray,
+    target_scene: np.ndarray,
+    found: Estimate,
+    more: bool = False,
+) -> str:
     means = [mean_estimate(scores, target_scene) for scores in (first, second)]
-    less = probability_of_less(first, second, target_scene)
+    pair = (second, first) if more else (first, second)
+    word, likely = "more" if more else "fewer", probability_of_less(*pair, target_scene)
     return (
-        f"{what}: {means[0]} against {means[1]}, difference {found}; probability that a run has fewer: {less}; "
+        f"{what}: {means[0]} against {means[1]}, difference {found}; probability that a run has {word}: {likely}; "
         f"{len(first)} and {len(second)} seeds."
     )
