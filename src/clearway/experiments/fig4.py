@@ -15,7 +15,8 @@ from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
-METRICS = ("steps", "collisions")
+METRICS = {"steps": 1.0, "collisions": 0.1}
+"""What is shown, and where its curves' axis turns logarithmic, so that the end of training can be seen too."""
 CURVE_POINTS = 50
 
 
@@ -85,13 +86,15 @@ def _curves(setting: Setting, groups: Sequence[Group]) -> list[ReportFigure]:
     figures = []
     for learner in setting.learners:
         own = [group for group in groups if group.learner == learner and not group.trial.halfway]
-        for metric in METRICS:
+        for metric, linear_below in METRICS.items():
             for axis in ("frames", "seconds"):
                 series = tuple(line for group in own if (line := _curve(setting, group, axis, metric)) is not None)
                 if series:
                     name = f"fig4_{learner}_{metric}_{axis}"
                     title = f"{learner}: {metric} of training episodes"
-                    figures.append(ReportFigure(name, title, f"training {axis}", f"{metric} an episode", series))
+                    figures.append(
+                        ReportFigure(name, title, f"training {axis}", f"{metric} an episode", series, linear_below)
+                    )
     return figures
 
 

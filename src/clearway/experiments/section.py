@@ -50,13 +50,14 @@ class Series:
 
 @dataclass(frozen=True)
 class ReportFigure:
-    """A figure: its series share the axes."""
+    """A figure: its series share the axes; beyond `linear_below` the vertical one is logarithmic, None: nowhere."""
 
     name: str
     title: str
     x_label: str
     y_label: str
     series: tuple[Series, ...]
+    linear_below: float | None = None
 
 
 @dataclass(frozen=True)

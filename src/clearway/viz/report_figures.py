@@ -27,6 +27,8 @@ def draw_report_map(shown: ReportMap, scenes: Sequence[Scene], path: Path) -> No
 
 def draw_report_figure(figure: ReportFigure, path: Path) -> None:
     """Draw a figure and save it as PNG. Series differ in colour, in lightness, and in dashes or markers."""
+    from matplotlib.ticker import EngFormatter
+
     with new_figure(WIDTH_IN, HEIGHT_IN, path) as canvas:
         canvas.suptitle(figure.title, x=0.01, ha="left", fontsize=12, fontweight="bold")
         axes = canvas.add_subplot()
@@ -45,6 +47,12 @@ def draw_report_figure(figure: ReportFigure, path: Path) -> None:
             )  # fmt: skip
             if series.low is not None and series.high is not None:
                 axes.fill_between(series.x, series.low, series.high, color=style.colour, alpha=0.15, linewidth=0)
+        if figure.linear_below is not None:
+            axes.set_yscale("symlog", linthresh=figure.linear_below)
+            axes.yaxis.set_major_formatter("{x:g}")
+            lowest = min(value for series in figure.series for value in (series.low or series.y))
+            axes.set_ylim(bottom=lowest / 2 if lowest > figure.linear_below else 0)
+        axes.xaxis.set_major_formatter(EngFormatter(sep=""))
         axes.set_xlabel(figure.x_label)
         axes.set_ylabel(figure.y_label)
         axes.grid(visible=True)
