@@ -7,13 +7,13 @@ import os
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from clearway.children import signals_held
 from clearway.errors import ClearwayError, RunError
 from clearway.experiments.job import do
 from clearway.experiments.plan import Job
@@ -81,23 +81,10 @@ def _started(out: Path, job: Job, threads: int) -> _Running:
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(out, job, threads, sender), name=job.run.name)
-    with _interrupts_held():
+    with signals_held(signal.SIGINT):  # Ctrl+C; terminate() is heard
         process.start()
     sender.close()
     return _Running(job, process, receiver)
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl+C back in a process that is started meanwhile, for good: this one hears it and ends the other."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(out: Path, job: Job, threads: int, complaint: Connection) -> None:

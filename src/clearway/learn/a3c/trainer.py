@@ -9,15 +9,15 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import fields, replace
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 
 import torch
 from torch import Tensor
 
+from clearway.children import signals_held
 from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.a3c.group import WorkerGroup
@@ -173,7 +173,7 @@ class AsyncTrainer:
         self.shared["frames"][-1] = self.frames
         context = get_context("spawn")
         parts = torch.tensor_split(_by_target(self.learner.envs, self.world.target_count), self.process_count)
-        with _signals_held():
+        with signals_held(signal.SIGINT, signal.SIGTERM):
             for number, workers in enumerate(parts):
                 ours, theirs = context.Pipe()
                 assignment = Assignment(
@@ -238,14 +238,3 @@ def _mean(figures: list[Update]) -> Update:
     return Update(
         **{field.name: sum(getattr(f, field.name) for f in figures) / len(figures) for field in fields(Update)}
     )
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Ctrl+C and SIGTERM wait, and processes started meanwhile never get them: their parent ends them."""
-    resource_tracker.ensure_running()  # starting it would let the signals through
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
