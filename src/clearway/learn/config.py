@@ -33,7 +33,7 @@ class Learner:
     """Everything that shapes learning apart from scenes, targets, reward and seed."""
 
     # How much experience, and how it is gathered
-    frames: int = 2_400_000
+    frames: int = 2_800_000
     """Training frames over all environments; schedules end here."""
     envs: int = 400
     """Environments side by side. Of a3c: workers, divided evenly among the targets."""
