@@ -21,28 +21,35 @@ def judged_less(text: str, what: str, first: np.ndarray, second: np.ndarray, tar
         first, second: (R, M) scores.
         target_scene: (M,) int.
     """
-    if not len(first) or not len(second):
-        return Claim(text, "undecided", "No complete runs.")
-    found = difference(first, second, target_scene)
-    return Claim(text, _side(found, 0.0), _evidence(what, first, second, target_scene, found))
+    return _judged(text, what, first, second, target_scene)
 
 
 def judged_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
     """The claim that the first kind of agent has more of something than the second; as in `judged_less`."""
-    if not len(first) or not len(second):
-        return Claim(text, "undecided", "No complete runs.")
-    found = difference(first, second, target_scene)
-    evidence = _evidence(what, first, second, target_scene, found, more=True)
-    return Claim(text, _side(-found, 0.0), evidence)
+    return _judged(text, what, first, second, target_scene, more=True)
 
 
 def judged_no_more(text: str, what: str, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray) -> Claim:
     """The claim that the first kind has no more of something: at most 2 % more than the second."""
+    allowed = SAME * mean_estimate(second, target_scene).value if len(second) else 0.0
+    return _judged(text, what, first, second, target_scene, allowed=allowed)
+
+
+def _judged(
+    text: str,
+    what: str,
+    first: np.ndarray,
+    second: np.ndarray,
+    target_scene: np.ndarray,
+    *,
+    more: bool = False,
+    allowed: float = 0.0,
+) -> Claim:
     if not len(first) or not len(second):
         return Claim(text, "undecided", "No complete runs.")
     found = difference(first, second, target_scene)
-    allowed = SAME * mean_estimate(second, target_scene).value
-    return Claim(text, _side(found, allowed), _evidence(what, first, second, target_scene, found))
+    evidence = _evidence(what, first, second, target_scene, found, more)
+    return Claim(text, _side(-found if more else found, allowed), evidence)
 
 
 def _side(found: Estimate, allowed: float) -> Verdict:
@@ -60,7 +67,7 @@ def _evidence(
     second: np.ndarray,
     target_scene: np.ndarray,
     found: Estimate,
-    more: bool = False,
+    more: bool,
 ) -> str:
     means = [mean_estimate(scores, target_scene) for scores in (first, second)]
     pair = (second, first) if more else (first, second)
