@@ -1,8 +1,9 @@
 """Minibatches in which everything that the network sees twice is computed once.
 
 Trained agents come by the same way again and again, and many targets are walked to from the same poses: at the end of
-the demo a minibatch holds 0.25 histories a row, and 0.43 pairs of a history and a target. Outputs depend on nothing else. So rows of one history are dealt into the same minibatch, each pair is
-computed once, and its rows' gradients are added up before they go back through the network. Nothing is approximated.
+the demo a minibatch holds 0.25 histories a row, and 0.43 pairs of a history and a target. Outputs depend on nothing
+else. So rows of one history are dealt into the same minibatch, each pair is computed once, and its rows' gradients are
+added up before they go back through the network. Nothing is approximated.
 
 Axis letters: B rows, P pairs that differ, U histories that differ, K history, A actions.
 """
