@@ -8,11 +8,13 @@
 Both sides have the same scenes, prepared features, targets, reward and step limit, the paper's network (a head a scene,
 the same sizes; SB3's is held against ours at the start), and all cores.
 
-Frames/s. Ours is the package's A2C, 400 environments x 20 steps, full network, exact gradients. SB3's A2C has its own
-settings; because its speed hangs on how many environments of which kind walk how many steps, several are tried first
-and the fastest is measured. "dummy" and "subproc" are SB3's own ways to run many of our single Gymnasium environments
-(one process, and a process each); "batched" hands it our vector environment, which spares it the loop over
-environments, so that little but the network is left. Repeats alternate; figures are medians (smallest - largest).
+Frames/s. Ours is the package's A2C, 400 and 1600 environments x 20 steps, full network, exact gradients, in float32 as
+SB3's and with factors of matrix products in bfloat16 as by default (float32 again on machines without such
+instructions). SB3's A2C has its own settings; because its speed hangs on how many environments of which kind walk how
+many steps, several are tried first and the fastest is measured. "dummy" and "subproc" are SB3's own ways to run many
+of our single Gymnasium environments (one process, and a process each); "batched" hands it our vector environment,
+which spares it the loop over environments, so that little but the network is left. Repeats alternate; figures are
+medians (smallest - largest).
 
 Seconds until every target is solved, on the first scene: our DEFAULT, SB3's PPO with its own default settings (and
 `--ppo-envs` environments), and SB3's PPO with the values of our recipe as far as it has them (400 environments x 20
@@ -46,15 +48,16 @@ SHOWN_VERSIONS = ("python", "clearway", "torch", "stable-baselines3", "gymnasium
 
 
 def speed_table(speeds: Sequence[Speed], trials: Sequence[Trial]) -> str:
-    """Frames/s in Markdown; ours is the first."""
-    ours = speeds[0]
-    lines = ["| | environments x steps | frames/s | ours is |", "|---|---|---|---|"]
+    """Frames/s in Markdown; the last two are SB3's, the others ours."""
+    peers = speeds[-2:]
+    heads = ["", "environments x steps", "frames/s", *(f"x {peer.name}" for peer in peers)]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for speed in speeds:
         rate = f"{speed.median:,.0f} ({speed.smallest:,.0f} - {speed.largest:,.0f})"
-        ratio = "" if speed is ours else f"{ours.median / speed.median:.1f} times as fast"
-        lines.append(f"| {speed.name} | {speed.envs} x {speed.steps} | {rate} | {ratio} |")
+        ratios = [f"{speed.median / peer.median:.1f}" for peer in peers]
+        lines.append(f"| {' | '.join([speed.name, f'{speed.envs} x {speed.steps}', rate, *ratios])} |")
     tried = "; ".join(f"{t.kind} {t.envs} x {t.steps}: {t.frames_per_s:,.0f}" for t in trials)
-    return "\n".join([*lines, "", f"Medians of {ours.repeats} (smallest - largest). SB3, tried first: {tried}."])
+    return "\n".join([*lines, "", f"Medians of {speeds[0].repeats} (smallest - largest). SB3, tried first: {tried}."])
 
 
 def quality_table(outcomes: Sequence[Outcome], scene: str) -> str:

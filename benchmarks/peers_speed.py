@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from typing import get_args
 
 from sb3 import SiamesePolicy, network_settings, policy_of, vec_env
 from scene_sets import ON_PREPARED, world_of
@@ -14,11 +15,18 @@ from stable_baselines3 import A2C
 from throughput import ENDLESS
 
 from clearway.envs.world import World
+from clearway.learn.config import Learner
 from clearway.learn.trainer import Trainer
+from clearway.model.precision import MatmulPrecision
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
 
-OURS = replace(ON_PREPARED.as_a2c(), frames=ENDLESS, hindsight=False, feature_basis=0)
+A2C_LIKE = replace(ON_PREPARED.as_a2c(), frames=ENDLESS, hindsight=False, lookahead=0.0, feature_basis=0)
+OURS = tuple(
+    replace(A2C_LIKE, envs=envs, matmul_precision=precision)
+    for envs in (400, 1600)
+    for precision in get_args(MatmulPrecision)
+)
 OWN_KINDS = (("dummy", 16, 5), ("dummy", 100, 5), ("dummy", 100, 20), ("subproc", 8, 5), ("subproc", 16, 20))
 BATCHED = (("batched", 16, 5), ("batched", 100, 20), ("batched", 400, 20), ("batched", 800, 20))
 
@@ -48,10 +56,11 @@ class Runner:
         return updates * self.envs * self.steps / (time.perf_counter() - started)
 
 
-def our_runner(world: World) -> Runner:
+def our_runner(world: World, learner: Learner) -> Runner:
     """The package's A2C."""
-    trainer = Trainer(world, OURS, COLLISION_AWARE, seed=0)
-    return Runner("clearway A2C", OURS.envs, OURS.rollout_steps, trainer.update, trainer.close)
+    trainer = Trainer(world, learner, COLLISION_AWARE, seed=0)
+    name = f"clearway A2C, {str(trainer.lookup.dtype).removeprefix('torch.')}"
+    return Runner(name, learner.envs, learner.rollout_steps, trainer.update, trainer.close)
 
 
 def sb3_runner(world: World, scenes: Sequence[Scene], kind: str, envs: int, steps: int) -> Runner:
@@ -92,7 +101,7 @@ class Trial:
 def measure_speed(
     scenes: Sequence[Scene], seconds: float, repeats: int, progress: Callable[[str], None]
 ) -> tuple[list[Speed], list[Trial]]:
-    """Ours, then the fastest of SB3's own kinds and of the batched one; and what was tried to find them."""
+    """Ours, then SB3's fastest of its own kinds and of the batched one; and what was tried to find them."""
     world, trials = world_of(scenes), []
     best = []
     for sizes in (OWN_KINDS, BATCHED):
@@ -104,7 +113,8 @@ def measure_speed(
                 found.append(Trial(kind, envs, steps, runner.rate(seconds / 2)))
         trials += found
         best.append(max(found, key=lambda trial: trial.frames_per_s))
-    runners = [our_runner(world), *(sb3_runner(world, scenes, t.kind, t.envs, t.steps) for t in best)]
+    runners = [our_runner(world, learner) for learner in OURS]
+    runners += [sb3_runner(world, scenes, trial.kind, trial.envs, trial.steps) for trial in best]
     for runner in runners:
         runner.update()
     rates: list[list[float]] = [[] for _ in runners]

@@ -22,9 +22,12 @@ siamese layer is computed, as often as `siamese_step` says: once a pass (the fir
 minibatch. Look-ahead's forward pass, a row for each next pose and target that occur, is timed but not counted. The
 agents are untrained, and walk at random; trained ones repeat themselves, so their rows cost half of that.
 
+Precision. Cases are computed in float32 but for those named bfloat16, whose `matmul_precision` is medium; they are left
+out where the device has no instructions for it.
+
 The share of the peak. The machine's speed may change from minute to minute, so each timing of a case stands between two
-of a matrix product, of the size that was fastest at the start, and is divided by the faster of them; the share is the
-median of these.
+of a matrix product of factors of its own dtype, of the size that was fastest at the start, and is divided by the faster
+of them; the share is the median of these.
 
 The naive version is the same network in `nn.Linear` layers with autograd: every row's four feature vectors are copied
 side by side (8192 numbers), and the target's branch is computed for every row, as published code does. Its update
@@ -58,6 +61,7 @@ from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.trainer import Trainer, Update
 from clearway.model.feature_map import FeatureMap
 from clearway.model.network import OUTPUTS
+from clearway.model.precision import factor_dtype
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
@@ -67,8 +71,9 @@ STATES = (180, 408, 468, 676)
 FEATURES = 2048
 ROW_CHUNK = 4000  # rows of a naive update held at a time
 ENDLESS = 10**9  # frames of the schedules; none ends during a benchmark
-A2C = replace(DEFAULT.as_a2c(), frames=ENDLESS, hindsight=False, lookahead=0.0, bootstrap_cut=False)
-PPO = replace(DEFAULT, frames=ENDLESS)
+PPO = replace(DEFAULT, frames=ENDLESS, matmul_precision="highest")
+A2C = replace(PPO.as_a2c(), hindsight=False, lookahead=0.0, bootstrap_cut=False)
+Peaks = dict[torch.dtype, dict[int, float]]
 
 
 # ---------------------------------------------------------------------------------------------------------- worlds
@@ -239,6 +244,7 @@ class Case:
         name, envs, steps: of the case.
         update: does one update.
         gflop: what the algorithm needs for an update so far as known, see the file's docstring; None for the naive one.
+        factors: dtype of the factors of its matrix products.
         seconds: of every update measured.
         shares: of the matrix-product peak at that time, likewise.
     """
@@ -248,6 +254,7 @@ class Case:
     steps: int
     update: Callable[[], object]
     gflop: Callable[[], float] | None = None
+    factors: torch.dtype = torch.float32
     seconds: list[float] = field(default_factory=list)
     shares: list[float] = field(default_factory=list)
 
@@ -290,7 +297,9 @@ def fast_case(world: World, learner: Learner) -> Case:
     def gflop() -> float:
         return needed_gflop(world, learner, updates)
 
-    return Case(learner.algorithm, learner.envs, learner.rollout_steps, update, gflop)
+    dtype = trainer.lookup.dtype
+    name = learner.algorithm if dtype == torch.float32 else f"{learner.algorithm} bfloat16"
+    return Case(name, learner.envs, learner.rollout_steps, update, gflop, dtype)
 
 
 def naive_case(world: World, learner: Learner) -> Case:
@@ -312,12 +321,14 @@ def wait(device: str) -> None:
         torch.cuda.synchronize()
 
 
-def matrix_peak(device: str, sizes: tuple[int, ...], repeats: int) -> dict[int, float]:
-    """Best GFLOP/s of a square float32 matrix product, by size."""
+def matrix_peak(
+    device: str, sizes: tuple[int, ...], repeats: int, dtype: torch.dtype = torch.float32
+) -> dict[int, float]:
+    """Best GFLOP/s of a product of square matrices, by size."""
     best = {}
     for size in sizes:
-        left, right = torch.rand(2, size, size, device=device)
-        out = torch.empty(size, size, device=device)
+        left, right = torch.rand(2, size, size, device=device).to(dtype)
+        out = torch.empty_like(left)
 
         def product(a: Tensor = left, b: Tensor = right, c: Tensor = out) -> None:
             torch.mm(a, b, out=c)
@@ -329,34 +340,37 @@ def matrix_peak(device: str, sizes: tuple[int, ...], repeats: int) -> dict[int, 
 
 def measure(case: Case, device: str, size: int, peak_repeats: int) -> None:
     """Time one update of a case between two measurements of the peak."""
-    before = matrix_peak(device, (size,), peak_repeats)[size]
+    before = matrix_peak(device, (size,), peak_repeats, case.factors)[size]
     case.seconds.append(timed(case.update, device))
     if case.gflop:
-        after = matrix_peak(device, (size,), peak_repeats)[size]
+        after = matrix_peak(device, (size,), peak_repeats, case.factors)[size]
         case.shares.append(case.gflop() / case.seconds[-1] / max(before, after))
 
 
-def run(device: str, quick: bool, progress: Callable[[str], None]) -> tuple[dict[int, float], list[Case]]:
-    """Measure everything; returns the peak by matrix size, and the cases."""
+def run(device: str, quick: bool, progress: Callable[[str], None]) -> tuple[Peaks, list[Case]]:
+    """Measure everything; returns the peaks by dtype and matrix size, and the cases."""
     world = made_up_world(device)
     sizes = [(100, 5), (400, 20), (1600, 20)]
     learners = [replace(A2C, envs=envs, rollout_steps=steps) for envs, steps in sizes]
     cases = [fast_case(world, learner) for learner in learners]
     cases += [fast_case(world, PPO)]
+    if factor_dtype("medium", world.device) == torch.bfloat16:
+        cases += [fast_case(world, replace(one, matmul_precision="medium")) for one in (*learners[1:], PPO)]
     cases += [naive_case(world, learner) for learner in learners]
     repeats, peak_repeats = (2, 2) if quick else (9, 3)
     product_sizes = (1024, 2048) if quick else (1024, 2048, 4096)
     for case in cases:  # memory and caches
         progress(f"warming up: {case.name} {case.envs}x{case.steps}")
         case.update()
-    peak = matrix_peak(device, product_sizes, peak_repeats)
-    best_size = max(peak, key=lambda size: peak[size])
+    dtypes = dict.fromkeys(case.factors for case in cases)
+    peaks = {dtype: matrix_peak(device, product_sizes, peak_repeats, dtype) for dtype in dtypes}
+    best_size = {dtype: max(peak, key=lambda size: peak[size]) for dtype, peak in peaks.items()}
     for repeat in range(repeats):
         progress(f"repeat {repeat + 1} of {repeats}")
         for case in cases:
             if case.gflop or repeat < 3:  # the naive version is slow and steady
-                measure(case, device, best_size, peak_repeats)
-    return peak, cases
+                measure(case, device, best_size[case.factors], peak_repeats)
+    return peaks, cases
 
 
 # ----------------------------------------------------------------------------------------------------------- output
@@ -386,7 +400,7 @@ def figures(cases: list[Case]) -> list[Figures]:
         rate, low, high = case.frames_per_s()
         needed = case.gflop() if case.gflop else None
         share = statistics.median(case.shares) if case.shares else None
-        ratio = rate / naive[case.envs, case.steps] if case.name == "a2c" else None
+        ratio = rate / naive[case.envs, case.steps] if case.name.startswith("a2c") else None
         count = len(case.seconds)
         lines.append(Figures(case.name, case.envs, case.steps, count, rate, low, high, needed, share, ratio))
     return lines
@@ -395,7 +409,7 @@ def figures(cases: list[Case]) -> list[Figures]:
 def table(lines: list[Figures]) -> str:
     """The lines as text."""
     heads = "case", "envs x steps", "frames/s", "min - max", "GFLOP/update", "of peak", "x naive"
-    text = [("{:<10} {:>13} {:>10} {:>21} {:>13} {:>8} {:>8}").format(*heads)]
+    text = [("{:<14} {:>13} {:>10} {:>21} {:>13} {:>8} {:>8}").format(*heads)]
     for line in lines:
         size = f"{line.envs} x {line.steps}"
         spread = f"{line.frames_per_s_min:,.0f} - {line.frames_per_s_max:,.0f}"
@@ -403,7 +417,7 @@ def table(lines: list[Figures]) -> str:
         share = f"{line.share_of_peak:.0%}" if line.share_of_peak else "-"
         ratio = f"{line.times_naive:.1f}" if line.times_naive else "-"
         rate = f"{line.frames_per_s:,.0f}"
-        text.append(f"{line.case:<10} {size:>13} {rate:>10} {spread:>21} {needed:>13} {share:>8} {ratio:>8}")
+        text.append(f"{line.case:<14} {size:>13} {rate:>10} {spread:>21} {needed:>13} {share:>8} {ratio:>8}")
     return "\n".join(text)
 
 
@@ -430,15 +444,20 @@ def main() -> None:
         if not options.json:
             print(text, flush=True)
 
-    peak, cases = run(options.device, options.quick, progress)
+    peaks, cases = run(options.device, options.quick, progress)
     lines = figures(cases)
     machine = {"device": device_name(options.device), "threads": torch.get_num_threads(), "torch": torch.__version__}
     if options.json:
-        print(json.dumps({**machine, "peak_gflop_per_s": peak, "cases": [asdict(line) for line in lines]}, indent=2))
+        by_dtype = {str(dtype).removeprefix("torch."): peak for dtype, peak in peaks.items()}
+        print(
+            json.dumps({**machine, "peak_gflop_per_s": by_dtype, "cases": [asdict(line) for line in lines]}, indent=2)
+        )
         return
-    by_size = ", ".join(f"{size}: {rate:,.0f}" for size, rate in peak.items())
     print(f"\n{machine['device']}, {machine['threads']} threads, torch {machine['torch']}")
-    print(f"float32 matrix products at the start, GFLOP/s by size: {by_size}\n")
+    for dtype, peak in peaks.items():
+        by_size = ", ".join(f"{size}: {rate:,.0f}" for size, rate in peak.items())
+        print(f"{str(dtype).removeprefix('torch.')} matrix products at the start, GFLOP/s by size: {by_size}")
+    print()
     print(table(lines))
 
 

@@ -34,6 +34,7 @@ def test_the_paper_s_settings() -> None:
         "lookahead": 0.0,
         "sum_loss": True,
         "optimiser": "rmsprop",
+        "matmul_precision": "highest",
         "lr_start": 7.0e-4,
         "lr_end": 0.0,
         "clip_norm": 40.0,
@@ -141,7 +142,7 @@ def test_a2c_with_several_passes_is_refused() -> None:
 
 def test_a_setting_that_came_later_renames_no_older_run() -> None:
     assert DEFAULT.told_apart_by().keys() == asdict(DEFAULT).keys() - {"heads", "scenes_at_once", "scene_updates"}
-    assert PAPER_A2C.told_apart_by().keys() == DEFAULT.told_apart_by().keys() - {"settle"}
+    assert PAPER_A2C.told_apart_by().keys() == DEFAULT.told_apart_by().keys() - {"settle", "matmul_precision"}
     changed = replace(DEFAULT, heads="shared", scenes_at_once=4, scene_updates=3)
     assert changed.told_apart_by() == asdict(changed)
     assert (DEFAULT.head_count(1000), replace(DEFAULT, heads="shared").head_count(1000)) == (1000, 1)

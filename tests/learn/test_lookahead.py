@@ -15,7 +15,7 @@ TEMPERATURE = 0.05
 @pytest.fixture
 def trainer() -> Trainer:
     """A trainer on the corridor and the grid that knows half of all transitions."""
-    trainer = small_trainer(small_learner(), reward=replace(COLLISION_AWARE, blocked=-0.5))
+    trainer = small_trainer(small_learner(matmul_precision="highest"), reward=replace(COLLISION_AWARE, blocked=-0.5))
     state, action = torch.meshgrid(torch.arange(trainer.world.state_count), torch.arange(4), indexing="ij")
     taken = torch.rand(state.shape, generator=torch.Generator().manual_seed(1)) < 0.5
     trainer.observed.add(state[taken], action[taken], trainer.world.next_state[taken])

@@ -27,8 +27,8 @@ def made_batch(seed: int = 0, lowest: int = 0) -> Batch:
     return Batch(history, target, number, number / 10, number / 20, number / 30, ROWS_PER_SCENE)
 
 
-def dealt(batch: Batch, parts: int = 3, seed: int = 0) -> list[Minibatch]:
-    return Deck(batch, STATES, TARGETS).dealt(parts, torch.Generator().manual_seed(seed))
+def dealt(batch: Batch, parts: int = 3, seed: int = 0, row_step: int = 1) -> list[Minibatch]:
+    return Deck(batch, STATES, TARGETS, row_step).dealt(parts, torch.Generator().manual_seed(seed))
 
 
 def test_every_row_is_dealt_once_and_stays_whole() -> None:
@@ -49,6 +49,24 @@ def test_what_repeats_is_there_once() -> None:
         assert len(part.history.unique(dim=0)) == len(part.history)
         pairs = torch.cat([part.history[part.history_of], part.target[:, None]], 1)
         assert len(pairs.unique(dim=0)) == len(pairs)
+        assert (part.pair_count, part.history_count) == (len(pairs), len(part.history))
+
+
+def test_round_numbers_of_pairs_and_histories_hold_the_same() -> None:
+    for part, plain in zip(dealt(made_batch(), row_step=8), dealt(made_batch()), strict=True):
+        assert all(count % 8 == 0 for count in (*part.pairs_per_scene, len(part.history)))
+        assert sum(part.pairs_per_scene) == len(part.target) == len(part.history_of)
+        assert (part.pair_count, part.history_count) == (len(plain.target), len(plain.history))
+        assert torch.equal(part.rows.action, plain.rows.action)
+        assert torch.equal(part.by_row(part.target), part.rows.target)
+        assert torch.equal(part.history[part.history_of][part.pair_of], part.rows.history)
+        first = part.pairs_per_scene[0]
+        assert (part.target[:first] < 2).all()
+        assert (part.target[first:] >= 2).all()
+        gradient = torch.rand(len(part.rows), 5, dtype=torch.float64) + 1
+        by_pair = part.by_pair(gradient)
+        assert torch.allclose(by_pair.sum(0), gradient.sum(0))
+        assert int((by_pair.sum(1) > 0).sum()) == part.pair_count
 
 
 def test_rows_of_one_history_are_learnt_from_together() -> None:
@@ -86,7 +104,7 @@ def test_every_epoch_is_shuffled_anew() -> None:
 
     def contents(seed: int) -> list[list[list[int]]]:
         generator = torch.Generator().manual_seed(seed)
-        epochs = dealt_epochs(batch, STATES, TARGETS, epochs=2, parts=3, generator=generator)
+        epochs = dealt_epochs(batch, STATES, TARGETS, epochs=2, parts=3, row_step=1, generator=generator)
         return [[part.rows.action.tolist() for part in parts] for parts in epochs]
 
     first, second = contents(0)
@@ -96,7 +114,7 @@ def test_every_epoch_is_shuffled_anew() -> None:
 
 def test_one_pass_over_everything_leaves_the_batch_as_it_is() -> None:
     batch = made_batch()
-    [[part]] = dealt_epochs(batch, STATES, TARGETS, epochs=1, parts=1, generator=torch.Generator())
+    [[part]] = dealt_epochs(batch, STATES, TARGETS, epochs=1, parts=1, row_step=8, generator=torch.Generator())
     assert part.rows is batch
     assert part.history is batch.history
     output = torch.randn(len(batch), 5)
@@ -113,15 +131,17 @@ def test_no_minibatch_is_empty_where_few_histories_differ(kinds: int, parts: int
     assert all(len(part.rows) for part in found)
 
 
-def test_a_step_is_the_one_that_every_row_by_itself_would_make() -> None:
-    trainer = small_trainer(small_learner(DEFAULT, epochs=1, minibatches=2, hindsight=True))
+@pytest.mark.parametrize("row_step", [1, 16])
+def test_a_step_is_the_one_that_every_row_by_itself_would_make(row_step: int) -> None:
+    exact = small_learner(DEFAULT, epochs=1, minibatches=2, hindsight=True, matmul_precision="highest")
+    trainer = small_trainer(exact)
     rollout = trainer.collector.collect(trainer.statistics)
     batch, _ = trainer._batch(rollout)
     batch = trainer._with_hindsight(rollout, batch)
-    deck = Deck(batch, trainer.world.state_count, trainer.world.target_count)
+    deck = Deck(batch, trainer.world.state_count, trainer.world.target_count, row_step)
     settings = LossSettings.after(0, trainer.learner)
     for part in deck.dealt(2, torch.Generator()):
-        assert len(part.history) < len(part.target) < len(part.rows)
+        assert part.history_count < part.pair_count < len(part.rows)
         whole = Minibatch.whole(part.rows)
         gradients = []
         for shape in (part, whole):

@@ -19,7 +19,7 @@ from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
 
-A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, lookahead=0.0, step_limit=5)
+A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, lookahead=0.0, step_limit=5, matmul_precision="highest")
 
 
 def predicted(trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
@@ -272,7 +272,7 @@ def test_one_row_an_update_gives_finite_figures() -> None:
 def test_projecting_visited_states_alone_changes_nothing_but_rounding(
     monkeypatch: pytest.MonkeyPatch, heads: str
 ) -> None:
-    learner = small_learner(heads=heads)
+    learner = small_learner(heads=heads, matmul_precision="highest")
     everywhere = small_trainer(learner)
     monkeypatch.setattr(lookup, "FEW_STATES", 0)
     visited = small_trainer(learner)

@@ -34,13 +34,15 @@ def float64() -> Iterator[None]:
     torch.set_default_dtype(torch.float32)
 
 
-def made_network(seed: int = 0, heads: int = 3) -> tuple[SiameseActorCritic, LookupNetwork]:
+def made_network(
+    seed: int = 0, heads: int = 3, dtype: torch.dtype | None = None
+) -> tuple[SiameseActorCritic, LookupNetwork]:
     network = SiameseActorCritic(NetworkShape(heads, FEATURES, WIDTH, HISTORY), seed)
     with torch.no_grad():  # larger weights, so that ReLUs cut and every path carries a gradient
         for parameter in network.parameters():
             parameter.mul_(2)
     features = torch.randn(STATES, FEATURES, generator=torch.Generator().manual_seed(seed + 100))
-    return network, LookupNetwork(network, features, torch.tensor(TARGET_STATE))
+    return network, LookupNetwork(network, features, torch.tensor(TARGET_STATE), dtype)
 
 
 def made_rows(rows_per_scene: tuple[int, ...], any_target: bool, seed: int = 0) -> tuple[Tensor, Tensor, Tensor]:
@@ -119,6 +121,52 @@ def test_rows_that_share_a_history_are_as_they_are_by_themselves() -> None:
     assert found[0][1].abs().max() > 0.1
 
 
+def outputs_and_gradients(network: SiameseActorCritic, lookup: LookupNetwork, repeats: int) -> dict[str, Tensor]:
+    """Of many rows, in two minibatches."""
+    rows_per_scene = (17 * repeats, 9 * repeats, 23 * repeats)
+    history, target, _ = made_rows(rows_per_scene, False)
+    grad_output = torch.randn(len(history), 5, generator=torch.Generator().manual_seed(5)) + 0.5
+    for _ in range(2):
+        kept = lookup.forward(history, target, rows_per_scene)
+        lookup.backward(history, target, rows_per_scene, kept, grad_output)
+    lookup.siamese_gradient()
+    return {"output": kept.output, **{name: parameter.grad for name, parameter in network.named_parameters()}}
+
+
+def test_with_bfloat16_factors_outputs_and_gradients_are_rounded_and_no_more() -> None:
+    """A thousand rows: sums of so many would be far off, were they added up in bfloat16 too."""
+    exact = outputs_and_gradients(*made_network(), repeats=20)
+    rounded = outputs_and_gradients(*made_network(dtype=torch.bfloat16), repeats=20)
+    assert torch.equal(rounded.pop("output_bias"), exact.pop("output_bias"))  # a sum of what is given
+    for name, expected in exact.items():
+        assert rounded[name].dtype == torch.float32
+        off = (rounded[name] - expected).norm() / expected.norm()
+        assert 1e-5 < off < 0.02, name
+
+
+def test_bfloat16_copies_of_weights_follow_the_parameters_after_refresh() -> None:
+    network, lookup = made_network(dtype=torch.bfloat16)
+    history, target, _ = made_rows((5, 5, 5), False)
+    before = lookup.forward(history, target, (5, 5, 5)).output
+    network.load_state_dict(made_network(seed=1)[0].state_dict())
+    lookup.refresh()
+    fresh = LookupNetwork(network, lookup.first_layer.features, torch.tensor(TARGET_STATE), torch.bfloat16)
+    found, expected = (one.forward(history, target, (5, 5, 5)).output for one in (lookup, fresh))
+    assert torch.equal(found, expected)
+    assert not torch.equal(found, before)
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_rows_are_judged_as_in_a_forward_pass_whatever_their_number(dtype: torch.dtype) -> None:
+    _, lookup = made_network(dtype=dtype)
+    history, target, _ = made_rows((7, 0, 5), False)
+    expected = lookup.forward(history, target, (7, 0, 5))
+    scores, value = lookup.judged(history, target, (7, 0, 5))
+    torch.testing.assert_close(scores, expected.scores, rtol=0.02, atol=0.02)
+    torch.testing.assert_close(value, expected.value, rtol=0.02, atol=0.02)
+    assert lookup.row_step == (1 if dtype == torch.float32 else 32)
+
+
 def test_forward_follows_the_parameters_after_refresh() -> None:
     network, lookup = made_network()
     history, target, scene = made_rows((5, 5, 5), False)
@@ -142,6 +190,10 @@ def test_start_values_are_those_of_a_history_of_one_pose(few_rows: bool) -> None
     expected = lookup.forward(state[:, None].expand(-1, HISTORY), target, rows_per_scene).value
     torch.testing.assert_close(lookup.start_values(state, target, rows_per_scene), expected)
     assert expected.unique().numel() == 5
+    _, rounded = made_network(dtype=torch.bfloat16)
+    rounded.refresh(few_rows=few_rows)
+    found = rounded.start_values(state, target, rows_per_scene)
+    torch.testing.assert_close(found, expected, rtol=0.02, atol=0.02)
 
 
 def test_backward_does_not_depend_on_what_was_computed_before() -> None:

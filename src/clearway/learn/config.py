@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from clearway.errors import RunError
+from clearway.model.precision import MatmulPrecision
 
 Algorithm = Literal["ppo", "a2c", "a3c"]
 PresetName = Literal["default", "paper", "paper-a3c"]
@@ -22,9 +23,16 @@ _A3C_NEEDS: dict[str, object] = {
     "log_barrier": 0,
     "lookahead": 0,
     "optimiser": "rmsprop",
+    "matmul_precision": "highest",
 }
 
-ADDED_LATER: dict[str, object] = {"heads": "scene", "scenes_at_once": 0, "scene_updates": 2, "settle": 0.0}
+ADDED_LATER: dict[str, object] = {
+    "heads": "scene",
+    "scenes_at_once": 0,
+    "scene_updates": 2,
+    "settle": 0.0,
+    "matmul_precision": "highest",
+}
 """Settings that runs may have been made without, and what holds for those."""
 
 
@@ -33,7 +41,7 @@ class Learner:
     """Everything that shapes learning apart from scenes, targets, reward and seed."""
 
     # How much experience, and how it is gathered
-    frames: int = 2_800_000
+    frames: int = 3_000_000
     """Training frames over all environments; schedules end here."""
     envs: int = 400
     """Environments side by side. Of a3c: workers, divided evenly among the targets."""
@@ -114,6 +122,10 @@ class Learner:
     """Clip every parameter tensor by itself, as Zhu's code does, rather than all together."""
 
     # The network
+    matmul_precision: MatmulPrecision = "medium"
+    """highest: all arithmetic is float32; medium: factors of matrix products are rounded to bfloat16, and activations
+    kept in it, on devices with instructions for it (elsewhere float32). Sums, outputs, parameters and what the
+    optimiser keeps are float32."""
     width: int = 512
     history_length: int = 4
     heads: Literal["scene", "shared"] = "scene"
@@ -227,6 +239,7 @@ PAPER_A2C = Learner(
     lr_end=0.0,
     clip_norm=40.0,
     clip_each_tensor=True,
+    matmul_precision="highest",
 )
 """The published settings, synchronous: 5-step returns, discount 0.99, entropy 0.01, RMSProp, rewards clipped."""
 

@@ -85,8 +85,8 @@ def hindsight_batch(
         return None
     history = rollout.history[rows.step, rows.env]
     action = rollout.action[rows.step, rows.env]
-    told = network.forward(history, rows.target, rows.rows_per_scene)
-    log_pi = torch.log_softmax(told.scores, 1).gather(1, action[:, None])[:, 0]
+    scores, value = network.judged(history, rows.target, rows.rows_per_scene)
+    log_pi = torch.log_softmax(scores, 1).gather(1, action[:, None])[:, 0]
     ratio = (log_pi - log_prob[rows.step, rows.env]).exp()
     reward = _reward(rollout, rows, navigation) * reward_scale
     shape = (len(rollout.action), len(rollout.target_after) * (int(rows.slot.max()) + 1))
@@ -101,7 +101,7 @@ def hindsight_batch(
     value_target, advantage = vtrace(
         dense(reward),
         dense(discount * (~rows.hit)),
-        dense(told.value),
+        dense(value),
         dense(ratio),
         dense(torch.ones_like(rows.hit)),
         trace_lambda,

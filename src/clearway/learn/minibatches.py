@@ -3,9 +3,10 @@
 Trained agents come by the same way again and again, and many targets are walked to from the same poses: at the end of
 the demo a minibatch holds 0.25 histories a row, and 0.43 pairs of a history and a target. Outputs depend on nothing
 else. So rows of one history are dealt into the same minibatch, each pair is computed once, and its rows' gradients are
-added up before they go back through the network. Nothing is approximated.
+added up before they go back through the network. Nothing is approximated. Where the network computes round numbers of
+rows faster, pairs and histories are repeated up to such a number; nothing is learnt from those.
 
-Axis letters: B rows, P pairs that differ, U histories that differ, K history, A actions.
+Axis letters: B rows, P pairs, U histories, K history, A actions.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import torch
 from torch import Tensor
 
 from clearway.learn.losses import Batch
+from clearway.model.padding import Padding
 from clearway.model.sums import sum_ascending
 
 
@@ -31,6 +33,7 @@ class Minibatch:
         history_of: (P,) int64, ascending, the history of each pair; None where every pair has its own.
         history: (U, K) int64.
         pairs_per_scene: number of pairs of each scene.
+        pair_count, history_count: how many pairs and histories differ.
     """
 
     rows: Batch
@@ -39,11 +42,14 @@ class Minibatch:
     history_of: Tensor | None
     history: Tensor
     pairs_per_scene: tuple[int, ...]
+    pair_count: int
+    history_count: int
 
     @classmethod
     def whole(cls, batch: Batch) -> Minibatch:
         """All rows of a batch as they are, none of them put together with another."""
-        return cls(batch, None, batch.target, None, batch.history, batch.rows_per_scene)
+        rows = len(batch)
+        return cls(batch, None, batch.target, None, batch.history, batch.rows_per_scene, rows, rows)
 
     def by_row(self, output: Tensor) -> Tensor:
         """Outputs (P, A + 1) of pairs, for each row: (B, A + 1)."""
@@ -60,13 +66,15 @@ class Deck:
     Args:
         batch: at least one row.
         state_count, target_count: of the world.
+        row_step: of what a minibatch's numbers of pairs of a scene, and of histories, are multiples.
 
     Attributes:
         batch: its rows in the new order.
         history, pair: (B,) int64, ascending: the rank of each row's history, and of its pair.
     """
 
-    def __init__(self, batch: Batch, state_count: int, target_count: int) -> None:
+    def __init__(self, batch: Batch, state_count: int, target_count: int, row_step: int = 1) -> None:
+        self.row_step = row_step
         slots = batch.history.flip(1).T  # newest first: states are numbered by scene, so sorting keeps scenes together
         history = slots[0]
         for slot in slots[1:]:
@@ -95,15 +103,20 @@ class Deck:
     def _minibatch(self, index: Tensor) -> Minibatch:
         """The rows in index (B,) int64, ascending, which hold all rows of each of their histories."""
         first, pair_of = _runs(self.pair[index])
-        pairs = index[first]
-        first, history_of = _runs(self.history[pairs])
+        padding = Padding.to_multiples(self.row_step, self._per_scene(index[first]), index.device)
+        pairs = index[first][padding.rows]
+        first_pair, history_of = _runs(self.history[pairs])
+        histories = pairs[first_pair]
+        repeated = histories[-1:].expand(-len(histories) % self.row_step)
         return Minibatch(
             rows=self.batch.rows(index, self._per_scene(index)),
-            pair_of=pair_of,
+            pair_of=padding.place[pair_of],
             target=self.batch.target[pairs],
             history_of=history_of,
-            history=self.batch.history[pairs[first]],
-            pairs_per_scene=self._per_scene(pairs),
+            history=self.batch.history[torch.cat([histories, repeated])],
+            pairs_per_scene=padding.rows_per_scene,
+            pair_count=len(first),
+            history_count=len(histories),
         )
 
     def _per_scene(self, index: Tensor) -> tuple[int, ...]:
@@ -112,13 +125,20 @@ class Deck:
 
 
 def dealt_epochs(
-    batch: Batch, state_count: int, target_count: int, *, epochs: int, parts: int, generator: torch.Generator
+    batch: Batch,
+    state_count: int,
+    target_count: int,
+    *,
+    epochs: int,
+    parts: int,
+    row_step: int,
+    generator: torch.Generator,
 ) -> Iterator[list[Minibatch]]:
-    """Every epoch's minibatches; a batch that is learnt from whole, and once, stays as it is."""
+    """Every epoch's minibatches, see `Deck`; a batch that is learnt from whole, and once, stays as it is."""
     if epochs * parts == 1:
         yield [Minibatch.whole(batch)]
         return
-    deck = Deck(batch, state_count, target_count)
+    deck = Deck(batch, state_count, target_count, row_step)
     for _ in range(epochs):
         yield deck.dealt(parts, generator)
 

@@ -93,8 +93,9 @@ class Collector:
         self.steps, self.keep_hidden = steps, keep_hidden
         device, count = navigation.world.device, sum(envs_per_scene)
         self.rows_per_scene = tuple(envs_per_scene)
-        self.one_step = Activations.empty(count, network.width, device)
-        self.kept = Activations.empty(count * steps, network.width if keep_hidden else 0, device)
+        self.one_step = Activations.empty(count, network.width, device, dtype=network.dtype)
+        width = network.width if keep_hidden else 0
+        self.kept = Activations.empty(count * steps, width, device, dtype=network.dtype)
 
     @torch.no_grad()
     def collect(self, statistics: EpisodeStatistics) -> Rollout:

@@ -138,8 +138,10 @@ def package_versions() -> dict[str, str]:
 
 
 def hardware() -> dict[str, Any]:
-    """Processor, usable cores and threads of this machine."""
+    """Processor, usable cores and threads of this machine; whether it multiplies bfloat16."""
     import torch
+
+    from clearway.model.precision import multiplies_bfloat16
 
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
@@ -147,6 +149,7 @@ def hardware() -> dict[str, Any]:
         "system": platform.system(),
         "cores": cores,
         "threads": torch.get_num_threads(),
+        "bfloat16": multiplies_bfloat16(torch.device("cpu")),
     }
 
 

@@ -30,6 +30,7 @@ from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
+from clearway.model.precision import factor_dtype
 from clearway.reward import Reward
 
 SHUFFLE_SALT = 1_000_003
@@ -102,7 +103,8 @@ class Trainer:
         heads = learner.head_count(world.scene_count)
         shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
-        self.lookup = LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state)
+        dtype = factor_dtype(learner.matmul_precision, device)
+        self.lookup = LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state, dtype)
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         self.navigation = Navigation(
@@ -197,7 +199,7 @@ class Trainer:
         log_prob = log_pi.gather(1, action[:, None])[:, 0]
         value = by_step(rollout.kept.value, learner.rollout_steps)
         rows_per_scene = self.collector.rows_per_scene
-        after = self.lookup.forward(rollout.history_after, rollout.target_after, rows_per_scene).value
+        _, after = self.lookup.judged(rollout.history_after, rollout.target_after, rows_per_scene)
         ended = rollout.reached | rollout.truncated
         advantage = generalised_advantages(
             rollout.reward * learner.reward_scale + self._value_at_cuts(rollout),
@@ -248,7 +250,7 @@ class Trainer:
             target = rollout.target[step, env]
             scene = self.world.target_scene[target]
             rows_per_scene = torch.bincount(scene, minlength=self.world.scene_count).tolist()
-            values = self.lookup.forward(rollout.last_history[step, env], target, rows_per_scene).value
+            _, values = self.lookup.judged(rollout.last_history[step, env], target, rows_per_scene)
             bonus[step, env] = self.learner.discount * values
         return bonus
 
@@ -276,6 +278,7 @@ class Trainer:
             world.target_count,
             epochs=learner.epochs,
             parts=learner.minibatches,
+            row_step=self.lookup.row_step,
             generator=generator,
         )
         steps: list[Step] = []
@@ -304,7 +307,7 @@ class Trainer:
         self.optimiser.step(lr)
         if siamese_moves:
             self.siamese_optimiser.step(lr * learner.siamese_lr)
-        return Step(loss, norm, len(part.rows), len(part.target), len(part.history))
+        return Step(loss, norm, len(part.rows), part.pair_count, part.history_count)
 
     def _rebalance(self) -> None:
         """Draw targets more often that are reached less often."""

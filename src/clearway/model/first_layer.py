@@ -15,13 +15,14 @@ import torch
 from torch import Tensor
 from torch.nn.functional import embedding_bag
 
-from clearway.model.sums import sum_listed
+from clearway.model.padding import rounded_up, row_step
+from clearway.model.sums import multiply, sum_listed
 
 MOST_ROWS = 131_072  # projected states kept while nothing is being learnt from them: 1 GiB at the published size
 
 
 class FirstLayer(Protocol):
-    """What both ways offer. All results are sums over the K slots, before bias and ReLU."""
+    """What both ways offer. Results are sums over the K slots, before bias and ReLU, in the dtype of the factors."""
 
     def refresh(self, keep: bool) -> None:
         """The weight has changed; `keep`: the states that occurred since the last time will occur again."""
@@ -50,21 +51,23 @@ class AllStates:
 
     Args:
         weight: (K, H, F), shared, not copied. Call `refresh` first, and after every change.
-        features: (S, F) in the weight's dtype.
+        features: (S, F).
         target_state: (M,) int64.
+        dtype: of the factors of matrix products and of what is projected; gradients have the weight's.
     """
 
-    def __init__(self, weight: Tensor, features: Tensor, target_state: Tensor) -> None:
-        self.weight, self.features, self.target_state = weight, features.contiguous(), target_state
+    def __init__(self, weight: Tensor, features: Tensor, target_state: Tensor, dtype: torch.dtype) -> None:
+        self.weight, self.features, self.target_state = weight, features.to(dtype).contiguous(), target_state
         self.history_length, self.width, _ = weight.shape
         self.slot = torch.arange(self.history_length, device=features.device)
         columns = self.history_length * self.width
-        self.projected = torch.empty(len(features), columns, device=features.device)
-        self.by_state = torch.empty(0, columns, device=features.device)
+        self.projected = self.features.new_empty(len(features), columns)
+        self.by_state = weight.new_empty(0, columns)
 
     def refresh(self, keep: bool) -> None:
         """The weight has changed; `keep` makes no difference here."""
-        torch.mm(self.features, self.weight.flatten(0, 1).T, out=self.projected)  # (S, K * H)
+        weight = self.weight.flatten(0, 1).to(self.features.dtype)
+        torch.mm(self.features, weight.T, out=self.projected)  # (S, K * H)
 
     def seen(self, history: Tensor) -> Tensor:
         """(B, H) of histories (B, K) int64."""
@@ -84,13 +87,13 @@ class AllStates:
         count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
         sample = torch.argsort(bag) // self.history_length
         by_state = sum_listed(grad_seen, sample, count)  # (S * K, H)
-        columns = by_state.view(len(self.features), -1)
+        columns = by_state.view(len(self.features), -1).to(self.weight.dtype)
         self.by_state = columns if begin else self.by_state.add_(columns)
         self.by_state.index_add_(0, self.target_state, grad_wanted.repeat(1, self.history_length))
 
     def gradient(self, out: Tensor) -> None:
         """Write the weight's gradient (K, H, F), of all that was added."""
-        torch.mm(self.by_state.T, self.features, out=out.flatten(0, 1))
+        multiply(self.by_state.to(self.features.dtype).T, self.features, out=out.flatten(0, 1))
 
     def _table_row(self, states: Tensor) -> Tensor:
         """Row of `projected`, seen as (S * K, H), for states (B, K) in their slots."""
@@ -106,32 +109,34 @@ class VisitedStates:
         weight: (K, H, F), shared, not copied. Call `refresh` first, and after every change.
         features: (S, F) in any store and float dtype; rows are read as they are needed.
         target_state: (M,) int64.
+        dtype: as of `AllStates`.
 
     Attributes:
         known: number of states projected at present.
         row_of: (S,) int64, their rows; -1 of all other states.
     """
 
-    def __init__(self, weight: Tensor, features: Tensor, target_state: Tensor) -> None:
-        self.weight, self.features = weight, features
+    def __init__(self, weight: Tensor, features: Tensor, target_state: Tensor, dtype: torch.dtype) -> None:
+        self.weight, self.features, self.dtype, self.row_step = weight, features, dtype, row_step(dtype)
         self.history_length, self.width, count = weight.shape
         columns, device = self.history_length * self.width, features.device
         self.slot = torch.arange(self.history_length, device=device)
         self.row_of = torch.full((len(features),), -1, device=device)
         self.known = 0
-        self.rows = torch.empty(0, count, dtype=weight.dtype, device=device)  # features of the known states
-        self.projected = torch.empty(0, columns, dtype=weight.dtype, device=device)
+        self.rows = torch.empty(0, count, dtype=dtype, device=device)  # features of the known states
+        self.projected = torch.empty(0, columns, dtype=dtype, device=device)
         self.targets = self._read(target_state)  # (M, F)
-        self.by_state, self.by_target = self.projected, torch.empty(0, self.width, device=device)
+        self.by_state, self.by_target = weight.new_empty(0, columns), weight.new_empty(0, self.width)
 
     def refresh(self, keep: bool) -> None:
         """The weight has changed; `keep` the states that are known and project them anew."""
+        self.rounded = self.weight.flatten(0, 1).to(self.dtype)
         if keep:
-            torch.mm(self.rows[: self.known], self.weight.flatten(0, 1).T, out=self.projected[: self.known])
+            self._project_rows(0, self.known)
         else:
             self._forget()
         self.by_state = self.by_state[:0]
-        self.slots_together = self.weight.sum(0)  # (H, F)
+        self.slots_together = self.weight.sum(0).to(self.dtype)  # (H, F)
 
     def seen(self, history: Tensor) -> Tensor:
         """(B, H) of histories (B, K) int64."""
@@ -155,17 +160,17 @@ class VisitedStates:
         sums = sum_listed(grad_seen, order // self.history_length, count)
         before = 0 if begin else len(self.by_state)
         if before < self.known:
-            grown = torch.zeros(self.known, self.projected.shape[1], dtype=grad_seen.dtype, device=bag.device)
+            grown = self.weight.new_zeros(rounded_up(self.known, self.row_step), self.projected.shape[1])
             grown[:before] = self.by_state[:before]
             self.by_state = grown
-        self.by_state.view(-1, self.width).index_add_(0, occupied, sums)
+        self.by_state.view(-1, self.width).index_add_(0, occupied, sums.to(self.weight.dtype))
         self.by_target = grad_wanted if begin else self.by_target + grad_wanted
 
     def gradient(self, out: Tensor) -> None:
         """Write the weight's gradient (K, H, F), of all that was added."""
-        torch.mm(self.by_state.T, self.rows[: len(self.by_state)], out=out.flatten(0, 1))
+        multiply(self.by_state.to(self.dtype).T, self.rows[: len(self.by_state)], out=out.flatten(0, 1))
         occurred = self.by_target.any(1).nonzero()[:, 0]
-        out.add_(self.by_target[occurred].T @ self.targets[occurred])
+        out.add_(self.by_target[occurred].to(self.dtype).T @ self.targets[occurred])
 
     def _table_row(self, states: Tensor) -> Tensor:
         """Row of `projected`, seen as (U * K, H), for states (B, K) in their slots; projects what is missing."""
@@ -182,11 +187,17 @@ class VisitedStates:
     def _project(self, states: Tensor) -> None:
         """Make states (U,) known."""
         first, last = self.known, self.known + len(states)
-        self.rows, self.projected = _with_room(self.rows, first, last), _with_room(self.projected, first, last)
+        room = rounded_up(first + rounded_up(len(states), self.row_step), self.row_step)
+        self.rows, self.projected = _with_room(self.rows, first, room), _with_room(self.projected, first, room)
         self.rows[first:last] = self._read(states)
-        torch.mm(self.rows[first:last], self.weight.flatten(0, 1).T, out=self.projected[first:last])
+        self._project_rows(first, last)
         self.row_of[states] = torch.arange(first, last, device=states.device)
         self.known = last
+
+    def _project_rows(self, first: int, last: int) -> None:
+        """Project the features in rows first to last, last excluded, and some rows more that nobody reads."""
+        rows = slice(first, first + rounded_up(last - first, self.row_step))
+        torch.mm(self.rows[rows], self.rounded.T, out=self.projected[rows])
 
     def _forget(self) -> None:
         self.row_of.fill_(-1)
@@ -194,13 +205,13 @@ class VisitedStates:
 
     def _read(self, states: Tensor) -> Tensor:
         """Features (U, F) of states (U,)."""
-        return self.features[states].to(self.weight.dtype)
+        return self.features[states].to(self.dtype)
 
 
 def _with_room(table: Tensor, used: int, rows: int) -> Tensor:
     """The table, or a larger one with its first `used` rows, so that it has so many rows; doubled when it grows."""
     if rows <= len(table):
         return table
-    larger = table.new_empty(max(rows, 2 * len(table)), table.shape[1])
+    larger = table.new_zeros(max(rows, 2 * len(table)), table.shape[1])
     larger[:used] = table[:used]
     return larger

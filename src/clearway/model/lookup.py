@@ -10,7 +10,8 @@ Features are frozen and states finite, so the first layer needs no picture twice
 
 The first layer is computed of all states, or in large worlds of those that occur: `first_layer`.
 
-Nothing is approximated. Gradients are written by hand into `.grad`; the tests hold them against autograd on `network`.
+Nothing is approximated, apart from rounding, see `LookupNetwork`. Gradients are written by hand into `.grad`; the tests
+hold them against autograd on `network`.
 
 Axis letters: B rows, U histories, K history, S states, F features, H width, M targets, C scenes, A actions.
 """
@@ -26,7 +27,8 @@ from torch import Tensor
 from clearway.envs.feature_store import FEW_STATES
 from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
-from clearway.model.sums import sum_ascending, sum_listed
+from clearway.model.padding import Padding, row_step
+from clearway.model.sums import add_up, multiply, sum_ascending, sum_listed
 from clearway.scenes.actions import ACTION_COUNT
 
 FEW_TARGETS = 1_024  # up to so many, the target branch is computed of all, beyond of those that occur
@@ -45,7 +47,7 @@ class Activations:
         seen: (U, H) observation branch after ReLU; B = U where rows share no history.
         fused: (B, H).
         special: (B, H) the scene layer.
-        output: (B, A + 1) action scores and value.
+        output: (B, A + 1) action scores and value; in the parameters' dtype, the others in the network's.
     """
 
     seen: Tensor
@@ -64,10 +66,17 @@ class Activations:
         return self.output[:, ACTION_COUNT]
 
     @classmethod
-    def empty(cls, rows: int, width: int, device: torch.device, histories: int | None = None) -> Activations:
-        """Memory for `rows` rows, of as many histories by default."""
-        seen = torch.empty(rows if histories is None else histories, width, device=device)
-        fused, special = (torch.empty(rows, width, device=device) for _ in range(2))
+    def empty(
+        cls,
+        rows: int,
+        width: int,
+        device: torch.device,
+        histories: int | None = None,
+        dtype: torch.dtype | None = None,
+    ) -> Activations:
+        """Memory for `rows` rows, of as many histories by default; `dtype` is that of all but the output."""
+        seen = torch.empty(rows if histories is None else histories, width, device=device, dtype=dtype)
+        fused, special = (torch.empty(rows, width, device=device, dtype=dtype) for _ in range(2))
         return cls(seen, fused, special, torch.empty(rows, OUTPUTS, device=device))
 
     def rows(self, first: int, last: int) -> Activations:
@@ -87,24 +96,36 @@ class LookupNetwork:
         network: the parameters; shared, not copied. Call `refresh` after every change of them.
         features: (S, F) float32, prepared features of all states; with more than `FEW_STATES` in any store.
         target_state: (M,) int64.
+        dtype: of features, activations and the factors of matrix products, the parameters' by default. What is added
+            up, outputs, gradients and the parameters themselves keep the parameters'.
 
     Attributes:
+        row_step: numbers of rows are best multiples of it, see `padding`.
         batches: backward passes since `siamese_gradient` was last called.
     """
 
-    def __init__(self, network: SiameseActorCritic, features: Tensor, target_state: Tensor) -> None:
+    def __init__(
+        self,
+        network: SiameseActorCritic,
+        features: Tensor,
+        target_state: Tensor,
+        dtype: torch.dtype | None = None,
+    ) -> None:
         shape = network.shape
         assert features.shape[1] == shape.feature_count, "features do not fit the network"
         self.network, self.target_state = network, target_state
         self.width, self.history_length = shape.width, shape.history_length
+        weight = network.siamese_weight.data
+        self.dtype = dtype or weight.dtype
+        self.row_step = row_step(self.dtype)
         layer = AllStates if len(features) <= FEW_STATES else VisitedStates
-        self.first_layer: FirstLayer = layer(network.siamese_weight.data, features, target_state)
-        self.workspace, self.batches = torch.empty(0, self.width, device=features.device), 0
+        self.first_layer: FirstLayer = layer(weight, features, target_state, self.dtype)
+        self.workspace, self.batches = torch.empty(0, self.width, device=features.device, dtype=self.dtype), 0
         goals = len(target_state)
         self.all_targets = torch.arange(goals, device=features.device)
         self.known = torch.zeros(goals, dtype=torch.bool, device=features.device)  # whose rows below are up to date
         self.wanted = network.siamese_bias.new_zeros(goals, self.width)
-        self.target_term = torch.zeros_like(self.wanted)  # of the fusion layer, before its ReLU
+        self.target_term = self.wanted.to(self.dtype, copy=True)  # of the fusion layer, before its ReLU
         for parameter in network.parameters():
             parameter.grad = torch.zeros_like(parameter)
         self.refresh()
@@ -120,7 +141,11 @@ class LookupNetwork:
         net = self.network
         if siamese_weight:
             self.first_layer.refresh(keep=not few_rows)
-        self.fusion_in, self.scene_in = net.fusion_weight[0].T, net.scene_weight.transpose(1, 2)
+        factors = (net.siamese_bias, net.fusion_weight[0], net.scene_weight, net.scene_bias, net.output_weight)
+        self.siamese_bias, self.fusion_weight, self.scene_weight, self.scene_bias, self.output_weight = (
+            factor.to(self.dtype) for factor in factors
+        )  # the parameters themselves, where the dtype is theirs
+        self.fusion_in, self.scene_in = self.fusion_weight.T, self.scene_weight.transpose(1, 2)
         if few_rows:
             self.fusion_in, self.scene_in = self.fusion_in.contiguous(), self.scene_in.contiguous()
         self.known.zero_()
@@ -145,9 +170,8 @@ class LookupNetwork:
             out: where to write; new memory by default.
             history_of: (B,) int64, ascending, the history of each row; None: every row has its own, U = B.
         """
-        net = self.network
-        out = out or Activations.empty(len(target), self.width, history.device, len(history))
-        torch.add(self.first_layer.seen(history), net.siamese_bias, out=out.seen).relu_()
+        out = out or Activations.empty(len(target), self.width, history.device, len(history), self.dtype)
+        torch.add(self.first_layer.seen(history), self.siamese_bias, out=out.seen).relu_()
         if history_of is None:
             torch.addmm(self._target_terms(target), out.seen, self.fusion_in, out=out.fused).relu_()
         else:
@@ -157,17 +181,26 @@ class LookupNetwork:
         return out
 
     @torch.no_grad()
+    def judged(self, history: Tensor, target: Tensor, rows_per_scene: Sequence[int]) -> tuple[Tensor, Tensor]:
+        """Action scores (B, A) and values (B,) of rows that are not learnt from; arguments as in `forward`."""
+        padding = Padding.to_multiples(self.row_step, rows_per_scene, target.device)
+        kept = self.forward(history[padding.rows], target[padding.rows], padding.rows_per_scene)
+        return kept.scores[padding.place], kept.value[padding.place]
+
+    @torch.no_grad()
     def start_values(self, state: Tensor, target: Tensor, rows_per_scene: Sequence[int]) -> Tensor:
         """Values (B,) of standing in states (B,) int64 at the start of an episode; other arguments as in `forward`.
 
         A start's history is one pose, so the observation branch is computed once a state, not once a row.
         """
-        out = Activations.empty(len(state), self.width, state.device)
+        padding = Padding.to_multiples(self.row_step, rows_per_scene, state.device)
+        out = Activations.empty(len(padding.rows), self.width, state.device, dtype=self.dtype)
         sums, row = self.first_layer.starts(state)
-        seen = sums.add_(self.network.siamese_bias).relu_()
+        seen = sums.add_(self.siamese_bias).relu_()
+        row, target = row[padding.rows], target[padding.rows]
         torch.add((seen @ self.fusion_in)[row], self._target_terms(target), out=out.fused).relu_()
-        self._forward_scenes(rows_per_scene, out)
-        return out.value
+        self._forward_scenes(padding.rows_per_scene, out)
+        return out.value[padding.place]
 
     def _forward_scenes(self, rows_per_scene: Sequence[int], out: Activations) -> None:
         """The scenes' own layers, from `fused` on."""
@@ -175,8 +208,9 @@ class LookupNetwork:
         for head, count in enumerate(self._rows_per_head(rows_per_scene)):
             if count:
                 part = out.rows(first, first + count)
-                torch.addmm(net.scene_bias[head], part.fused, self.scene_in[head], out=part.special).relu_()
-                torch.addmm(net.output_bias[head], part.special, net.output_weight[head].T, out=part.output)
+                torch.addmm(self.scene_bias[head], part.fused, self.scene_in[head], out=part.special).relu_()
+                special = part.special.to(part.output.dtype)
+                torch.addmm(net.output_bias[head], special, net.output_weight[head].T, out=part.output)
             first += count
 
     @torch.no_grad()
@@ -197,17 +231,18 @@ class LookupNetwork:
         grad_fused, spare = self._work(2, len(target))
         self._backward_scenes(rows_per_scene, kept, grad_output, spare, grad_fused)
         _relu_backward_(grad_fused, kept.fused)
-        torch.sum(grad_fused, 0, out=grad_of(net.fusion_bias))
         grad_observed = grad_fused if history_of is None else sum_ascending(grad_fused, history_of, len(history))
-        torch.mm(grad_observed.T, kept.seen, out=grad_of(net.fusion_weight)[0])
+        multiply(grad_observed.T, kept.seen, out=grad_of(net.fusion_weight)[0])
         goals = self.all_targets if len(self.known) <= FEW_TARGETS else target.unique()
-        wanted, grad_term = self.wanted[goals], self._sum_by_target(target, grad_fused)[goals]  # (M, H) or fewer
+        wanted = self.wanted[goals]  # (M, H) or fewer
+        grad_term = self._sum_by_target(target, grad_fused)[goals].to(wanted.dtype)
+        torch.sum(grad_term, 0, out=grad_of(net.fusion_bias))
         torch.mm(grad_term.T, wanted, out=grad_of(net.fusion_weight)[1])
         grad_wanted = torch.zeros_like(self.wanted)
         grad_wanted[goals] = _relu_backward_(grad_term @ net.fusion_weight[1], wanted)
-        grad_seen = torch.mm(grad_observed, net.fusion_weight[0], out=spare[: len(history)])
+        grad_seen = torch.mm(grad_observed, self.fusion_weight, out=spare[: len(history)])
         _relu_backward_(grad_seen, kept.seen)
-        torch.sum(grad_seen, 0, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
+        add_up(grad_seen, out=grad_of(net.siamese_bias)).add_(grad_wanted.sum(0))
         self.first_layer.add(history, grad_seen, grad_wanted, begin=not self.batches)
         self.batches += 1
 
@@ -223,7 +258,7 @@ class LookupNetwork:
     def _work(self, blocks: int, rows: int) -> list[Tensor]:
         """Memory for some (rows, H) blocks, kept between calls: fresh pages cost more than the arithmetic."""
         if len(self.workspace) < blocks * rows:
-            self.workspace = torch.empty(blocks * rows, self.width, device=self.target_state.device)
+            self.workspace = self.workspace.new_empty(blocks * rows, self.width)
         return list(self.workspace[: blocks * rows].view(blocks, rows, self.width))
 
     def _backward_scenes(
@@ -239,14 +274,14 @@ class LookupNetwork:
         first = 0
         for head, count in enumerate(self._rows_per_head(rows_per_scene)):
             rows = slice(first, first + count)
-            grad_out = grad_output[rows]
-            torch.mm(grad_out.T, kept.special[rows], out=grad_of(net.output_weight)[head])
-            torch.sum(grad_out, 0, out=grad_of(net.output_bias)[head])
-            torch.mm(grad_out, net.output_weight[head], out=grad_special[rows])
+            add_up(grad_output[rows], out=grad_of(net.output_bias)[head])
+            grad_out = grad_output[rows].to(self.dtype)
+            multiply(grad_out.T, kept.special[rows], out=grad_of(net.output_weight)[head])
+            torch.mm(grad_out, self.output_weight[head], out=grad_special[rows])
             _relu_backward_(grad_special[rows], kept.special[rows])
-            torch.mm(grad_special[rows].T, kept.fused[rows], out=grad_of(net.scene_weight)[head])
-            torch.sum(grad_special[rows], 0, out=grad_of(net.scene_bias)[head])
-            torch.mm(grad_special[rows], net.scene_weight[head], out=grad_fused[rows])
+            multiply(grad_special[rows].T, kept.fused[rows], out=grad_of(net.scene_weight)[head])
+            add_up(grad_special[rows], out=grad_of(net.scene_bias)[head])
+            torch.mm(grad_special[rows], self.scene_weight[head], out=grad_fused[rows])
             first += count
 
     def _rows_per_head(self, rows_per_scene: Sequence[int]) -> Sequence[int]:
@@ -263,9 +298,9 @@ class LookupNetwork:
     def _know(self, targets: Tensor) -> None:
         """Compute the target branch of targets (U,) int64."""
         net = self.network
-        wanted = self.first_layer.wanted(targets).add_(net.siamese_bias).relu_()
+        wanted = self.first_layer.wanted(targets).to(self.wanted.dtype).add_(net.siamese_bias).relu_()
         self.wanted[targets] = wanted
-        self.target_term[targets] = torch.addmm(net.fusion_bias, wanted, net.fusion_weight[1].T)
+        self.target_term[targets] = torch.addmm(net.fusion_bias, wanted, net.fusion_weight[1].T).to(self.dtype)
         self.known[targets] = True
 
     def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:

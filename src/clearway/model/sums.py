@@ -1,4 +1,4 @@
-"""Sums of rows by what they belong to."""
+"""Sums of rows, by what they belong to or all of them, and products; results may have another dtype."""
 
 from __future__ import annotations
 
@@ -15,3 +15,16 @@ def sum_ascending(rows: Tensor, index: Tensor, count: int) -> Tensor:
 def sum_listed(rows: Tensor, listed: Tensor, counts: Tensor) -> Tensor:
     """Rows (B, H) named by `listed` (L,) int64, added up in runs of `counts` (M,) int64: (M, H)."""
     return embedding_bag(listed, rows, counts.cumsum(0) - counts, mode="sum")
+
+
+def add_up(rows: Tensor, out: Tensor) -> Tensor:
+    """Write the sum of all rows (B, H) to `out` (H,), added up in its dtype."""
+    return torch.sum(rows, 0, dtype=out.dtype, out=out)
+
+
+def multiply(left: Tensor, right: Tensor, out: Tensor) -> None:
+    """Write the matrix product of two matrices of one dtype to `out`, of any."""
+    if out.dtype == left.dtype:
+        torch.mm(left, right, out=out)
+    else:
+        out.copy_(left @ right)
