@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from clearway.errors import RunError
+from clearway.learn import trainer as trainer_module
 from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
 from clearway.learn.losses import Batch, merged
 from clearway.learn.rollout import Rollout
@@ -292,3 +293,23 @@ def test_one_head_learns_for_all_scenes() -> None:
     trainer.update()
     assert trainer.network.scene_weight.shape == (1, 16, 16)
     assert not torch.equal(trainer.network.scene_weight, before)
+
+
+def test_bfloat16_factors_learn_nearly_the_same_and_leave_nothing_of_it_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On any processor: one without instructions for it takes longer."""
+    learner = small_learner(epochs=2, minibatches=2, step_limit=200)
+    exact = small_trainer(replace(learner, matmul_precision="highest"))
+    monkeypatch.setattr(trainer_module, "factor_dtype", lambda precision, device: torch.bfloat16)
+    rounded = small_trainer(learner)
+    assert rounded.lookup.dtype == torch.bfloat16
+    for _ in range(2):
+        expected, found = exact.update(), rounded.update()
+        assert found.hindsight_rows > 0
+        assert found.loss == pytest.approx(expected.loss, abs=0.02)
+        assert found.gradient_norm == pytest.approx(expected.gradient_norm, rel=0.1)
+    for name, parameter in rounded.network.named_parameters():
+        moved = parameter - exact.network.get_parameter(name)
+        assert 0 < moved.abs().max() < 0.01, name
+    assert {tensor.dtype for tensor in rounded.tensors().values()} <= {torch.float32, torch.int64, torch.bool}
