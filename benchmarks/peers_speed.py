@@ -14,10 +14,10 @@ from scene_sets import ON_PREPARED, world_of
 from stable_baselines3 import A2C
 from throughput import ENDLESS
 
+from clearway.choices import MatmulPrecision
 from clearway.envs.world import World
 from clearway.learn.config import Learner
 from clearway.learn.trainer import Trainer
-from clearway.model.precision import MatmulPrecision
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
 

@@ -22,3 +22,6 @@ LearnerName = Literal["published", "published-a3c", "default"]
 
 FeatureStore = Literal["memory", "float16", "mapped"]
 """See `clearway.envs.feature_store`."""
+
+MatmulPrecision = Literal["highest", "medium"]
+"""See `clearway.model.precision`."""

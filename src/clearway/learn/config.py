@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
+from clearway.choices import MatmulPrecision
 from clearway.errors import RunError
-from clearway.model.precision import MatmulPrecision
 
 Algorithm = Literal["ppo", "a2c", "a3c"]
 PresetName = Literal["default", "paper", "paper-a3c"]

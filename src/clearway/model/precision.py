@@ -1,13 +1,14 @@
-"""In which number format matrix products take their factors while learning."""
+"""In which number format matrix products take their factors while learning.
+
+The words are those of PyTorch's `set_float32_matmul_precision`: with `highest` factors are float32, with `medium` they
+may be rounded to bfloat16.
+"""
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
 
-MatmulPrecision = Literal["highest", "medium"]
-"""PyTorch's words for float32 factors, and for factors that may be rounded to bfloat16."""
+from clearway.choices import MatmulPrecision
 
 BFLOAT16_INSTRUCTIONS = ("amx_bf16", "avx512_bf16")  # of processors, as PyTorch names them
 
