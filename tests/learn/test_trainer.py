@@ -287,6 +287,13 @@ def test_projecting_visited_states_alone_changes_nothing_but_rounding(
         torch.testing.assert_close(parameter, everywhere.network.get_parameter(name), rtol=1e-3, atol=1e-4)
 
 
+@pytest.mark.parametrize(("steps", "layer"), [(2, VisitedStates), (3, AllStates)])
+def test_batches_too_small_for_all_states_project_those_that_occur(steps: int, layer: type) -> None:
+    trainer = small_trainer(small_learner(envs=12, history_length=2, rollout_steps=steps))
+    assert 12 * (2 + 2) < trainer.world.state_count <= 12 * (2 + 3)
+    assert isinstance(trainer.lookup.first_layer, layer)
+
+
 def test_one_head_learns_for_all_scenes() -> None:
     trainer = small_trainer(small_learner(heads="shared"))
     before = trainer.network.scene_weight.clone()

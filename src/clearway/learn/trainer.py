@@ -104,7 +104,13 @@ class Trainer:
         shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
         dtype = factor_dtype(learner.matmul_precision, device)
-        self.lookup = LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state, dtype)
+        self.lookup = LookupNetwork(
+            self.network,
+            prepared_features(world, self.feature_map),
+            world.target_state,
+            dtype,
+            most_seen=self.env_count * (learner.history_length + learner.rollout_steps),
+        )
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         self.navigation = Navigation(

@@ -8,7 +8,8 @@ Features are frozen and states finite, so the first layer needs no picture twice
     dL/dW_k              gradients are added up by state (S, H), then multiplied with the features once; several
                          batches may be added up before that, as long as W_k stays what it is.
 
-The first layer is computed of all states, or in large worlds of those that occur: `first_layer`.
+The first layer is computed of all states, or in large worlds, and for small batches, of those that occur:
+`first_layer`.
 
 Nothing is approximated, apart from rounding, see `LookupNetwork`. Gradients are written by hand into `.grad`; the tests
 hold them against autograd on `network`.
@@ -98,6 +99,7 @@ class LookupNetwork:
         target_state: (M,) int64.
         dtype: of features, activations and the factors of matrix products, the parameters' by default. What is added
             up, outputs, gradients and the parameters themselves keep the parameters'.
+        most_seen: states that histories between two refreshes hold, at most; by default as many as there are.
 
     Attributes:
         row_step: numbers of rows are best multiples of it, see `padding`.
@@ -110,6 +112,7 @@ class LookupNetwork:
         features: Tensor,
         target_state: Tensor,
         dtype: torch.dtype | None = None,
+        most_seen: int | None = None,
     ) -> None:
         shape = network.shape
         assert features.shape[1] == shape.feature_count, "features do not fit the network"
@@ -118,7 +121,7 @@ class LookupNetwork:
         weight = network.siamese_weight.data
         self.dtype = dtype or weight.dtype
         self.row_step = row_step(self.dtype)
-        layer = AllStates if len(features) <= FEW_STATES else VisitedStates
+        layer = AllStates if len(features) <= min(FEW_STATES, most_seen or FEW_STATES) else VisitedStates
         self.first_layer: FirstLayer = layer(weight, features, target_state, self.dtype)
         self.workspace, self.batches = torch.empty(0, self.width, device=features.device, dtype=self.dtype), 0
         goals = len(target_state)
