@@ -96,6 +96,13 @@ def test_what_the_user_did_wrong_is_said_as_on_one_machine(tmp_path: Path) -> No
     assert not is_done(setting.out, job)
 
 
+def test_more_threads_than_any_node_has_are_refused(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    ray.init(num_cpus=2, include_dashboard=False)
+    with pytest.raises(RunError, match=r"no node .* the 3 processors .*there are 2 and .*--threads"):
+        run_jobs_on_ray(setting.out, jobs_of(setting), address="local", workers=None, threads=3, show=nothing)
+
+
 def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
     setting = small_setting(tmp_path, seeds=1)
     with pytest.raises(RunError, match=r"--ray auto: no cluster.*--ray local"):

@@ -14,6 +14,7 @@ from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.local import affordable_workers, run_jobs
 from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
+from clearway.learn.run_folder import RunFolder
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
 
@@ -90,21 +91,49 @@ def test_an_interruption_stops_all_workers_and_leaves_what_can_be_resumed(tmp_pa
     assert all(is_done(setting.out, job) for job in jobs)
 
 
+def endless_command(folder: Path) -> list[str]:
+    """`clearway reproduce` on the small rooms, too long to end by itself; runs go to the folder `out` in it."""
+    small_setting(folder)
+    words = ["--budget", "smoke", "--scenes", folder / "scenes", "--out", folder / "out", "--frames", "10000000"]
+    return [sys.executable, "-m", "clearway", "reproduce", "fig3", "--learners", "published", *map(str, words)]
+
+
+def wait_for(pattern: str, folder: Path) -> Path:
+    """The first file in a folder that matches, once there is one."""
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
+        for path in folder.glob(pattern):
+            return path
+        time.sleep(0.02)
+    raise TimeoutError(f"no {pattern} in {folder}")
+
+
 def test_ctrl_c_is_said_once_and_not_by_workers(tmp_path: Path) -> None:
     """The terminal sends SIGINT to every process of the group, also to workers that are still importing."""
-    words = ["--budget", "smoke", "--scenes", tmp_path / "scenes", "--out", tmp_path / "out", "--frames", "1000000"]
-    small_setting(tmp_path)
-    command = [sys.executable, "-m", "clearway", "reproduce", "fig3", *map(str, words)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, start_new_session=True, text=True) as process:
-        runs = tmp_path / "out" / "reproduction.json"
-        while not runs.exists():
-            time.sleep(0.02)
+    with subprocess.Popen(
+        endless_command(tmp_path), stderr=subprocess.PIPE, start_new_session=True, text=True
+    ) as process:
+        wait_for("out/reproduction.json", tmp_path)
         time.sleep(0.5)  # the workers are importing by now
         os.killpg(process.pid, signal.SIGINT)
         _, said = process.communicate(timeout=120)
     assert process.returncode == 130
     assert "Traceback" not in said
     assert "interrupted" in said
+
+
+def test_a_killed_command_leaves_no_worker_that_keeps_its_runs_locked(tmp_path: Path) -> None:
+    with subprocess.Popen(endless_command(tmp_path), stderr=subprocess.PIPE) as process:
+        metrics = wait_for("out/runs/*/metrics.jsonl", tmp_path)
+        process.kill()
+    end = time.monotonic() + 10  # alone it takes a moment
+    while True:
+        try:
+            with RunFolder(metrics.parent).held():
+                return
+        except RunError:
+            assert time.monotonic() < end
+            time.sleep(0.05)
 
 
 def test_memory_limits_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,11 +39,13 @@ def run_jobs_on_ray(
         show: called now and then with those under way.
 
     Raises:
-        ClearwayError: Ray is not installed, the cluster cannot be reached, or a job failed.
+        ClearwayError: Ray is not installed, the cluster cannot be reached or has no node that is large enough, or a job
+            failed.
     """
     if not jobs:
         return
     with connected(address, None if workers is None else workers * threads) as ray:
+        _check_room(ray, threads)
         # a fresh process a job, as on one machine; a job whose worker or node dies is begun again by Ray
         options = {"num_cpus": threads, "max_calls": 1, "max_retries": ATTEMPTS - 1, "memory": JOB_BYTES}
         remote = ray.remote(**options)(do)
@@ -60,6 +62,21 @@ def run_jobs_on_ray(
                 ray.cancel(reference, force=False)  # training saves a checkpoint before it ends
             if waiting:
                 ray.wait(list(waiting), num_returns=len(waiting), timeout=GRACE_S)
+
+
+def _check_room(ray: Any, threads: int) -> None:
+    """Refuse what Ray would wait for without a word.
+
+    Raises:
+        RunError: no node has the processors and the memory for a job.
+    """
+    nodes = [node["Resources"] for node in ray.nodes() if node["Alive"]]
+    if not any(node.get("CPU", 0) >= threads and node.get("memory", 0) >= JOB_BYTES for node in nodes):
+        found = "; ".join(f"{node.get('CPU', 0):g} and {node.get('memory', 0) / 1e9:.1f} GB" for node in nodes)
+        raise RunError(
+            f"no node of the Ray cluster has the {threads} processors and {JOB_BYTES / 1e9:g} GB of memory that a run "
+            f"takes (there are {found}). Give fewer --threads, or add a larger node"
+        )
 
 
 def _last_sign(out: Path, job: Job) -> int | None:

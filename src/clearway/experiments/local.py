@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from clearway.children import signals_held
+from clearway.children import end_with_parent, signals_held
 from clearway.errors import ClearwayError, RunError
 from clearway.experiments.job import do
 from clearway.experiments.plan import Job
@@ -89,6 +89,7 @@ def _started(out: Path, job: Job, threads: int) -> _Running:
 
 def _work(out: Path, job: Job, threads: int, complaint: Connection) -> None:
     """Do a job in this process; what the user did wrong goes to the parent as text."""
+    end_with_parent()
     os.environ["OMP_NUM_THREADS"] = str(threads)
     try:
         do(out, job, threads)

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from clearway.children import end_with_parent
 from clearway.errors import EncoderError
 from clearway.perception.encoder import Encoder
 from clearway.ray_cluster import connected, result
@@ -53,7 +54,7 @@ def encode_batch(load: Loader, record: EncoderRecord, pictures: Observations, fi
 def processes(workers: int) -> Iterator[Encode]:
     """Encoding in so many processes, which end on the way out."""
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, context, initializer=_leave_interrupts_to_parent)
+    pool = ProcessPoolExecutor(workers, context, initializer=_follow_parent)
 
     def encode(load: Loader, record: EncoderRecord, pictures: Observations, batch: int) -> Iterator[np.ndarray]:
         jobs = [pool.submit(encode_batch, load, record, *part) for part in batches(pictures, batch)]
@@ -92,5 +93,7 @@ def _died(reason: str) -> EncoderError:
     return EncoderError(f"an encoding worker or its node died ({reason}). Run the command again")
 
 
-def _leave_interrupts_to_parent() -> None:
+def _follow_parent() -> None:
+    """Leave interrupts to the parent, and end when it does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
