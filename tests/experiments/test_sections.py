@@ -5,9 +5,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from clearway.experiments import analysis, fig3, hard
+from clearway.choices import ExperimentName
+from clearway.experiments import analysis, fig3, fig6, generalisation, hard
 from clearway.experiments.analysis import pareto_front
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.job import do, episodes_of, is_done
@@ -52,6 +54,21 @@ def test_before_any_run_every_section_says_what_is_missing(tmp_path: Path) -> No
         section = experiment.section(empty)
         assert section.missing
         assert all(claim.verdict == "undecided" for claim in section.claims)
+
+
+def test_trials_on_unseen_targets_end_when_success_is_settled(
+    setting: Setting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def caps(*names: ExperimentName) -> set[int]:
+        patient = replace(setting, budget=replace(setting.budget, step_cap=10_000))
+        return {trial.step_cap for job in planned(patient, names) for trial in job.trials}
+
+    assert caps("table1", "table2", "fig4") == {10_000}
+    assert caps("fig5", "fig6") == {500}
+    monkeypatch.setattr(generalisation, "SC_STEPS", 3)
+    held_out = fig6.held_out_targets(setting)
+    paths = [scene.distances_to(np.array(own)) for scene, own in zip(setting.scenes, held_out, strict=True)]
+    assert caps("fig6") == {4 * max(int(steps.max()) for steps in paths)}  # four times the shortest path takes longer
 
 
 def test_nothing_is_missing_in_the_end(sections: dict[str, Section]) -> None:

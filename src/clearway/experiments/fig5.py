@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from clearway.experiments.generalisation import HEADINGS, NOTE, Tried, line, together
-from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.generalisation import HEADINGS, NOTE, Tried, line, together, tried
+from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, random_walk
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
@@ -39,12 +39,12 @@ def section(setting: Setting) -> Section:
         }
         found[None, RANDOM_WALK] = random_walk(world, groups[0].trial)
         for kind, values in found.items():
-            tried = Tried(values, target_scene)
-            kinds.setdefault(kind, []).append(tried)
-            rows.append(_row(steps, kind, tried))
+            figures = Tried(values, target_scene)
+            kinds.setdefault(kind, []).append(figures)
+            rows.append(_row(steps, kind, figures))
         missing.update(dict.fromkeys(all_missing(groups, setting.out)))
     averages = {kind: together(parts) for kind, parts in kinds.items()}
-    rows += [_row(AVERAGE, kind, tried) for kind, tried in averages.items()]
+    rows += [_row(AVERAGE, kind, figures) for kind, figures in averages.items()]
     lines = [
         line(", ".join(filter(None, kind)), list(zip(DISTANCES, parts, strict=True))) for kind, parts in kinds.items()
     ]
@@ -64,9 +64,9 @@ def section(setting: Setting) -> Section:
     )
 
 
-def _row(steps: Value, kind: tuple[str | None, str], tried: Tried) -> tuple[Value, ...]:
+def _row(steps: Value, kind: tuple[str | None, str], figures: Tried) -> tuple[Value, ...]:
     learner, agent = kind
-    return (steps, learner, agent, None if learner is None else len(tried.scores), *tried.cells())
+    return (steps, learner, agent, None if learner is None else len(figures.scores), *figures.cells())
 
 
 def _claims(setting: Setting, averages: Mapping[tuple[str | None, str], Tried]) -> list[Claim]:
@@ -86,7 +86,7 @@ def _known(lines: list[Series | None]) -> tuple[Series, ...]:
 
 
 def _groups(setting: Setting, steps: int) -> list[Group]:
-    return compared(setting, PAIR, tried_on=unseen_targets(setting, steps))
+    return tried(setting, PAIR, unseen_targets(setting, steps))
 
 
 def unseen_targets(setting: Setting, steps: int) -> TargetSets:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from clearway.experiments.generalisation import HEADINGS, NOTE, Tried, line
-from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, compared, random_walk
+from clearway.experiments.generalisation import HEADINGS, NOTE, Tried, line, tried
+from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, random_walk
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
@@ -25,16 +25,16 @@ def section(setting: Setting) -> Section:
     held_out = held_out_targets(setting)
     world = setting.world(held_out)
     target_scene = world.target_scene.numpy()
-    walked = Tried(random_walk(world, setting.trial(held_out)), target_scene)
+    walked = Tried(random_walk(world, _groups(setting, TRAINED[0])[0].trial), target_scene)
     rows: list[tuple[Value, ...]] = []
     points: dict[str, list[tuple[float, Tried]]] = {RANDOM_WALK: []}
     missing: dict[str, None] = {}
     for count in TRAINED:
         for group in _groups(setting, count):
             values = group.scores(setting.out, world.target_count)
-            tried = Tried(values, target_scene)
-            rows.append((count, group.learner, len(values), *tried.cells()))
-            points.setdefault(group.learner, []).append((count, tried))
+            figures = Tried(values, target_scene)
+            rows.append((count, group.learner, len(values), *figures.cells()))
+            points.setdefault(group.learner, []).append((count, figures))
             missing.update(dict.fromkeys(group.missing(setting.out)))
         points[RANDOM_WALK].append((count, walked))
     rows.append((None, RANDOM_WALK, None, *walked.cells()))
@@ -65,7 +65,7 @@ def _groups(setting: Setting, count: int) -> list[Group]:
     trained: TargetSets = tuple(
         tuple(sorted(target_order(scene, ORDER_SEED)[HELD_OUT : HELD_OUT + count])) for scene in setting.scenes
     )
-    return compared(setting, (COLLISION_AWARE,), targets=trained, tried_on=held_out_targets(setting))
+    return tried(setting, (COLLISION_AWARE,), held_out_targets(setting), trained=trained)
 
 
 def held_out_targets(setting: Setting) -> TargetSets:

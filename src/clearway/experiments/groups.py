@@ -100,6 +100,7 @@ def compared(
     tried_on: TargetSets | None = None,
     frames_factor: float = 1,
     halfway: bool = False,
+    step_cap: int | None = None,
 ) -> list[Group]:
     """A group for each learner and reward.
 
@@ -110,12 +111,13 @@ def compared(
         tried_on: to be tried on; None: those trained on.
         frames_factor: multiplies the learners' frames.
         halfway: try the agents halfway through their training, not in the end.
+        step_cap: end the trial's episodes sooner than the budget does.
     """
     found = []
     for name, learner in setting.learners.items():
         for reward in rewards:
             runs = setting.runs(learner, reward, targets, frames_factor)
-            trial = setting.trial(targets if tried_on is None else tried_on, halfway=halfway)
+            trial = setting.trial(targets if tried_on is None else tried_on, halfway=halfway, step_cap=step_cap)
             found.append(Group(name, reward.name, runs, trial))
     return found
 

@@ -69,10 +69,13 @@ class Setting:
         own = self.targets if targets is None else targets
         return tuple(PlannedRun(self.files, own, reward, longer, seed) for seed in self.seeds)
 
-    def trial(self, targets: TargetSets | None = None, *, halfway: bool = False) -> Trial:
-        """The protocol on some targets, the paper's by default; of the agent halfway, or in the end."""
-        own = self.targets if targets is None else targets
-        return Trial(own, halfway, self.budget.episodes_per_target, self.budget.step_cap)
+    def trial(self, targets: TargetSets | None = None, *, halfway: bool = False, step_cap: int | None = None) -> Trial:
+        """The protocol on some targets, the paper's by default; of the agent halfway, or in the end.
+
+        `step_cap` ends episodes sooner than the budget does.
+        """
+        own, cap = self.targets if targets is None else targets, self.budget.step_cap
+        return Trial(own, halfway, self.budget.episodes_per_target, cap if step_cap is None else min(cap, step_cap))
 
 
 def prepare(
