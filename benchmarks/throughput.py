@@ -8,12 +8,14 @@ hits all alike. Worlds are made up on the spot: four random floor plans with as 
 (180 + 408 + 468 + 676), 2048 features a state, 20 targets; the network has the paper's size.
 
 What is counted. A multiplication with its addition is 2 FLOP; only matrix products that the algorithm needs count, so
-the share of the peak falls with every row looked up, action drawn and parameter stepped. With S states, F features,
-K history, H width, M targets, O = 5 outputs, one update of `histories` histories in `rows` rows needs
+the share of the peak falls with every row looked up, action drawn and parameter stepped. With S states projected, F
+features, K history, H width, M targets, O = 5 outputs, one update of `histories` histories in `rows` rows needs
 
-    tables      2 S F K H + 2 M H H                   project all states; targets through their half of fusion
+    tables      2 S F K H + 2 M H H                   project states; targets through their half of fusion
     forward     histories 2 H H + rows (2 H H + 2 H O)    observation half of fusion; scene layer, outputs
     backward    2 x forward + 2 S F K H + 4 M H H     dX and dW of those; dW of the siamese layer; targets
+
+All states are projected, but where a batch is too small to hold them all, those that occur in it.
 
 A2C: tables once, forward for the rollout's rows and the values after its last step, backward once (the rollout's
 activations are used again). PPO: the same forward, then forward and backward for every minibatch, with the rows that
@@ -60,6 +62,7 @@ from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.trainer import Trainer, Update
 from clearway.model.feature_map import FeatureMap
+from clearway.model.first_layer import VisitedStates
 from clearway.model.network import OUTPUTS
 from clearway.model.precision import factor_dtype
 from clearway.reward import COLLISION_AWARE
@@ -264,10 +267,10 @@ class Case:
         return statistics.median(rates), rates[0], rates[-1]
 
 
-def needed_gflop(world: World, learner: Learner, updates: Sequence[Update]) -> float:
-    """GFLOP of one update, by the formulas above; mean over some updates."""
-    width, targets = learner.width, world.target_count
-    projection = 2 * world.state_count * FEATURES * learner.history_length * width
+def needed_gflop(targets: int, states: float, learner: Learner, updates: Sequence[Update]) -> float:
+    """GFLOP of one update, by the formulas above; mean over some updates that projected so many states."""
+    width = learner.width
+    projection = 2 * states * FEATURES * learner.history_length * width
     tables = projection + 2 * targets * width * width
     of_history, of_row = 2 * width * width, 2 * width * width + 2 * width * OUTPUTS
     rows = learner.envs * learner.rollout_steps
@@ -290,12 +293,15 @@ def fast_case(world: World, learner: Learner) -> Case:
     """The learner of the package."""
     trainer = Trainer(world, learner, COLLISION_AWARE, seed=0)
     updates: list[Update] = []
+    states: list[int] = []
 
     def update() -> None:
         updates.append(trainer.update())
+        layer = trainer.lookup.first_layer
+        states.append(layer.known if isinstance(layer, VisitedStates) else world.state_count)
 
     def gflop() -> float:
-        return needed_gflop(world, learner, updates)
+        return needed_gflop(world.target_count, statistics.fmean(states), learner, updates)
 
     dtype = trainer.lookup.dtype
     name = learner.algorithm if dtype == torch.float32 else f"{learner.algorithm} bfloat16"
