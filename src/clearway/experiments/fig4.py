@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from clearway.evaluate.across_seeds import mean_estimate
+from clearway.experiments.convergence import settling
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import run_folder
 from clearway.experiments.plan import Job
@@ -28,6 +29,7 @@ def jobs(setting: Setting) -> list[Job]:
 def section(setting: Setting) -> Section:
     """What came of it."""
     groups = _groups(setting)
+    settled, sooner = settling(setting, [group for group in groups if not group.trial.halfway])
     return Section(
         name="fig4",
         title="Speed of convergence (the paper's figure 4)",
@@ -35,9 +37,9 @@ def section(setting: Setting) -> Section:
             "The main experiment's agents tried halfway and in the end of their training; below, episodes ended during "
             "training (not every learner draws their targets evenly)."
         ),
-        tables=(_table(setting, groups),),
+        tables=(_table(setting, groups), settled),
         figures=tuple(_curves(setting, groups)),
-        claims=tuple(_claims(setting, groups)),
+        claims=(*_claims(setting, groups), *sooner),
         missing=all_missing(groups, setting.out),
     )
 

@@ -1,0 +1,74 @@
+"""When training has settled: from then on its episodes take at most twice the shortest path.
+
+A curve says it better than a figure, but curves have no interval. The mark is twice the mean shortest path of the
+targets from all starts, so it depends on scenes and targets alone. A run that has not settled by its end counts with
+all its frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from clearway.evaluate.across_seeds import mean_estimate
+from clearway.experiments.groups import Group
+from clearway.experiments.job import run_folder
+from clearway.experiments.section import Claim, ReportTable, Value
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less
+from clearway.reward import COLLISION_AWARE, SHORTEST
+
+DETOUR = 2.0
+ONE_TARGET = np.zeros(1, dtype=np.int64)  # a run has one figure, as if of one target
+
+Row = dict[str, float]
+
+
+def mark_steps(setting: Setting) -> float:
+    """Twice the mean steps of the shortest paths, over scenes, their targets and all starts."""
+    means = []
+    for scene, own in zip(setting.scenes, setting.targets, strict=True):
+        steps = scene.distances_to(np.array(own)).astype(np.float64)
+        means.append(np.nanmean(np.where(steps > 0, steps, np.nan), axis=1).mean())
+    return DETOUR * float(np.mean(means))
+
+
+def settled_row(rows: Sequence[Row], mark: float) -> Row | None:
+    """The first row of a training's metrics from which on no mean of steps lies above the mark; None: there is none."""
+    known = [row for row in rows if row["episodes"]]
+    above = [number for number, row in enumerate(known) if row["steps"] > mark]
+    first = above[-1] + 1 if above else 0
+    return known[first] if first < len(known) else None
+
+
+def settling(setting: Setting, groups: Sequence[Group]) -> tuple[ReportTable, list[Claim]]:
+    """How long each group trains until it has settled, and whether the collision-aware reward settles sooner."""
+    mark = mark_steps(setting)
+    found = {(group.learner, group.agent): _frames(setting.out, group, mark) for group in groups}
+    rows: list[tuple[Value, ...]] = []
+    for (learner, agent), (frames, settled) in found.items():
+        estimate = mean_estimate(frames, ONE_TARGET) if len(frames) else None
+        values = (None, None) if estimate is None else (estimate.value, estimate.ends)
+        rows.append((learner, agent, len(frames), settled, *values))
+    claims = []
+    for learner in dict.fromkeys(group.learner for group in groups):
+        ours, baseline = (found[learner, reward.name][0] for reward in (COLLISION_AWARE, SHORTEST))
+        text = f"{learner}: learns faster (fewer frames until training has settled)"
+        claims.append(judged_less(text, "frames until settled", ours, baseline, ONE_TARGET))
+    headings = ("learner", "agent", "seeds", "settled", "frames", "95 %")
+    note = (
+        f"Frames from which on training episodes take at most {mark:.3g} steps on average, {DETOUR:g} times the "
+        "shortest paths'. A run that never gets there counts with all its frames."
+    )
+    return ReportTable("fig4_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
+
+
+def _frames(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
+    """Frames until each complete run of a group had settled (R, 1), and how many have."""
+    missing = group.missing(out)
+    runs = [run for run in group.runs if run.name not in missing]
+    rows = [settled_row(run_folder(out, run).metrics(), mark) for run in runs]
+    frames = [run.learner.frames if row is None else row["frames"] for run, row in zip(runs, rows, strict=True)]
+    return np.array(frames, dtype=np.float64).reshape(-1, 1), sum(row is not None for row in rows)
