@@ -1,18 +1,27 @@
 """Statistics over training seeds, so that no claim rests on one run (Agarwal et al., NeurIPS 2021).
 
-A score is one figure of one target from one seed. Intervals are stratified bootstraps: seeds are redrawn for every
-target by itself, since targets are the fixed tasks and seeds the chance.
+A score is one figure of one target from one run. Targets are the fixed tasks, runs the chance. One run learns all its
+targets together, so runs are redrawn whole; redrawing every target's runs by themselves would take 5 runs of 5 targets
+for 25 independent ones.
 
-Axis letters: R seeds, M targets, C scenes, B resamples.
+Intervals are expanded percentile intervals of the bootstrap (Hesterberg, The American Statistician 69(4), 2015): a
+percentile interval of few runs is too narrow, so its level is raised as Student's t and n / (n - 1) ask for. Of
+5 runs with normal scores it holds the mean in 92 % of all cases instead of 83 %, the difference of two means in 97 %
+instead of 87 %. Two runs say next to nothing: 51 and 66 %.
+
+Axis letters: R runs, one a seed, M targets, C scenes, B resamples.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.evaluate.bootstrap import RESAMPLES, intervals
+from clearway.evaluate.bootstrap import LEVEL
+
+RESAMPLES = 20_000
 
 
 @dataclass(frozen=True)
@@ -40,26 +49,26 @@ class Estimate:
 
 
 def mean_estimate(scores: np.ndarray, target_scene: np.ndarray, *, resamples: int = RESAMPLES) -> Estimate:
-    """The plain mean over scenes of the means over their targets and all seeds.
+    """The plain mean over scenes of the means over their targets and all runs.
 
     Args:
         scores: (R, M).
         target_scene: (M,) int, scene of each target.
         resamples: B.
     """
-    weights = _weights(target_scene)
-    drawn = _resampled(scores, resamples, np.random.default_rng(0)).mean(1) @ weights
-    return Estimate(float(scores.mean(0) @ weights), _ends(drawn, len(scores)))
+    own = scores @ _weights(target_scene)
+    return Estimate(float(own.mean()), _interval(own[_redrawn(len(own), resamples, 0)].mean(1), len(own)))
 
 
 def difference(
     first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, *, resamples: int = RESAMPLES
 ) -> Estimate:
     """By how much the mean of the first kind exceeds that of the second, see `mean_estimate`; arguments as below."""
-    rng, weights = np.random.default_rng(0), _weights(target_scene)
-    drawn = [_resampled(scores, resamples, rng).mean(1) @ weights for scores in (first, second)]
-    value = float((first.mean(0) - second.mean(0)) @ weights)
-    return Estimate(value, _ends(drawn[0] - drawn[1], min(len(first), len(second))))
+    weights = _weights(target_scene)
+    own = [scores @ weights for scores in (first, second)]
+    means = [runs[_redrawn(len(runs), resamples, seed)].mean(1) for seed, runs in enumerate(own)]
+    value = float(own[0].mean() - own[1].mean())
+    return Estimate(value, _interval(means[0] - means[1], min(len(first), len(second))))
 
 
 def probability_of_less(
@@ -67,7 +76,7 @@ def probability_of_less(
 ) -> Estimate:
     """The probability that a run of the first kind scores less than one of the second, a tie counting half.
 
-    Mean over scenes of the means over targets of P(first < second) + P(first = second) / 2 over all pairs of seeds.
+    Mean over scenes of the means over targets of P(first < second) + P(first = second) / 2 over all pairs of runs.
 
     Args:
         first: (R, M).
@@ -75,23 +84,16 @@ def probability_of_less(
         target_scene: (M,) int.
         resamples: B.
     """
-    rng, weights = np.random.default_rng(0), _weights(target_scene)
-    drawn = _less(_resampled(first, resamples, rng), _resampled(second, resamples, rng)) @ weights
-    value = float((_less(first[None], second[None]) @ weights)[0])
-    return Estimate(value, _ends(drawn, min(len(first), len(second))))
+    less = 0.5 + np.sign(second[None] - first[:, None]) / 2  # (R, R', M)
+    pairs = less @ _weights(target_scene)
+    rows, columns = (_redrawn(len(runs), resamples, seed) for seed, runs in enumerate((first, second)))
+    drawn = pairs[rows[:, :, None], columns[:, None, :]].mean((1, 2))
+    return Estimate(float(pairs.mean()), _interval(drawn, min(len(first), len(second))))
 
 
-def _less(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(B, R, M), (B, R', M) -> (B, M)."""
-    pairs = np.sign(second[:, None] - first[:, :, None])  # (B, R, R', M)
-    return (0.5 + pairs / 2).mean((1, 2))
-
-
-def _resampled(scores: np.ndarray, resamples: int, rng: np.random.Generator) -> np.ndarray:
-    """(R, M) -> (B, R, M), seeds redrawn target by target."""
-    seeds, targets = scores.shape
-    index = rng.integers(seeds, size=(resamples, seeds, targets))
-    return scores[index, np.arange(targets)]
+def _redrawn(runs: int, resamples: int, seed: int) -> np.ndarray:
+    """(B, R) int: which runs each resample holds."""
+    return np.random.default_rng(seed).integers(runs, size=(resamples, runs))
 
 
 def _weights(target_scene: np.ndarray) -> np.ndarray:
@@ -100,8 +102,13 @@ def _weights(target_scene: np.ndarray) -> np.ndarray:
     return 1 / (count[target_scene] * np.count_nonzero(count))
 
 
-def _ends(drawn: np.ndarray, seeds: int) -> tuple[float, float] | None:
-    if seeds < 2:
+def _interval(drawn: np.ndarray, runs: int) -> tuple[float, float] | None:
+    """The expanded percentile interval of a bootstrap's means (B,) from so many runs; None where there is one."""
+    if runs < 2:
         return None
-    low, high = intervals(drawn)
+    from scipy import special
+
+    student = special.stdtrit(runs - 1, (1 + LEVEL) / 2)
+    tail = special.ndtr(-math.sqrt(runs / (runs - 1)) * student)
+    low, high = np.quantile(drawn, [tail, 1 - tail])
     return float(low), float(high)
