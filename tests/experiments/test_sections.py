@@ -208,8 +208,10 @@ def test_the_report_is_complete_and_stands_alone(
     markdown = (tmp_path / MARKDOWN).read_text(encoding="utf-8")
     content = json.loads((tmp_path / JSON).read_text(encoding="utf-8"))
     assert [section["name"] for section in content["sections"]] == list(sections)
+    summary = html[: html.index('<section id="table1">')], markdown[: markdown.index(sections["table1"].title + "\n\n")]
     for section in sections.values():
         assert section.title in markdown
+        assert all(claim.text in text for claim in section.claims for text in summary)
         for table in section.tables:
             with (tmp_path / "tables" / f"{table.name}.csv").open(newline="", encoding="utf-8") as file:
                 rows = list(csv.reader(file))

@@ -83,6 +83,13 @@ def value_text(value: Value) -> str:
     return f"{value:,}" if isinstance(value, int) else value
 
 
+def _summary(sections: Sequence[Section]) -> list[ReportTable]:
+    """All verdicts at a glance; nothing where there are none."""
+    rows = tuple((claim.text, claim.verdict, section.title) for section in sections for claim in section.claims)
+    title = "What became of the paper's claims"
+    return [ReportTable("summary", title, ("claim", "verdict", "evidence in"), rows)] if rows else []
+
+
 def _verdict_rows(claims: Sequence[Claim]) -> ReportTable:
     rows = tuple((claim.text, claim.verdict, claim.evidence) for claim in claims)
     return ReportTable("claims", "Verdicts", ("claim", "verdict", "evidence"), rows)
@@ -104,6 +111,8 @@ def _folded(table: ReportTable) -> str:
 def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
     lines = [f"# {title}", ""]
     lines += [f"**{warning}**", ""] if warning else []
+    for table in _summary(sections):
+        lines += [f"## {table.title}", "", *_markdown_table(table)]
     for section in sections:
         lines += [f"## {section.title}", "", section.text, ""]
         missing = _missing_text(section)
@@ -132,7 +141,10 @@ def _markdown_table(table: ReportTable) -> list[str]:
 
 def _page(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
     parts = [f'<p class="lead warning">{escape(warning)}</p>'] if warning else []
-    body = "".join(_section(folder, section) for section in sections)
+    body = "".join(
+        [f"<section>{_table(table)}</section>" for table in _summary(sections)]
+        + [_section(folder, section) for section in sections]
+    )
     made = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts.items())
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
