@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from clearway.model import lookup as lookup_module
-from clearway.model.lookup import LookupNetwork
+from clearway.model.lookup import LookupNetwork, projects_all
 from clearway.model.network import NetworkShape, SiameseActorCritic
 
 STATES, FEATURES, WIDTH, HISTORY = 30, 11, 14, 4
@@ -43,6 +43,12 @@ def made_network(
             parameter.mul_(2)
     features = torch.randn(STATES, FEATURES, generator=torch.Generator().manual_seed(seed + 100))
     return network, LookupNetwork(network, features, torch.tensor(TARGET_STATE), dtype)
+
+
+def test_a_gpu_projects_all_states_unless_they_are_many() -> None:
+    few, cpu, gpu = lookup_module.FEW_STATES, torch.device("cpu"), torch.device("cuda")
+    cases = [(few, None, cpu), (few, few, cpu), (few, few - 1, cpu), (few, few - 1, gpu), (few + 1, few + 2, gpu)]
+    assert [projects_all(*case) for case in cases] == [True, True, False, True, False]
 
 
 def made_rows(rows_per_scene: tuple[int, ...], any_target: bool, seed: int = 0) -> tuple[Tensor, Tensor, Tensor]:

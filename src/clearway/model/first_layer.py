@@ -2,7 +2,7 @@
 
 Two ways to the same numbers, up to rounding. `AllStates` projects every state whenever the weight moves: the less work
 the fewer states there are. `VisitedStates` projects the states that occur: memory and work follow the batch, not the
-world. `LookupNetwork` takes the second for worlds of more states than a batch can hold, or than `FEW_STATES`.
+world. Which one is taken says `lookup.projects_all`.
 
 Axis letters: B rows, K history, S states, F features, H width, M targets, U states that occur.
 """

@@ -90,6 +90,16 @@ class Activations:
         )
 
 
+def projects_all(states: int, most_seen: int | None, device: torch.device) -> bool:
+    """Whether the first layer is computed of all states, or of those that occur, of which there are `most_seen`.
+
+    On a GPU all of them, unless they are many: it would have to wait until the host knows which occur.
+    """
+    if device.type != "cpu" or most_seen is None:
+        return states <= FEW_STATES
+    return states <= min(FEW_STATES, most_seen)
+
+
 class LookupNetwork:
     """`SiameseActorCritic` on the states of a world.
 
@@ -121,7 +131,7 @@ class LookupNetwork:
         weight = network.siamese_weight.data
         self.dtype = dtype or weight.dtype
         self.row_step = row_step(self.dtype)
-        layer = AllStates if len(features) <= min(FEW_STATES, most_seen or FEW_STATES) else VisitedStates
+        layer = AllStates if projects_all(len(features), most_seen, features.device) else VisitedStates
         self.first_layer: FirstLayer = layer(weight, features, target_state, self.dtype)
         self.workspace, self.batches = torch.empty(0, self.width, device=features.device, dtype=self.dtype), 0
         goals = len(target_state)
