@@ -50,6 +50,24 @@ def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
         assert (tables[0].collisions == tables[1].collisions).all()
 
 
+def test_a_process_does_one_job_after_the_other_until_it_dies(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path, seeds=3)
+    jobs = jobs_of(setting)
+    seen: list[tuple[str, int]] = []
+
+    def kill_in_the_third(under_way: Sequence[Job]) -> None:
+        for job, process in zip(under_way, local.multiprocessing.active_children(), strict=bool(under_way)):
+            if (job.run.name, process.pid) not in seen:
+                seen.append((job.run.name, process.pid))
+                if len(seen) == 3:
+                    os.kill(process.pid, signal.SIGKILL)
+
+    run_jobs(setting.out, jobs, workers=1, threads=1, show=kill_in_the_third)
+    assert [name for name, _ in seen] == [job.run.name for job in (*jobs, jobs[-1])]
+    assert [pid == seen[0][1] for _, pid in seen] == [True, True, True, False]
+    assert all(is_done(setting.out, job) for job in jobs)
+
+
 def test_what_the_user_did_wrong_is_said_in_one_line(tmp_path: Path) -> None:
     setting = small_setting(tmp_path)
     jobs = jobs_of(setting)

@@ -1,4 +1,7 @@
-"""Jobs on this machine: each in a process of its own, so that one that dies takes nothing with it."""
+"""Jobs on this machine, in processes of their own: one that dies takes no other job with it.
+
+A process does one job after the other, since starting one takes some seconds, which is much of a small job.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,8 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from clearway.children import end_with_parent, signals_held
@@ -21,14 +23,57 @@ from clearway.experiments.plan import Job
 ATTEMPTS = 3  # a job whose process is killed is begun so many times, each from its last checkpoint
 POLL_S = 0.2
 JOB_BYTES = 1_000_000_000  # a job on the four default rooms was seen to take 650 MB
-REFUSED, INTERRUPTED = 2, 130  # a worker's exit codes
+INTERRUPTED = 130  # a worker's exit code
 
 
-@dataclass
-class _Running:
-    job: Job
-    process: BaseProcess
-    complaint: Connection
+class _Worker:
+    """A process that does one job after the other, and what connects this one with it."""
+
+    def __init__(self, out: Path, threads: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(out, threads, theirs))
+        with signals_held(signal.SIGINT):  # Ctrl+C; terminate() is heard
+            self.process.start()
+        theirs.close()
+        self.job: Job | None = None
+        self.attempt = 0
+
+    def begin(self, job: Job, attempt: int) -> None:
+        """Let it do a job, for the attempt-th time."""
+        self.job, self.attempt = job, attempt
+        with suppress(ConnectionError):  # it is dead, which `has_ended` finds out
+            self.connection.send(job)
+
+    def has_ended(self) -> bool | None:
+        """True where its job is done, False where it has to begin again, in another process; None: it is at work.
+
+        Raises:
+            RunError: the job failed.
+            KeyboardInterrupt: the user interrupted.
+        """
+        alive = self.process.is_alive()  # asked first: what it said before it died is there by then
+        with suppress(EOFError, ConnectionError):
+            if self.connection.poll():
+                complaint = self.connection.recv()
+                if complaint is None:
+                    return True
+                raise RunError(complaint)
+        return None if alive else self._begins_again()
+
+    def _begins_again(self) -> bool:
+        assert self.job is not None
+        self.process.join()
+        code, name = self.process.exitcode, self.job.run.name
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        if code is not None and code < 0 and self.attempt < ATTEMPTS:
+            return False
+        how = f"ended with code {code}" if code is None or code >= 0 else f"was killed by {signal.Signals(-code).name}"
+        raise RunError(
+            f"run {name}: its process {how}, attempt {self.attempt}. Its output above says why; run the command again "
+            "to go on, with fewer --workers where memory is short"
+        )
 
 
 def affordable_workers(wanted: int | None, threads: int) -> int:
@@ -58,65 +103,42 @@ def run_jobs(
         KeyboardInterrupt: the user interrupted; likewise.
     """
     waiting = deque((job, 1) for job in jobs)
-    running: list[tuple[_Running, int]] = []
+    at_work: list[_Worker] = []
+    idle: list[_Worker] = []
     try:
-        while waiting or running:
-            while waiting and len(running) < workers:
-                job, attempt = waiting.popleft()
-                running.append((_started(out, job, threads), attempt))
+        while waiting or at_work:
+            while waiting and len(at_work) < workers:
+                worker = idle.pop() if idle else _Worker(out, threads)
+                worker.begin(*waiting.popleft())
+                at_work.append(worker)
             time.sleep(POLL_S)
-            for one, attempt in [pair for pair in running if not pair[0].process.is_alive()]:
-                running.remove((one, attempt))
-                if not _ended_well(one, attempt):
-                    waiting.appendleft((one.job, attempt + 1))
-            show([one.job for one, _ in running])
+            for worker in list(at_work):
+                done = worker.has_ended()
+                if done is None:
+                    continue
+                at_work.remove(worker)
+                if done:
+                    idle.append(worker)
+                elif worker.job is not None:
+                    waiting.appendleft((worker.job, worker.attempt + 1))
+            show([worker.job for worker in at_work if worker.job is not None])
     finally:
-        for one, _ in running:
-            one.process.terminate()  # training saves a checkpoint before it ends
-        for one, _ in running:
-            one.process.join()
+        for worker in at_work + idle:
+            worker.process.terminate()  # training saves a checkpoint before it ends
+        for worker in at_work + idle:
+            worker.process.join()
 
 
-def _started(out: Path, job: Job, threads: int) -> _Running:
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(out, job, threads, sender), name=job.run.name)
-    with signals_held(signal.SIGINT):  # Ctrl+C; terminate() is heard
-        process.start()
-    sender.close()
-    return _Running(job, process, receiver)
-
-
-def _work(out: Path, job: Job, threads: int, complaint: Connection) -> None:
-    """Do a job in this process; what the user did wrong goes to the parent as text."""
+def _work(out: Path, threads: int, connection: Connection) -> None:
+    """Do in this process what the parent asks for, and say None when it is done, or what the user did wrong."""
     end_with_parent()
     os.environ["OMP_NUM_THREADS"] = str(threads)
     try:
-        do(out, job, threads)
+        while True:
+            job = connection.recv()
+            do(out, job, threads)
+            connection.send(None)
     except ClearwayError as error:
-        complaint.send(str(error))
-        raise SystemExit(REFUSED) from error
+        connection.send(str(error))
     except KeyboardInterrupt:
         raise SystemExit(INTERRUPTED) from None
-
-
-def _ended_well(one: _Running, attempt: int) -> bool:
-    """True where the job is done, False where it has to begin again.
-
-    Raises:
-        RunError: the job failed.
-    """
-    code, name = one.process.exitcode, one.job.run.name
-    if code == 0:
-        return True
-    if code == INTERRUPTED:
-        raise KeyboardInterrupt
-    if code == REFUSED:
-        raise RunError(one.complaint.recv())
-    if code is not None and code < 0 and attempt < ATTEMPTS:
-        return False
-    how = f"was killed by {signal.Signals(-code).name}" if code is not None and code < 0 else f"ended with code {code}"
-    raise RunError(
-        f"run {name}: its process {how}, attempt {attempt}. Its output above says why; run the command again to go on, "
-        "with fewer --workers where memory is short"
-    )
