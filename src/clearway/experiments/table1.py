@@ -16,6 +16,8 @@ from clearway.experiments.verdicts import judged_less, judged_no_more
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
 
 REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
+BASELINES = {SHORTEST.name: "the shortest-path reward", BUMP.name: "a penalty for bumping"}
+"""What the collision-aware reward is compared with, by name; the paper compares with the first alone."""
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -52,22 +54,20 @@ def _groups(setting: Setting) -> list[Group]:
 
 
 def claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
-    """Fewer collisions, and no more steps, for every learner; groups hold both rewards of each."""
+    """Fewer collisions, and no more steps, than with each baseline that a learner was trained with."""
     world = setting.world(groups[0].trial.targets)
     target_scene = world.target_scene.numpy()
+    scores = {(group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups}
     found = []
     for learner in dict.fromkeys(group.learner for group in groups):
-        ours, baseline = (
-            next(
-                group.scores(setting.out, world.target_count)
-                for group in groups
-                if (group.learner, group.agent) == (learner, reward.name)
-            )
-            for reward in (COLLISION_AWARE, SHORTEST)
-        )
-        for text, what, judged in (
-            ("fewer collisions than with the shortest-path reward", "collisions", judged_less),
-            ("no more steps than with the shortest-path reward", "steps", judged_no_more),
-        ):
-            found.append(judged(f"{learner}: {text}", what, ours.of(what), baseline.of(what), target_scene))
+        ours = scores[learner, COLLISION_AWARE.name]
+        for baseline, called in BASELINES.items():
+            theirs = scores.get((learner, baseline))
+            if theirs is None:
+                continue
+            for text, what, judged in (
+                (f"fewer collisions than with {called}", "collisions", judged_less),
+                (f"no more steps than with {called}", "steps", judged_no_more),
+            ):
+                found.append(judged(f"{learner}: {text}", what, ours.of(what), theirs.of(what), target_scene))
     return found

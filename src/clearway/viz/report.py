@@ -86,7 +86,7 @@ def value_text(value: Value) -> str:
 def _summary(sections: Sequence[Section]) -> list[ReportTable]:
     """All verdicts at a glance; nothing where there are none."""
     rows = tuple((claim.text, claim.verdict, section.title) for section in sections for claim in section.claims)
-    title = "What became of the paper's claims"
+    title = "Verdicts at a glance"
     return [ReportTable("summary", title, ("claim", "verdict", "evidence in"), rows)] if rows else []
 
 
