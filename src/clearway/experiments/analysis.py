@@ -29,6 +29,11 @@ GAMMA_SHARES = (0.0, 0.1, 0.5)  # of the way from alpha to beta; the paper's gam
 ENTROPIES = (0.003, 0.01, 0.03)
 LEVELS: tuple[ZoneLevel, ...] = ("pose", "cell")
 FIGURES = ("steps", "collisions", "collision_visits", "precollision_visits")
+SHOWN = {
+    "collision_visits": ("steps in the collision zone an episode", None),
+    "collisions": ("collisions an episode", 0.01),
+}
+"""What is drawn against steps: its label, and where its axis turns logarithmic."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +94,7 @@ def section(setting: Setting) -> Section:
             f"{PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, pose level."
         ),
         tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows), folded=True),),
-        figures=tuple(_pareto(setting, found, metric) for metric in ("collision_visits", "collisions")),
+        figures=tuple(_pareto(setting, found, metric) for metric in SHOWN),
         missing=all_missing(compared(setting, PAIR), setting.out),
     )
 
@@ -140,10 +145,9 @@ def _pareto(setting: Setting, found: Solved, metric: str) -> ReportFigure:
         if len(values):
             x, y = (values.of(name).mean(1).tolist() for name in ("steps", metric))
             series.append(Series(f"{group.learner}, {group.agent}", x, y, points=True))
-    label = {"collisions": "collisions an episode", "collision_visits": "steps in the collision zone an episode"}[
-        metric
-    ]
-    return ReportFigure(f"analysis_{metric}", "Steps against " + label, "steps an episode", label, tuple(series))
+    label, linear_below = SHOWN[metric]
+    title = f"Steps against {label}"
+    return ReportFigure(f"analysis_{metric}", title, "steps an episode", label, tuple(series), linear_below)
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
