@@ -42,7 +42,7 @@ from peers_speed import Speed, Trial, measure_speed
 from scene_sets import chosen_scenes, prepared
 from throughput import device_name
 
-from clearway.learn.run_folder import hardware, package_versions
+from clearway.learn.provenance import hardware, package_versions
 
 SHOWN_VERSIONS = ("python", "clearway", "torch", "stable-baselines3", "gymnasium", "numpy")
 

@@ -49,7 +49,7 @@ from clearway.evaluate.report import Protocol
 from clearway.evaluate.run import encoder_names
 from clearway.files import written_whole
 from clearway.learn.config import PRESETS, Learner
-from clearway.learn.run_folder import hardware, package_versions
+from clearway.learn.provenance import hardware, package_versions
 from clearway.learn.settings import with_settings
 from clearway.learn.train import RunRequest, set_threads
 from clearway.perception import encode_scenes

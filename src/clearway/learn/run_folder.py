@@ -11,13 +11,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
-import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
@@ -28,13 +25,12 @@ from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.config import ADDED_LATER, Learner
+from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
-from clearway.version import __version__
 
 FORMAT_VERSION = 1
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
-_PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
 Settings = TypeVar("Settings", Learner, Reward)
 
 
@@ -124,33 +120,6 @@ def record_of(
         hardware=hardware(),
         command=tuple(sys.argv),
     )
-
-
-def package_versions() -> dict[str, str]:
-    """Versions of Python, clearway and the packages that shape results."""
-    found = {"python": platform.python_version(), "clearway": __version__}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-def hardware() -> dict[str, Any]:
-    """Processor, usable cores and threads of this machine; whether it multiplies bfloat16."""
-    import torch
-
-    from clearway.model.precision import multiplies_bfloat16
-
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return {
-        "machine": platform.machine(),
-        "system": platform.system(),
-        "cores": cores,
-        "threads": torch.get_num_threads(),
-        "bfloat16": multiplies_bfloat16(torch.device("cpu")),
-    }
 
 
 class RunFolder:

@@ -10,7 +10,7 @@ import numpy as np
 from clearway.evaluate.report import Evaluation
 from clearway.evaluate.tables import table_text
 from clearway.experiments.demo import DemoResult
-from clearway.learn.run_folder import hardware, package_versions
+from clearway.learn.provenance import facts_text, hardware, package_versions
 from clearway.viz.contact_sheet import draw_contact_sheet
 from clearway.viz.curves import draw_curves
 from clearway.viz.maps import Walk, draw_map
@@ -49,8 +49,8 @@ def make_demo_page(result: DemoResult, command: str) -> Path:
             "evaluation": f"{first.protocol.episodes_per_target} episodes a target from random starts, at most "
             f"{first.protocol.step_cap:,} steps; intervals are 95 % bootstrap",
             "seconds": ", ".join(f"{name} {seconds:.0f}" for name, seconds in result.seconds.items()),
-            "versions": ", ".join(f"{name} {version}" for name, version in package_versions().items()),
-            "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
+            "versions": facts_text(package_versions()),
+            "hardware": facts_text(hardware()),
         },
     )
     return write_page(result.out, page)

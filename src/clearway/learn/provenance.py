@@ -1,0 +1,66 @@
+"""What shapes results beside settings and seed: versions of packages, and the machine."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from clearway.version import __version__
+
+PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
+CPU_INFO = Path("/proc/cpuinfo")
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of Python, clearway and the packages that shape results."""
+    found = {"python": platform.python_version(), "clearway": __version__}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def hardware() -> dict[str, Any]:
+    """Processor, memory, usable cores and threads of this machine; whether it multiplies bfloat16."""
+    import torch
+
+    from clearway.model.precision import multiplies_bfloat16
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "machine": platform.machine(),
+        "system": platform.system(),
+        "processor": _processor(),
+        "memory_gib": _memory_gib(),
+        "cores": cores,
+        "threads": torch.get_num_threads(),
+        "bfloat16": multiplies_bfloat16(torch.device("cpu")),
+    }
+
+
+def facts_text(facts: dict[str, Any]) -> str:
+    """Facts in a line, for people."""
+    return ", ".join(f"{name} {value}" for name, value in facts.items())
+
+
+def _processor() -> str:
+    """The processor's model as the system names it."""
+    if CPU_INFO.exists():
+        for line in CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"
+
+
+def _memory_gib() -> float | None:
+    """Physical memory; None where the system does not say."""
+    names = ("SC_PHYS_PAGES", "SC_PAGE_SIZE")
+    if not all(name in getattr(os, "sysconf_names", {}) for name in names):
+        return None
+    pages, size = (os.sysconf(name) for name in names)
+    return round(pages * size / 2**30, 1)
