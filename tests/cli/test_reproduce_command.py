@@ -55,10 +55,44 @@ def test_a_report_from_what_is_complete(clearway, dumps: Path, tmp_path: Path) -
     shutil.rmtree(first)
     (section,) = clearway("report", out, "--json").json["sections"]
     assert section["missing"] == [first.name]
-    assert "reproduce fig5" in json.loads((out / "report.json").read_text())["facts"]["command"]  # not the report's own
+    assert (
+        "reproduce fig5" in json.loads((out / "report.json").read_text())["facts"]["commands"]
+    )  # not the report's own
     assert not first.exists()  # nothing was trained
     assert clearway("reproduce", "fig5", "--scenes", dumps, "--out", out, "--learners", "default").code == 0
     assert json.loads((out / "report.json").read_text())["sections"] == whole
+
+
+def test_a_second_experiment_joins_the_report(clearway, dumps: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("--scenes", dumps, "--out", out, "--learners", "default", "--json")
+
+    def names(answer) -> list[str]:
+        return [section["name"] for section in answer.json["sections"]]
+
+    assert names(clearway("reproduce", "fig5", *words)) == ["fig5"]
+    both = clearway("reproduce", "fig3", *words)
+    assert names(both) == ["fig3", "fig5"]
+    assert "reproduce fig5" in both.json["facts"]["commands"] and "reproduce fig3" in both.json["facts"]["commands"]
+    assert names(clearway("report", out, "--json")) == ["fig3", "fig5"]
+    alone = clearway("reproduce", "fig4", *words, "--seeds", 1)  # another question: a report of its own
+    assert names(alone) == ["fig4"]
+    assert not (out / "tables" / "fig5.csv").exists()
+
+
+def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, dumps: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("reproduce", "fig3", "--scenes", dumps, "--out", out, "--learners", "default", "--seeds", 1, "--json")
+    assert "(2 runs)" in clearway(*words).json["facts"]["hardware"]
+    first, second = sorted((out / "runs").iterdir())
+    for folder, threads in ((first, 7), (second, 8)):
+        record = json.loads((folder / "run.json").read_text())
+        record["hardware"]["threads"] = threads
+        (folder / "run.json").write_text(json.dumps(record))
+    facts = clearway("report", out, "--json").json["facts"]
+    assert "threads 7" in facts["hardware"] and "threads 8" in facts["hardware"]
+    assert facts["hardware"].count("(1 run)") == 2
+    assert "(2 runs)" in facts["versions"] and "torch" in facts["versions"]
 
 
 @pytest.mark.parametrize("content", [None, "{", "[]", '{"names": ["fig5"]}', '{"dumps": [], "unknown": 1}'])

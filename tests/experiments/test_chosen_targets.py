@@ -11,6 +11,7 @@ from clearway.evaluate.episodes import run_episodes
 from clearway.evaluate.policies import random_policy, shortest_path_policy
 from clearway.experiments import fig5, fig6, hard
 from clearway.experiments.hard_targets import hard_targets, hardness
+from clearway.scenes.scene import Scene
 from clearway.zones import Zone
 from made import corridor_scene, grid_scene
 from small_setting import small_setting
@@ -29,33 +30,55 @@ def test_hardness_by_other_means() -> None:
 def test_hard_targets_lie_apart_and_lead_the_ranking() -> None:
     scene = grid_scene(3, width=9, depth=9, obstacle_share=0.1)
     chosen = hard_targets(scene, 3)
-    cells = np.rint(scene.locations_m[list(chosen)] / scene.cell_size_m)
+    assert chosen.apart_cells == 4 <= least_apart(scene, chosen.targets)
+    values = hardness(scene)
+    assert int(values.argmax()) in chosen.targets
+    assert chosen.rank[chosen.targets.index(int(values.argmax()))] == 1
+    assert chosen.hardness == tuple(values[list(chosen.targets)])
+
+
+def least_apart(scene: Scene, targets: tuple[int, ...]) -> int:
+    """Cells between the two that lie closest."""
+    cells = np.rint(scene.locations_m[list(targets)] / scene.cell_size_m)
     apart = np.abs(cells[:, None] - cells[None]).max(-1)
-    assert (apart[~np.eye(3, dtype=bool)] >= 4).all()
-    assert int(hardness(scene).argmax()) in chosen
+    return int(apart[~np.eye(len(targets), dtype=bool)].min())
 
 
-def test_where_too_few_lie_apart_they_stand_closer() -> None:
-    assert len(set(hard_targets(corridor_scene(3), 5))) == 5
+@pytest.mark.parametrize(("cells", "count", "apart"), [(3, 5, 0), (3, 3, 1), (5, 3, 2), (9, 3, 4)])
+def test_where_too_few_lie_apart_they_stand_as_far_as_they_can(cells: int, count: int, apart: int) -> None:
+    scene = corridor_scene(cells)
+    chosen = hard_targets(scene, count)
+    assert len(set(chosen.targets)) == count
+    assert chosen.apart_cells == apart == least_apart(scene, chosen.targets)
 
 
 def test_hard_targets_are_written_once_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     setting = small_setting(tmp_path)
     first = hard.chosen(setting)
     content = json.loads((tmp_path / hard.FILE).read_text())
-    assert content["targets"] == {"bathroom": list(first[0]), "kitchen": list(first[1])}
+    assert {name: found["targets"] for name, found in content["found"].items()} == {
+        "bathroom": list(first[0]),
+        "kitchen": list(first[1]),
+    }
     monkeypatch.setattr(hard, "hard_targets", lambda scene: pytest.fail("chosen again"))
     assert hard.chosen(setting) == first
 
 
-@pytest.mark.parametrize("steps", [1, 2, 4])
-def test_unseen_targets_are_so_many_steps_away_and_not_trained_on(tmp_path: Path, steps: int) -> None:
+@pytest.mark.parametrize("steps", [1, 2, 4, 50])
+def test_unseen_targets_are_so_many_steps_from_the_nearest_trained_one(tmp_path: Path, steps: int) -> None:
     setting = small_setting(tmp_path)
     chosen = fig5.unseen_targets(setting, steps)
     for scene, own, trained in zip(setting.scenes, chosen, setting.targets, strict=True):
-        assert own and not set(own) & set(trained)
-        away = scene.distances_to(np.array(trained))[:, list(own)]
-        assert (away == steps).any(0).all()
+        nearest = scene.distances_to(np.array(trained)).min(0)
+        there = np.flatnonzero(nearest == min(steps, nearest.max()))  # no pose lies 50 away: the farthest stand in
+        assert len(own) == min(len(there), setting.budget.unseen_targets) > 0
+        assert set(own) <= set(there.tolist())
+
+
+def test_where_no_pose_lies_so_far_away_the_report_says_so(tmp_path: Path) -> None:
+    (table, _) = fig5.section(small_setting(tmp_path)).tables
+    (note,) = [note for note in table.notes if note.startswith("bathroom has no pose")]
+    assert note.startswith("bathroom has no pose 8 steps from every trained target; its farthest, ")
 
 
 def test_training_sets_grow_and_never_hold_what_is_held_out(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from clearway.experiments.verdicts import judged_less, judged_more, judged_no_more
+from clearway.experiments.verdicts import judged_less, judged_more, judged_no_more, with_failures
 
 SCENE = np.array([0, 0])
 
@@ -14,9 +14,10 @@ def scores(*means: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("first", "second", "verdict"),
     [
-        (scores(1, 1.1, 0.9), scores(2, 2.1, 1.9), "holds"),
-        (scores(2, 2.1, 1.9), scores(1, 1.1, 0.9), "does not hold"),
-        (scores(1, 3, 2), scores(2, 1, 3), "undecided"),
+        (scores(1, 1.1, 0.9, 1), scores(2, 2.1, 1.9, 2), "holds"),
+        (scores(2, 2.1, 1.9, 2), scores(1, 1.1, 0.9, 1), "does not hold"),
+        (scores(1, 3, 2, 2), scores(2, 1, 3, 2), "undecided"),
+        (scores(1, 1.1, 0.9), scores(2, 2.1, 1.9, 2), "undecided"),  # three seeds say too little
         (scores(1), scores(2), "undecided"),  # one seed says nothing
         (scores(1, 1), scores(), "undecided"),
     ],
@@ -28,24 +29,39 @@ def test_fewer(first: np.ndarray, second: np.ndarray, verdict: str) -> None:
 @pytest.mark.parametrize(
     ("first", "verdict"),
     [
-        (scores(10.1, 10.1, 10.1), "holds"),  # 1 % more is no more
-        (scores(10.5, 10.5, 10.5), "does not hold"),
-        (scores(9, 11, 10), "undecided"),
-        (scores(5, 5, 5), "holds"),
+        (scores(10.1, 10.1, 10.1, 10.1), "holds"),  # 1 % more is no more
+        (scores(10.5, 10.5, 10.5, 10.5), "does not hold"),
+        (scores(9, 11, 10, 10), "undecided"),
+        (scores(5, 5, 5, 5), "holds"),
     ],
 )
 def test_no_more(first: np.ndarray, verdict: str) -> None:
-    claim = judged_no_more("no more", "steps", first, scores(10, 10, 10), SCENE)
+    claim = judged_no_more("no more", "steps", first, scores(10, 10, 10, 10), SCENE)
     assert claim.verdict == verdict
-    assert "3 and 3 seeds" in claim.evidence
+    assert "4 and 4 seeds" in claim.evidence
 
 
 def test_more_is_fewer_the_other_way_round() -> None:
-    low, high = scores(1, 1.1, 0.9), scores(2, 2.1, 1.9)
+    low, high = scores(1, 1.1, 0.9, 1), scores(2, 2.1, 1.9, 2)
     claim = judged_more("more", "sc", high, low, SCENE)
     assert claim.verdict == "holds"
-    assert "probability that a run has more: 1 [1, 1]" in claim.evidence
+    assert "probability of improvement, mean over targets: 1 [1 to 1]" in claim.evidence
     assert "difference 1 [" in claim.evidence
+    assert claim.numbers["difference"].value == pytest.approx(1)
     assert judged_more("more", "sc", low, high, SCENE).verdict == "does not hold"
-    assert judged_more("more", "sc", scores(1, 3, 2), scores(2, 1, 3), SCENE).verdict == "undecided"
+    assert judged_more("more", "sc", scores(1, 3, 2, 2), scores(2, 1, 3, 2), SCENE).verdict == "undecided"
     assert judged_more("more", "sc", scores(1), scores(2), SCENE).verdict == "undecided"
+
+
+def test_failed_targets_are_told_beside_the_means() -> None:
+    claim = judged_less("fewer", "steps", scores(1, 1, 1, 1), scores(2, 2, 2, 2), SCENE)
+    success = np.ones((4, 2))
+    success[2, 1] = 0.99
+    told = with_failures(claim, np.ones((4, 2)), success)
+    assert told.evidence.endswith("Failed targets, over all seeds: 0 of 8, 1 of 8.")
+    assert with_failures(claim, np.empty((0, 2)), success) == claim
+
+
+def test_thousands_are_written_out() -> None:
+    claim = judged_less("fewer", "frames", scores(1e6, 2e6, 1.5e6, 1.2e6), scores(4e6, 5e6, 4e6, 4e6), SCENE)
+    assert "1,425,000" in claim.evidence and "e+" not in claim.evidence

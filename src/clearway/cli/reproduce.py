@@ -79,7 +79,7 @@ class Reproduce:
             workers=self.workers,
             threads=self.threads,
             ray=self.ray,
-            command=shlex.join(["clearway", *sys.argv[1:]]),
+            commands=(shlex.join(["clearway", *sys.argv[1:]]),),
         )
         _write(reproduce(request, show_progress=True), self.out, self.json)
 
@@ -107,22 +107,23 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     """Write the report into a folder and say where it is, or print it."""
     import json
 
-    from clearway.learn.run_folder import hardware, package_versions
+    from clearway.experiments.provenance import made_by
+    from clearway.experiments.setting import ABOUT_LEARNERS
     from clearway.viz.report import JSON, MARKDOWN, write_report
 
     setting = found.setting
     budget = setting.budget
+    learners = (
+        f"{name}: {ABOUT_LEARNERS[name]}, {learner.frames:,} frames" for name, learner in setting.learners.items()
+    )
     facts = {
-        "command": found.command,
+        "commands": "; ".join(found.commands),
         "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
         "features": setting.encoder,
         "seeds": ", ".join(map(str, setting.seeds)),
         "evaluation": f"{budget.episodes_per_target} episodes a target, at most {budget.step_cap:,} steps",
-        "learners": ", ".join(
-            f"{name} ({learner.algorithm}): {learner.frames:,} frames" for name, learner in setting.learners.items()
-        ),
-        "versions": ", ".join(f"{name} {version}" for name, version in package_versions().items()),
-        "hardware": ", ".join(f"{name} {value}" for name, value in hardware().items()),
+        "learners": "; ".join(learners),
+        **made_by(out, found.jobs),
     }
     page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning, setting.scenes)
     if as_json:

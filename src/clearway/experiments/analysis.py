@@ -13,9 +13,10 @@ import numpy as np
 
 from clearway.choices import ZoneLevel
 from clearway.envs.world import World
-from clearway.evaluate.metrics import average, by_scene
+from clearway.evaluate.metrics import METRIC_NAMES, average, by_scene
 from clearway.evaluate.optimum import world_yardsticks
 from clearway.evaluate.oracle import ENTROPY_WEIGHT, Expected
+from clearway.experiments import table1
 from clearway.experiments.groups import PAIR, all_jobs, all_missing, compared
 from clearway.experiments.kept import keep, kept
 from clearway.experiments.plan import Job
@@ -56,7 +57,10 @@ PAPERS_POINT = Point(COLLISION_AWARE.beta, COLLISION_AWARE.gamma, ENTROPY_WEIGHT
 
 
 def grid(whole: bool) -> Iterator[Point]:
-    """The settings: one kind of change at a time around the paper's, and the two penalties together.
+    """The settings.
+
+    Both penalties together, with the paper's entropy weight, clipped, at pose level; and entropy weights, clipping and
+    levels together, with the penalties of the shortest-path reward and of the paper's.
 
     Args:
         whole: False leaves most penalties out.
@@ -91,7 +95,9 @@ def section(setting: Setting) -> Section:
         text=(
             "Expected figures an episode, mean over scenes of the means over targets and all starts. Optimal: the best "
             "policy, ties taken alike. Soft: where the loss comes to rest with that entropy weight; the paper's: beta "
-            f"{PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, pose level."
+            f"{PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, pose level. "
+            "Visits are counted in zones of the setting's own level, so those of the two levels do not compare. The "
+            "figures show the pose level at the paper's entropy weight."
         ),
         tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows), folded=True),),
         figures=tuple(_pareto(setting, found, metric) for metric in SHOWN),
@@ -129,25 +135,35 @@ def _figures(worlds: dict[ZoneLevel, World], point: Point) -> dict[str, dict[str
 
 
 def _pareto(setting: Setting, found: Solved, metric: str) -> ReportFigure:
-    """Steps against collisions or visits: all soft fixed points, those no other beats in both, the paper's, agents."""
-    points = [(policies["soft"]["steps"], policies["soft"][metric], point) for point, policies in found]
-    pose = [(x, y, point) for x, y, point in points if point.level == "pose"]
-    front = pareto_front([(x, y) for x, y, _ in pose])
-    own = [(x, y) for x, y, point in pose if point == PAPERS_POINT]
+    """Steps against collisions or visits at the paper's entropy weight: fixed points, those no other beats, agents."""
+    solved = [
+        (policies["soft"]["steps"], policies["soft"][metric], point)
+        for point, policies in found
+        if (point.level, point.entropy) == (PAPERS_POINT.level, PAPERS_POINT.entropy)
+    ]
+    clipped, unclipped = ([(x, y) for x, y, point in solved if point.clip == clip] for clip in (True, False))
+    front, own = pareto_front(clipped), [(x, y) for x, y, point in solved if point == PAPERS_POINT]
     series = [
-        Series("soft fixed points", [x for x, _, _ in pose], [y for _, y, _ in pose], points=True),
-        Series("Pareto front", [x for x, _ in front], [y for _, y in front]),
-        Series("the paper's setting", [x for x, _ in own], [y for _, y in own], points=True),
+        _points("fixed points, rewards clipped", clipped),
+        replace(_points("Pareto front of these", front), points=False),
+        _points("fixed points, not clipped", unclipped),
     ]
     world = setting.world()
-    for group in compared(setting, PAIR):
+    target_scene = world.target_scene.numpy()
+    for group in table1.all_groups(setting):  # those that are complete
         values = group.scores(setting.out, world.target_count)
         if len(values):
-            x, y = (values.of(name).mean(1).tolist() for name in ("steps", metric))
+            means = average(by_scene(values.values, target_scene))  # (R, J)
+            x, y = (means[:, METRIC_NAMES.index(name)].tolist() for name in ("steps", metric))
             series.append(Series(f"{group.learner}, {group.agent}", x, y, points=True))
+    series.append(replace(_points("fixed point, the paper's reward", own), highlighted=True))
     label, linear_below = SHOWN[metric]
-    title = f"Steps against {label}"
+    title = f"{label.capitalize()}, against steps"
     return ReportFigure(f"analysis_{metric}", title, "steps an episode", label, tuple(series), linear_below)
+
+
+def _points(label: str, points: Sequence[tuple[float, float]]) -> Series:
+    return Series(label, [x for x, _ in points], [y for _, y in points], points=True)
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

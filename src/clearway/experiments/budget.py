@@ -21,9 +21,10 @@ class Budget:
         default_frames: of a run of the default recipe there; None: as many as the recipe says.
         seeds: agents of each kind.
         episodes_per_target, step_cap: of every evaluation.
+        unseen_targets: tried at each distance in a scene, at most.
         most_scenes: scenes taken of a folder of dumps; None: all.
         whole_grid: solve all settings of the analysis, not a few of them.
-        warning: stands on top of the report; empty for none.
+        mark: stands on top of the report, where its figures say nothing; empty for none.
     """
 
     name: BudgetName
@@ -33,20 +34,32 @@ class Budget:
     seeds: int
     episodes_per_target: int
     step_cap: int
+    unseen_targets: int
     most_scenes: int | None = None
     whole_grid: bool = True
-    warning: str = ""
+    mark: str = ""
 
     def changed(self, rooms: Sequence[RoomName] | None = None, frames: int | None = None) -> Budget:
         """The budget with other rooms, or with the same number of frames for every learner; None changes nothing."""
         found = self if rooms is None else replace(self, rooms=tuple(rooms))
         if frames is None:
             return found
-        warning = found.warning or f"Trained for {frames:,} frames; the paper trains for {PAPER.frames:,}."
-        return replace(found, frames=frames, default_frames=frames, warning=warning)
+        return replace(found, frames=frames, default_frames=frames)
+
+    @property
+    def warning(self) -> str:
+        """What stands on top of a report: where the budget spends less than the paper did."""
+        if self.mark:
+            return self.mark
+        found = []
+        if set(self.rooms) < set(PAPER.rooms):
+            found.append(f"{len(self.rooms)} of {len(PAPER.rooms)} rooms")
+        if self.frames != PAPER.frames:
+            found.append(f"{self.frames:,} frames in the main experiment instead of the paper's {PAPER.frames:,}")
+        return f"Less than the paper's budget: {'; '.join(found)}." if found else ""
 
 
-PAPER = Budget("paper", ROOM_NAMES, 10_000_000, None, 5, EPISODES_PER_TARGET, STEP_CAP)
+PAPER = Budget("paper", ROOM_NAMES, 10_000_000, None, 5, EPISODES_PER_TARGET, STEP_CAP, 20)
 """The paper's frames, with five seeds instead of one."""
 
 SMOKE = Budget(
@@ -57,9 +70,10 @@ SMOKE = Budget(
     2,
     10,
     1_000,
+    5,
     most_scenes=1,
     whole_grid=False,
-    warning="Smoke budget: shows that everything runs. Its figures say nothing about the paper.",
+    mark="Smoke budget: shows that everything runs. Its figures say nothing about the paper.",
 )
 """Shows within minutes that everything runs; its figures say nothing about the paper."""
 

@@ -22,34 +22,39 @@ def jobs(setting: Setting) -> list[Job]:
 def section(setting: Setting) -> Section:
     """What came of it."""
     groups = compared(setting, PAIR)
+    scene_of_target = setting.world().target_scene.numpy()
     figures = [
         ReportFigure(
-            f"fig3_{learner}_{metric}",
-            f"{learner}: {metric} over the episodes",
+            f"fig3_{learner}_{scene.name}_{metric}",
+            f"{learner}, {scene.name}: {metric} over the episodes",
             "episodes of every target",
             f"{label}, mean over targets",
             tuple(
                 series
                 for group in groups
                 if group.learner == learner
-                for series in _best_and_worst(setting, group, metric)
+                for series in _best_and_worst(setting, group, metric, np.flatnonzero(scene_of_target == number))
             ),
         )
         for learner in dict.fromkeys(group.learner for group in groups)
+        for number, scene in enumerate(setting.scenes)
         for metric, label in FIGURES.items()
     ]
     return Section(
         name="fig3",
         title="Accumulated steps and collisions (the paper's figure 3)",
-        text="Best and worst are the seeds whose sum over all episodes is smallest and largest.",
+        text=(
+            "Best and worst are the seeds whose sum over all episodes in that scene is smallest and largest, for steps "
+            "and for collisions by themselves. The paper prints its figures as a picture alone."
+        ),
         figures=tuple(figure for figure in figures if figure.series),
         missing=all_missing(groups, setting.out),
     )
 
 
-def _best_and_worst(setting: Setting, group: Group, metric: str) -> list[Series]:
+def _best_and_worst(setting: Setting, group: Group, metric: str, targets: np.ndarray) -> list[Series]:
     found = [(run.seed, episodes_of(setting.out, run, group.trial)) for run in group.runs]
-    sums = [(seed, accumulated(table, metric)) for seed, table in found if table is not None]
+    sums = [(seed, accumulated(table, metric)[targets].mean(0)) for seed, table in found if table is not None]
     if not sums:
         return []
     ranked = sorted(sums, key=lambda pair: float(pair[1][-1]))
@@ -61,6 +66,5 @@ def _best_and_worst(setting: Setting, group: Group, metric: str) -> list[Series]
 
 
 def accumulated(table: EpisodeTable, metric: str) -> np.ndarray:
-    """(E,) sums over the first 1 to E episodes of every target, mean over targets."""
-    values = getattr(table, metric).reshape(int(table.target.max()) + 1, -1)
-    return values.mean(0).cumsum()
+    """(M, E) sums over the first 1 to E episodes of each target."""
+    return getattr(table, metric).reshape(int(table.target.max()) + 1, -1).cumsum(1)

@@ -13,12 +13,13 @@ from clearway.experiments.job import run_folder
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less
+from clearway.experiments.verdicts import judged_less, with_failures
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
 METRICS = {"steps": 1.0, "collisions": 0.1}
 """What is shown, and where its curves' axis turns logarithmic, so that the end of training can be seen too."""
 CURVE_POINTS = 50
+BAND = "Lines: mean of the seeds; bands: smallest to largest"
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -35,7 +36,7 @@ def section(setting: Setting) -> Section:
         title="Speed of convergence (the paper's figure 4)",
         text=(
             "The main experiment's agents tried halfway and in the end of their training; below, episodes ended during "
-            "training (not every learner draws their targets evenly)."
+            "training (not every learner draws their targets evenly). The paper prints its figures as a picture alone."
         ),
         tables=(_table(setting, groups), settled),
         figures=tuple(_curves(setting, groups)),
@@ -54,7 +55,8 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     for group in groups:
         values = group.scores(setting.out, world.target_count)
         frames = group.runs[0].halfway if group.trial.halfway else group.runs[0].learner.frames
-        figures: list[Value] = []
+        success = values.of("success")
+        figures: list[Value] = [f"{int((success < 1).sum())} of {success.size}" if len(values) else None]
         for metric in METRICS:
             if not len(values):
                 figures += [None, None]
@@ -62,7 +64,17 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
             found = mean_estimate(values.of(metric), world.target_scene.numpy())
             figures += [found.value, found.ends]
         rows.append((group.learner, group.agent, frames, len(values), *figures))
-    headings = ("learner", "agent", "frames", "seeds", "steps", "95 %", "collisions", "95 % of collisions")
+    headings = (
+        "learner",
+        "agent",
+        "frames",
+        "seeds",
+        "failed targets",
+        "steps",
+        "95 %",
+        "collisions",
+        "95 % of collisions",
+    )
     return ReportTable("fig4", "Halfway and in the end", headings, tuple(rows))
 
 
@@ -80,7 +92,8 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
         for metric in METRICS:
             text = f"{learner}: learns faster (fewer {metric} halfway)"
             scene = world.target_scene.numpy()
-            found.append(judged_less(text, f"{metric} halfway", ours.of(metric), baseline.of(metric), scene))
+            claim = judged_less(text, f"{metric} halfway", ours.of(metric), baseline.of(metric), scene)
+            found.append(with_failures(claim, ours.of("success"), baseline.of("success")))
     return found
 
 
@@ -94,9 +107,8 @@ def _curves(setting: Setting, groups: Sequence[Group]) -> list[ReportFigure]:
                 if series:
                     name = f"fig4_{learner}_{metric}_{axis}"
                     title = f"{learner}: {metric} of training episodes"
-                    figures.append(
-                        ReportFigure(name, title, f"training {axis}", f"{metric} an episode", series, linear_below)
-                    )
+                    what = f"training {axis}", f"{metric} an episode"
+                    figures.append(ReportFigure(name, title, *what, series, linear_below, band=BAND))
     return figures
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clearway.envs.world import World
 from clearway.evaluate.across_seeds import mean_estimate
 from clearway.evaluate.metrics import SC_DETOUR, SC_STEPS
 from clearway.experiments.groups import Group, Scores, compared
@@ -16,11 +17,13 @@ from clearway.experiments.setting import Setting
 from clearway.reward import Reward
 
 METRICS = ("sc", "sc_4x", "spl")
-HEADINGS = ("sc", "95 % of sc", "sc within 4 x shortest", "SPL")
+HEADINGS = ("sc", "95 % of sc", "sc within 4 x shortest", "95 % of that", "SPL", "95 % of SPL")
+TARGET_HEADINGS = ("scene", "target", "learner", "agent", "seed", *METRICS)
+BAND = "Bars: 95 % intervals over seeds, for these targets"
 NOTE = (
     "sc: share of episodes that reach the target in under 500 steps. It flatters: a random walk reaches much within "
     "500 steps, so beside it stand the share within 4 times the shortest path, and SPL. Episodes end when both shares "
-    "are settled; arriving later would add less than 1/500 of the shortest path to SPL."
+    "are settled; SPL takes later arrivals for failures. Intervals are over seeds, for these targets."
 )
 
 
@@ -36,26 +39,36 @@ class Tried:
         if not len(self.scores):
             return (None,) * len(HEADINGS)
         estimates = [mean_estimate(self.scores.of(metric), self.target_scene) for metric in METRICS]
-        first, *rest = estimates
-        return (first.value, first.ends, *(estimate.value for estimate in rest))
+        return tuple(value for estimate in estimates for value in (estimate.value, estimate.ends))
+
+    def by_target(self, world: World, learner: str, agent: str) -> list[tuple[Value, ...]]:
+        """A row under `TARGET_HEADINGS` for each target and seed, targets being those of the world."""
+        return [
+            (
+                *(world.scene_names[scene], world.scene_state(index), learner, agent, seed),
+                *(float(self.scores.of(metric)[row, index]) for metric in METRICS),
+            )
+            for index, scene in enumerate(self.target_scene.tolist())
+            for row, seed in enumerate(self.scores.seeds)
+        ]
 
 
 def tried(
-    setting: Setting, rewards: Sequence[Reward], unseen: TargetSets, *, trained: TargetSets | None = None
+    setting: Setting, rewards: Sequence[Reward], targets: TargetSets, *, trained: TargetSets | None = None
 ) -> list[Group]:
-    """A group for each learner and reward, tried on unseen targets.
+    """A group for each learner and reward, tried on targets until success is settled.
 
     Args:
         setting: see there.
         rewards: to be compared.
-        unseen: to be tried on.
+        targets: to be tried on.
         trained: to be trained on; None: the paper's.
     """
     farthest = max(
-        int(scene.distances_to(np.array(own)).max()) for scene, own in zip(setting.scenes, unseen, strict=True) if own
+        int(scene.distances_to(np.array(own)).max()) for scene, own in zip(setting.scenes, targets, strict=True) if own
     )
     step_cap = max(SC_STEPS, SC_DETOUR * farthest)
-    return compared(setting, rewards, targets=trained, tried_on=unseen, step_cap=step_cap)
+    return compared(setting, rewards, targets=trained, tried_on=targets, step_cap=step_cap)
 
 
 def together(parts: Sequence[Tried]) -> Tried:
@@ -69,13 +82,16 @@ def together(parts: Sequence[Tried]) -> Tried:
     )
 
 
-def line(label: str, points: Sequence[tuple[float, Tried]]) -> Series | None:
-    """The success score over something, with intervals where there are several seeds; None without any runs."""
-    known = [(x, mean_estimate(own.scores.of("sc"), own.target_scene)) for x, own in points if len(own.scores)]
-    if not known:
-        return None
-    ends = [found.interval for _, found in known]
+def lines(kinds: dict[str, list[tuple[float, Tried]]]) -> tuple[Series, ...]:
+    """By label the success score over something, with intervals where there are several seeds."""
+    found = [_line(label, [(x, own) for x, own in points if len(own.scores)]) for label, points in kinds.items()]
+    return tuple(line for line in found if line.x)
+
+
+def _line(label: str, points: Sequence[tuple[float, Tried]]) -> Series:
+    estimates = [mean_estimate(own.scores.of("sc"), own.target_scene) for _, own in points]
+    ends = [found.interval for found in estimates]
     complete = all(each is not None for each in ends)
     low = [each[0] for each in ends if each is not None] if complete else None
     high = [each[1] for each in ends if each is not None] if complete else None
-    return Series(label, [x for x, _ in known], [found.value for _, found in known], low, high)
+    return Series(label, [x for x, _ in points], [found.value for found in estimates], low, high)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.hard_targets import hard_targets
@@ -16,7 +16,10 @@ from clearway.experiments.setting import Setting
 from clearway.experiments.table1 import claims
 
 FILE = "hard_targets.json"
-RULE = "hard targets: random-walk steps times share of collision poses on shortest paths, at least 4 cells apart"
+RULE = (
+    "hard targets: the largest product of a random walk's steps and the share of collision poses on shortest paths, "
+    "at least 4 cells apart or as far as they can be"
+)
 
 
 @dataclass(frozen=True)
@@ -40,14 +43,18 @@ class HardTable:
     def section(self, setting: Setting) -> Section:
         """What came of it."""
         groups, name = self._groups(setting), f"table{self.number}"
+        frames = " and ".join(dict.fromkeys(f"{group.runs[0].learner.frames:,}" for group in groups))
         times = "" if self.frames_factor == 1 else f"{self.frames_factor} times "
         title = f"Hard targets after {times}the main experiment's frames"
         return Section(
             name=name,
             title=f"{title} (the paper's table {self.number})",
-            text=f"Agents trained and tried on {RULE}; the targets are in {FILE}.",
+            text=(
+                f"Agents trained for {frames} frames and tried on {RULE}. {FILE} holds the targets, how hard they are "
+                "and how far apart."
+            ),
             tables=navigation_tables(name, title, setting, chosen(setting), groups, self.paper),
-            claims=tuple(claims(setting, groups)),
+            claims=tuple(claims(setting, groups, where=" on hard targets")),
             missing=all_missing(groups, setting.out),
         )
 
@@ -62,8 +69,8 @@ def chosen(setting: Setting) -> TargetSets:
     """The hard targets of the setting's scenes; found once, then read from their file."""
     path = setting.out / FILE
     question = {"rule": RULE, "scenes": {file.name: file.digest for file in setting.files}}
-    targets = kept(path, question, "targets")
-    if targets is None:
-        targets = {scene.name: hard_targets(scene) for scene in setting.scenes}
-        keep(path, question, {"targets": targets})
-    return tuple(tuple(targets[scene.name]) for scene in setting.scenes)
+    found = kept(path, question, "found")
+    if found is None:
+        found = {scene.name: asdict(hard_targets(scene)) for scene in setting.scenes}
+        keep(path, question, {"found": found})
+    return tuple(tuple(found[scene.name]["targets"]) for scene in setting.scenes)

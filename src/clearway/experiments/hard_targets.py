@@ -2,11 +2,14 @@
 
 A state's hardness is the expected number of steps that a random walk needs to reach it, mean over all starts, times the
 share of collision poses among those that the shortest paths to it arrive at (the optimal policy of the shortest-path
-reward, ties taken alike, mean over all starts). Targets are taken from the hardest down, each at least 4 cells from
-those already taken (Chebyshev distance on the grid); where fewer than 5 fit, the distance is lowered cell by cell.
+reward, ties taken alike, mean over all starts). Targets are taken from the hardest down, of equal ones the smaller
+state first, each at least 4 cells from those already taken (Chebyshev distance on the grid); where fewer than 5 fit,
+the distance is lowered cell by cell.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +21,23 @@ from clearway.scenes.targets import TARGETS_PER_SCENE
 from clearway.zones import scene_zones
 
 APART_CELLS = 4
+
+
+@dataclass(frozen=True)
+class HardTargets:
+    """The hardest states of a scene that lie apart.
+
+    Attributes:
+        targets: states, ascending.
+        hardness: of each.
+        rank: of each among all states, 1 for the hardest.
+        apart_cells: by which all of them lie apart.
+    """
+
+    targets: tuple[int, ...]
+    hardness: tuple[float, ...]
+    rank: tuple[int, ...]
+    apart_cells: int
 
 
 def hardness(scene: Scene) -> np.ndarray:
@@ -32,14 +52,22 @@ def hardness(scene: Scene) -> np.ndarray:
     return found
 
 
-def hard_targets(scene: Scene, count: int = TARGETS_PER_SCENE, apart_cells: int = APART_CELLS) -> tuple[int, ...]:
-    """The hardest states of a scene by the rule above, ascending."""
-    order = np.argsort(-hardness(scene), kind="stable")
+def hard_targets(scene: Scene, count: int = TARGETS_PER_SCENE, apart_cells: int = APART_CELLS) -> HardTargets:
+    """The hardest states of a scene by the rule above."""
+    values = hardness(scene)
+    order = np.argsort(-values, kind="stable")
     cells = np.rint(scene.locations_m / scene.cell_size_m).astype(np.int64)
     taken: list[int] = []
+    apart = apart_cells
     for apart in range(apart_cells, -1, -1):
         for state in order.tolist():
             far = all(np.abs(cells[state] - cells[other]).max() >= apart for other in taken)
             if len(taken) < count and state not in taken and far:
                 taken.append(state)
-    return tuple(sorted(taken))
+        if len(taken) == count:
+            break
+    targets = tuple(sorted(taken))
+    ranks = {state: rank for rank, state in enumerate(order.tolist(), start=1)}
+    return HardTargets(
+        targets, tuple(float(values[s]) for s in targets), tuple(ranks[s] for s in targets), apart_cells=apart
+    )

@@ -60,7 +60,14 @@ def do(out: Path, job: Job, threads: int) -> None:
     for trial in job.trials:
         path = trial_path(out, run, trial)
         if not path.exists():
-            about = {"run": run.name, "halfway": trial.halfway, "seed": trial.seed, "step_cap": trial.step_cap}
+            targets = {scene.name: list(own) for scene, own in zip(run.scenes, trial.targets, strict=True)}
+            about = {
+                "run": run.name,
+                "targets": targets,
+                "halfway": trial.halfway,
+                "seed": trial.seed,
+                "step_cap": trial.step_cap,
+            }
             write_episodes(path, _walk(folder, scenes, run, trial), about)
 
 

@@ -12,15 +12,16 @@ from clearway.evaluate.across_seeds import mean_estimate
 from clearway.evaluate.metrics import by_scene
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
-from clearway.experiments.paper_numbers import REMINDER, REMINDER_ORIGINAL, PaperRow
+from clearway.experiments.paper_numbers import THE_PAPER, PaperRow, reminder
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import ReportTable, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import Reward
 
 METRICS = ("steps", "collisions")
-TARGET_METRICS = ("steps", "shortest_path_steps", "collisions", "success", "sc", "spl")
-PAPER_COLUMN = "the paper's average"
+TARGET_METRICS = ("steps", "shortest_path_steps", "collisions", "success", "sc", "sc_4x", "spl")
+PAPER_COLUMN = "the paper's average of these scenes"
+NAMED_FAILURES = 8  # of each kind of agent, in the note below the table
 EXACT = "exact"
 
 
@@ -38,23 +39,30 @@ def navigation_tables(
     """
     world = setting.world(targets)
     found = [(group, group.scores(setting.out, world.target_count)) for group in groups]
-    rewards = list(dict.fromkeys(group.runs[0].reward for group in groups))
-    exact = _references(world, rewards)
+    kinds = list(dict.fromkeys((group.runs[0].reward, group.runs[0].learner.clip_rewards) for group in groups))
+    exact = _references(world, kinds)
     walked = random_walk(world, setting.trial(targets))
     rows: list[tuple[Value, ...]] = []
     for metric in METRICS:
         for group, values in found:
             of_paper = paper.get(group.runs[0].reward.name)
-            own = of_paper.of(metric, "average") if of_paper else None
+            own = of_paper.average(metric, world.scene_names) if of_paper else None
             rows.append(_group_row(world, group, values, metric, own))
-        rows += [_reference_row(world, agent, figures[metric], metric) for agent, figures in exact]
-        rows.append(_reference_row(world, RANDOM_WALK, walked.of(metric)[0], metric, kind="walked"))
+        for reward, row in paper.items():
+            scenes = row.by_scene(metric, world.scene_names)
+            rows.append(_reference_row(metric, THE_PAPER, reward, scenes, row.average(metric, world.scene_names)))
+        for kind, agent, figures in [*exact, ("walked", RANDOM_WALK, {m: walked.of(m)[0] for m in METRICS})]:
+            means = _by_scene(world, figures[metric])
+            rows.append(_reference_row(metric, kind, agent, means, float(np.mean(means))))
     left = ("figure", "learner", "agent", "seeds", "failed targets")
-    headings = (*left, *world.scene_names, "average", "95 %", PAPER_COLUMN)
+    by_scene_headings = (heading for scene in world.scene_names for heading in (scene, f"95 % of {scene}"))
+    headings = (*left, *by_scene_headings, "average", "95 %", PAPER_COLUMN)
     notes = (
-        REMINDER_ORIGINAL if setting.original else REMINDER,
-        "Failed targets: of all seeds, those that some episode did not reach; it counts with all its steps.",
-        f"{SOFT_FIXED_POINT.capitalize()}: where the published loss comes to rest, exactly.",
+        reminder(setting.original, original_targets=targets == setting.targets),
+        "Failed targets: of those of all seeds, the ones that an episode did not reach; it counts with all its steps.",
+        *_failures(world, found),
+        f"{SOFT_FIXED_POINT.capitalize()}: where the published loss comes to rest, exactly (entropy weight 0.01; "
+        "rewards clipped unless it says otherwise).",
     )
     return ReportTable(name, title, headings, tuple(rows), notes), _target_table(name, title, world, found)
 
@@ -62,17 +70,35 @@ def navigation_tables(
 def _group_row(world: World, group: Group, values: Scores, metric: str, of_paper: float | None) -> tuple[Value, ...]:
     learnt = (metric, group.learner, group.agent, len(values))
     if not len(values):
-        return (*learnt, None, *(None for _ in world.scene_names), None, None, of_paper)
-    target_scene = world.target_scene.numpy()
-    failed = int((values.of("success") < 1).sum())
-    estimate = mean_estimate(values.of(metric), target_scene)
-    means = _by_scene(world, values.of(metric).mean(0))
-    return (*learnt, failed, *means, estimate.value, estimate.ends, of_paper)
+        return (*learnt, None, *(None for _ in world.scene_names for _ in range(2)), None, None, of_paper)
+    target_scene, success, own = world.target_scene.numpy(), values.of("success"), values.of(metric)
+    failed = f"{int((success < 1).sum())} of {success.size}"
+    parts = [target_scene == scene for scene in range(len(world.scene_names))]
+    scenes = [mean_estimate(own[:, part], target_scene[part]) for part in parts]
+    estimate = mean_estimate(own, target_scene)
+    figures = (value for scene in scenes for value in (scene.value, scene.ends))
+    return (*learnt, failed, *figures, estimate.value, estimate.ends, of_paper)
 
 
-def _reference_row(world: World, name: str, by_target: np.ndarray, metric: str, kind: str = EXACT) -> tuple[Value, ...]:
-    means = _by_scene(world, by_target)
-    return (metric, kind, name, None, None, *means, float(np.mean(means)), None, None)
+def _reference_row(
+    metric: str, kind: str, name: str, means: Sequence[float | None], average: float | None
+) -> tuple[Value, ...]:
+    return (metric, kind, name, None, None, *(value for mean in means for value in (mean, None)), average, None, None)
+
+
+def _failures(world: World, found: Sequence[tuple[Group, Scores]]) -> list[str]:
+    """Which targets failed, by kind of agent."""
+    notes = []
+    for group, values in found:
+        pairs = np.argwhere(values.of("success") < 1).tolist()
+        places = [
+            f"{world.scene_names[world.target_scene[index]]} {world.scene_state(index)} (seed {values.seeds[row]})"
+            for row, index in pairs
+        ]
+        more = f" and {len(places) - NAMED_FAILURES} more, see all targets" if len(places) > NAMED_FAILURES else ""
+        if places:
+            notes.append(f"Failed, {group.learner}, {group.agent}: {', '.join(places[:NAMED_FAILURES])}{more}.")
+    return notes
 
 
 def _by_scene(world: World, by_target: np.ndarray) -> list[float]:
@@ -80,22 +106,27 @@ def _by_scene(world: World, by_target: np.ndarray) -> list[float]:
     return by_scene(by_target[:, None], world.target_scene.numpy())[:, 0].tolist()
 
 
-def _references(world: World, rewards: Sequence[Reward]) -> list[tuple[str, dict[str, np.ndarray]]]:
-    """Steps and collisions, (M,) each, of the shortest path and of each reward's exact policies."""
-    found: list[tuple[str, dict[str, np.ndarray]]] = []
-    for reward in rewards:
-        exact = [each.yardstick for each in world_yardsticks(world, replace(reward, clip=True))]
+def _references(world: World, kinds: Sequence[tuple[Reward, bool]]) -> list[tuple[str, str, dict[str, np.ndarray]]]:
+    """Kind, name, and steps and collisions, (M,) each, of the shortest path and of the rewards' exact policies.
+
+    Args:
+        world: see there.
+        kinds: rewards, and whether they are clipped.
+    """
+    found: list[tuple[str, str, dict[str, np.ndarray]]] = []
+    for reward, clip in kinds:
+        exact = [each.yardstick for each in world_yardsticks(world, replace(reward, clip=clip))]
         if not found:
             shortest = np.array([each.shortest_path_steps for each in exact])
-            found.append(("shortest path", {"steps": shortest, "collisions": np.zeros(len(exact))}))
+            found.append((EXACT, "shortest path", {"steps": shortest, "collisions": np.zeros(len(exact))}))
         for name, policies in ((OPTIMUM, [e.optimal for e in exact]), (SOFT_FIXED_POINT, [e.soft for e in exact])):
-            figures = {metric: np.array([getattr(policy, metric) for policy in policies]) for metric in METRICS}
-            found.append((f"{name} ({reward.name})", figures))
+            label = f"{name} ({reward.name}{'' if clip else ', unclipped'})"
+            found.append((EXACT, label, {m: np.array([getattr(policy, m) for policy in policies]) for m in METRICS}))
     return found
 
 
 def _target_table(name: str, title: str, world: World, found: Sequence[tuple[Group, Scores]]) -> ReportTable:
-    """A row for each target and kind of agent: nothing is hidden in a mean."""
+    """A row for each target and kind of agent, those that failed first: nothing is hidden in a mean."""
     rows: list[tuple[Value, ...]] = []
     for index, scene in enumerate(world.target_scene.tolist()):
         for group, values in found:
@@ -105,4 +136,6 @@ def _target_table(name: str, title: str, world: World, found: Sequence[tuple[Gro
                 for row, seed in enumerate(values.seeds)
             ]
     headings = ("scene", "target", "learner", "agent", "seed", *TARGET_METRICS)
+    success = headings.index("success")
+    rows.sort(key=lambda row: row[success] == 1.0)
     return ReportTable(f"{name}_targets", f"{title}: every target", headings, tuple(rows), folded=True)

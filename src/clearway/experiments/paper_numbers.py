@@ -5,10 +5,12 @@ One run each, on four AI2-THOR scenes and ImageNet features; scenes are named by
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-REMINDER = "The paper's figures are of single runs on other scenes and features; compare rewards, not rooms."
-REMINDER_ORIGINAL = "The paper's figures are of single runs."
+KINDS = ("bathroom", "bedroom", "living_room", "kitchen")
+AVERAGE = "average"
+THE_PAPER = "the paper"
 
 
 @dataclass(frozen=True)
@@ -18,15 +20,30 @@ class PaperRow:
     steps: dict[str, float]
     collisions: dict[str, float]
 
-    def of(self, metric: str, scene: str) -> float | None:
-        """The figure for a scene such as "kitchen_02" or "kitchen", or "average"; None where the paper has none."""
+    def by_scene(self, metric: str, scenes: Sequence[str]) -> list[float | None]:
+        """The paper's figures for scenes such as "kitchen_02" or "kitchen"; None where it has none."""
         values = self.steps if metric == "steps" else self.collisions
-        return next((value for kind, value in values.items() if scene.startswith(kind)), None)
+        return [next((values[kind] for kind in KINDS if scene.startswith(kind)), None) for scene in scenes]
+
+    def average(self, metric: str, scenes: Sequence[str]) -> float | None:
+        """The paper's own average where all of its scenes are among these, else the mean over those that are."""
+        known = [value for value in self.by_scene(metric, scenes) if value is not None]
+        if len(known) == len(KINDS) == len(scenes):
+            return (self.steps if metric == "steps" else self.collisions)[AVERAGE]
+        return round(sum(known) / len(known), 4) if len(known) == len(scenes) else None
+
+
+def reminder(original_scenes: bool, original_targets: bool = True) -> str:
+    """What to keep in mind where the paper's figures stand beside others."""
+    differ = [] if original_scenes else ["scenes", "features"]
+    differ += [] if original_targets else ["targets"]
+    other = f" on other {' and '.join(differ)}" if differ else ""
+    return f"The paper's figures are of single runs{other}" + ("; compare rewards, not rooms." if differ else ".")
 
 
 def _row(steps: tuple[float, ...], collisions: tuple[float, ...]) -> PaperRow:
-    kinds = ("bathroom", "bedroom", "living_room", "kitchen", "average")
-    return PaperRow(dict(zip(kinds, steps, strict=True)), dict(zip(kinds, collisions, strict=True)))
+    names = (*KINDS, AVERAGE)
+    return PaperRow(dict(zip(names, steps, strict=True)), dict(zip(names, collisions, strict=True)))
 
 
 TABLE_1 = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
@@ -18,7 +18,7 @@ from clearway.experiments.local import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting, prepare
-from clearway.files import written_whole
+from clearway.files import read_json, written_whole
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class ReproduceRequest:
         learners: names among `setting.LEARNERS`.
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
-        command: that asked for it, for the report.
+        commands: that asked for it, for the report.
         ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
     """
 
@@ -53,32 +53,44 @@ class ReproduceRequest:
     workers: int | None = None
     threads: int = 1
     ray: str | None = None
-    command: str = ""
+    commands: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What came of it: the setting, and a section for each experiment."""
+    """What came of it.
 
-    command: str
+    Attributes:
+        commands: that asked for the experiments.
+        setting: that they share.
+        jobs: all that they need.
+        sections: one for each.
+    """
+
+    commands: tuple[str, ...]
     setting: Setting
+    jobs: list[Job]
     sections: list[Section]
 
 
 REQUEST_FILE = "reproduction.json"
 HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a report does not depend on
+WHO_ASKED = ("names", "commands")  # parts that may differ between requests of one report
 
 
 def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reproduction:
     """Do what is missing of the experiments and gather their sections.
+
+    Experiments that earlier commands asked for with all else alike keep their place in the report.
 
     Raises:
         ClearwayError: a scene cannot be had, or a run failed; what is complete stays.
         KeyboardInterrupt: the user interrupted; the same command goes on.
     """
     setting = _setting(request, show_progress)
+    whole = _with_earlier(request)
     with written_whole(request.out / REQUEST_FILE) as part:
-        part.write_text(json.dumps(_request_json(request), indent=2) + "\n", encoding="utf-8")
+        part.write_text(json.dumps(_request_json(whole), indent=2) + "\n", encoding="utf-8")
     jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
     with board(request.out, jobs, show_progress) as show:
@@ -94,7 +106,7 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
                 threads=request.threads,
                 show=show,
             )
-    return _gathered(request, setting)
+    return _gathered(whole, setting)
 
 
 def gather(out: Path) -> Reproduction:
@@ -103,20 +115,39 @@ def gather(out: Path) -> Reproduction:
     Raises:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
+    request = _read_request(out)
+    return _gathered(request, _setting(request, show_progress=False))
+
+
+def _read_request(out: Path) -> ReproduceRequest:
     path = out / REQUEST_FILE
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         dumps = [Path(dump) for dump in content.pop("dumps")]
-        request = ReproduceRequest(out=out, dumps=dumps, **content)
+        return ReproduceRequest(out=out, dumps=dumps, **content)
     except FileNotFoundError as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
-    return _gathered(request, _setting(request, show_progress=False))
+
+
+def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
+    """The request, and the experiments that the folder's last one asked for where all else is alike."""
+    try:
+        earlier = _read_request(request.out)
+    except RunError:  # there is none, or none that could be gone on with: this one takes its place
+        return request
+    own, other = ({n: v for n, v in _request_json(r).items() if n not in WHO_ASKED} for r in (request, earlier))
+    if own != other:
+        return request
+    names = {*earlier.names, *request.names}
+    commands = dict.fromkeys((*earlier.commands, *request.commands))
+    return replace(request, names=[name for name in EXPERIMENTS if name in names], commands=tuple(commands))
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
-    return Reproduction(request.command, setting, [EXPERIMENTS[name].section(setting) for name in request.names])
+    sections = [EXPERIMENTS[name].section(setting) for name in request.names]
+    return Reproduction(tuple(request.commands), setting, planned(setting, request.names), sections)
 
 
 def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from clearway.evaluate.across_seeds import Estimate
 
 Verdict = Literal["holds", "does not hold", "undecided"]
 Value = str | int | float | None
@@ -37,7 +39,15 @@ class ReportTable:
 
 @dataclass(frozen=True)
 class Series:
-    """A line or a set of points: x and y, and the interval of y where there is one."""
+    """A line or a set of points.
+
+    Attributes:
+        label: in the legend.
+        x, y: of the points.
+        low, high: around y, where there is an interval.
+        points: without a line between them.
+        highlighted: points that stand out.
+    """
 
     label: str
     x: Sequence[float]
@@ -45,12 +55,21 @@ class Series:
     low: Sequence[float] | None = None
     high: Sequence[float] | None = None
     points: bool = False
-    """Points without a line between them."""
+    highlighted: bool = False
 
 
 @dataclass(frozen=True)
 class ReportFigure:
-    """A figure: its series share the axes; beyond `linear_below` the vertical one is logarithmic, None: nowhere."""
+    """A figure whose series share the axes.
+
+    Attributes:
+        name: of its file.
+        title: above it.
+        x_label, y_label: of the axes.
+        series: lines and points.
+        linear_below: beyond it the vertical axis is logarithmic; None: nowhere.
+        band: what the bands or bars around the lines are; empty where there are none.
+    """
 
     name: str
     title: str
@@ -58,6 +77,7 @@ class ReportFigure:
     y_label: str
     series: tuple[Series, ...]
     linear_below: float | None = None
+    band: str = ""
 
 
 @dataclass(frozen=True)
@@ -81,11 +101,20 @@ class ReportMap:
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that the paper says, and what was found."""
+    """A claim, and what was found.
+
+    Attributes:
+        text: the claim.
+        verdict, evidence: for people.
+        numbers: the evidence by name, for programs.
+        further: the paper does not ask this.
+    """
 
     text: str
     verdict: Verdict
     evidence: str
+    numbers: Mapping[str, Estimate] = field(default_factory=dict)
+    further: bool = False
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,11 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 
 SCENES = "scenes"
 LEARNERS: dict[LearnerName, Learner] = {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}
+ABOUT_LEARNERS: Mapping[str, str] = {
+    "published": "the paper's settings, A2C in place of A3C (PAPER_A2C)",
+    "published-a3c": "the paper's settings and its A3C (PAPER_A3C)",
+    "default": "this project's default recipe",
+}
 
 
 @dataclass(frozen=True)

@@ -12,22 +12,23 @@ from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
 from clearway.experiments.trajectories import maps
-from clearway.experiments.verdicts import judged_less, judged_no_more
+from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
 
 REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
 BASELINES = {SHORTEST.name: "the shortest-path reward", BUMP.name: "a penalty for bumping"}
 """What the collision-aware reward is compared with, by name; the paper compares with the first alone."""
+UNCLIPPED = "unclipped"  # ends the name of a learner that the paper does not have
 
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done."""
-    return all_jobs(_groups(setting))
+    return all_jobs(all_groups(setting))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    groups = _groups(setting)
+    groups = all_groups(setting)
     tables = navigation_tables("table1", "Steps and collisions", setting, setting.targets, groups, TABLE_1)
     return Section(
         name="table1",
@@ -43,18 +44,24 @@ def section(setting: Setting) -> Section:
     )
 
 
-def _groups(setting: Setting) -> list[Group]:
+def all_groups(setting: Setting) -> list[Group]:
     """All rewards; and the two that the paper compares once more without clipping, where a learner clips."""
     unclipped = {
-        f"{name}, unclipped": replace(learner, clip_rewards=False)
+        f"{name}, {UNCLIPPED}": replace(learner, clip_rewards=False)
         for name, learner in setting.learners.items()
         if learner.clip_rewards
     }
     return compared(setting, REWARDS) + compared(replace(setting, learners=unclipped), PAIR)
 
 
-def claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
-    """Fewer collisions, and no more steps, than with each baseline that a learner was trained with."""
+def claims(setting: Setting, groups: Sequence[Group], where: str = "") -> list[Claim]:
+    """Fewer collisions, and no more steps, than with each baseline that a learner was trained with.
+
+    Args:
+        setting: see there.
+        groups: of any learners and rewards, all tried on the same targets.
+        where: behind each claim, for example " on hard targets".
+    """
     world = setting.world(groups[0].trial.targets)
     target_scene = world.target_scene.numpy()
     scores = {(group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups}
@@ -66,8 +73,10 @@ def claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
             if theirs is None:
                 continue
             for text, what, judged in (
-                (f"fewer collisions than with {called}", "collisions", judged_less),
-                (f"no more steps than with {called}", "steps", judged_no_more),
+                (f"fewer collisions than with {called}{where}", "collisions", judged_less),
+                (f"no more steps than with {called}{where}", "steps", judged_no_more),
             ):
-                found.append(judged(f"{learner}: {text}", what, ours.of(what), theirs.of(what), target_scene))
+                claim = judged(f"{learner}: {text}", what, ours.of(what), theirs.of(what), target_scene)
+                further = baseline != SHORTEST.name or learner.endswith(UNCLIPPED)
+                found.append(replace(with_failures(claim, ours.of("success"), theirs.of("success")), further=further))
     return found

@@ -18,7 +18,7 @@ from html import escape
 from pathlib import Path
 
 from clearway.experiments.section import Claim, ReportTable, Section, Value
-from clearway.files import written_whole
+from clearway.files import read_json, written_whole
 from clearway.scenes.scene import Scene
 from clearway.viz.page_style import CSS
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
@@ -46,6 +46,7 @@ def write_report(
         warning: stands at the top; empty for none.
         scenes: those of the maps.
     """
+    _remove_stale(folder, sections)
     for section in sections:
         for table in section.tables:
             _write_csv(folder / TABLES / f"{table.name}.csv", table)
@@ -63,6 +64,21 @@ def write_report(
         with written_whole(folder / name) as part:
             part.write_text(text, encoding="utf-8")
     return folder / HTML
+
+
+def _remove_stale(folder: Path, sections: Sequence[Section]) -> None:
+    """Remove the tables and figures of the report that lies here, where the new one has none of that name."""
+    try:
+        earlier = read_json(folder / JSON)["sections"]
+        names = {(TABLES, f"{table['name']}.csv") for section in earlier for table in section["tables"]}
+        names |= {(FIGURES, f"{f['name']}.png") for section in earlier for f in (*section["figures"], *section["maps"])}
+    except (OSError, ValueError, KeyError, TypeError):  # no report, or a damaged one: nothing is known to be stale
+        return
+    names -= {(TABLES, f"{table.name}.csv") for section in sections for table in section.tables}
+    names -= {(FIGURES, f"{figure.name}.png") for section in sections for figure in section.pictures}
+    for place, name in names:
+        if Path(name).name == name:  # a file may say anything; nothing outside the report's folders is touched
+            (folder / place / name).unlink(missing_ok=True)
 
 
 def _write_csv(path: Path, table: ReportTable) -> None:
@@ -84,10 +100,14 @@ def value_text(value: Value) -> str:
 
 
 def _summary(sections: Sequence[Section]) -> list[ReportTable]:
-    """All verdicts at a glance; nothing where there are none."""
-    rows = tuple((claim.text, claim.verdict, section.title) for section in sections for claim in section.claims)
-    title = "Verdicts at a glance"
-    return [ReportTable("summary", title, ("claim", "verdict", "evidence in"), rows)] if rows else []
+    """All verdicts at a glance, the paper's claims apart; nothing where there are none."""
+    tables = []
+    for title, further in (("The paper's claims at a glance", False), ("Further questions", True)):
+        claims = [(claim, section.title) for section in sections for claim in section.claims]
+        rows = tuple((claim.text, claim.verdict, where) for claim, where in claims if claim.further == further)
+        if rows:
+            tables.append(ReportTable("summary", title, ("claim", "verdict", "evidence in"), rows))
+    return tables
 
 
 def _verdict_rows(claims: Sequence[Claim]) -> ReportTable:

@@ -26,8 +26,8 @@ def draw_report_map(shown: ReportMap, scenes: Sequence[Scene], path: Path) -> No
 
 
 def draw_report_figure(figure: ReportFigure, path: Path) -> None:
-    """Draw a figure and save it as PNG. Series differ in colour, in lightness, and in dashes or markers."""
-    from matplotlib.ticker import EngFormatter
+    """Draw a figure and save it as PNG. Series differ in colour, and in dashes or markers."""
+    from matplotlib.ticker import EngFormatter, SymmetricalLogLocator
 
     with new_figure(WIDTH_IN, HEIGHT_IN, path) as canvas:
         canvas.suptitle(figure.title, x=0.01, ha="left", fontsize=12, fontweight="bold")
@@ -35,9 +35,10 @@ def draw_report_figure(figure: ReportFigure, path: Path) -> None:
         for index, series in enumerate(figure.series):
             style, marker = CURVES[index % len(CURVES)], MARKERS[index % len(MARKERS)]
             if series.points:
+                size, kind, front = (160, "*", 5) if series.highlighted else (26, marker, 3)
                 axes.scatter(
-                    series.x, series.y, s=26, color=style.colour, edgecolor=colours.INK, linewidth=0.5, marker=marker,
-                    label=series.label, zorder=3,
+                    series.x, series.y, s=size, color=style.colour, edgecolor=colours.INK, linewidth=0.5, marker=kind,
+                    label=series.label, zorder=front,
                 )  # fmt: skip
                 continue
             few = len(series.x) <= len(MARKERS)
@@ -45,16 +46,27 @@ def draw_report_figure(figure: ReportFigure, path: Path) -> None:
                 series.x, series.y, color=style.colour, linestyle=style.pattern, marker=marker if few else None,
                 markersize=4, label=series.label,
             )  # fmt: skip
-            if series.low is not None and series.high is not None:
+            if series.low is None or series.high is None:
+                continue
+            if few:
+                ends = [[y - low for y, low in zip(series.y, series.low, strict=True)],
+                        [high - y for y, high in zip(series.y, series.high, strict=True)]]  # fmt: skip
+                axes.errorbar(series.x, series.y, yerr=ends, fmt="none", ecolor=style.colour, capsize=3, linewidth=1)
+            else:
                 axes.fill_between(series.x, series.low, series.high, color=style.colour, alpha=0.15, linewidth=0)
+                for edge in (series.low, series.high):  # so that bands can be told apart in grey
+                    axes.plot(series.x, edge, color=style.colour, linestyle=style.pattern, linewidth=0.5)
         if figure.linear_below is not None:
             axes.set_yscale("symlog", linthresh=figure.linear_below)
+            axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=figure.linear_below, subs=(1, 2, 5)))
             axes.yaxis.set_major_formatter("{x:g}")
             lowest = min(value for series in figure.series for value in (series.low or series.y))
-            axes.set_ylim(bottom=lowest / 2 if lowest > figure.linear_below else 0)
+            axes.set_ylim(bottom=lowest / 2 if lowest > figure.linear_below else -0.06 * figure.linear_below)
         axes.xaxis.set_major_formatter(EngFormatter(sep=""))
         axes.set_xlabel(figure.x_label)
         axes.set_ylabel(figure.y_label)
         axes.grid(visible=True)
         axes.set_axisbelow(True)
-        canvas.legend(loc="outside lower center", ncols=2, fontsize=8, handlelength=3)
+        canvas.legend(
+            loc="outside lower center", ncols=2, fontsize=8, handlelength=3, title=figure.band or None, title_fontsize=8
+        )

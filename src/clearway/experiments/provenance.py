@@ -1,0 +1,33 @@
+"""What made the runs of a report: the commands that started them, the versions and the machines, as the runs say."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from clearway.experiments.job import run_folder
+from clearway.experiments.plan import Job
+from clearway.learn.provenance import facts_text, hardware, package_versions
+
+
+def made_by(out: Path, jobs: Sequence[Job]) -> dict[str, str]:
+    """Lines for a report: each different answer with the number of runs that give it; this machine's without runs.
+
+    Raises:
+        RunError: a run's record is damaged.
+    """
+    folders = [folder for job in jobs if (folder := run_folder(out, job.run)).exists]
+    records = [folder.read_record() for folder in folders]
+    if not records:
+        return {"versions": facts_text(package_versions()), "hardware": facts_text(hardware())}
+    return {
+        "runs begun by": _counted([shlex.join(["clearway", *record.command[1:]]) for record in records]),
+        "versions": _counted([facts_text(dict(record.versions)) for record in records]),
+        "hardware": _counted([facts_text(dict(record.hardware)) for record in records]),
+    }
+
+
+def _counted(answers: Sequence[str]) -> str:
+    return "; ".join(f"{answer} ({count} run{'s' * (count > 1)})" for answer, count in Counter(answers).items())
