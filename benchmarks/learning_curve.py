@@ -132,7 +132,9 @@ def policy_of(trainer: Learning) -> Policy:
     """The agent as it stands, whichever algorithm trains it; training is none the wiser."""
     world, learner, prefix = trainer.world, trainer.learner, "network."
     assert world.features is not None
-    shape = NetworkShape(world.scene_count, trainer.feature_map.input_count, learner.width, learner.history_length)
+    shape = NetworkShape(
+        learner.head_count(world.scene_count), trainer.feature_map.input_count, learner.width, learner.history_length
+    )
     network = SiameseActorCritic(shape).to(world.device)
     tensors = trainer.tensors().items()
     network.load_state_dict({name[len(prefix) :]: t for name, t in tensors if name.startswith(prefix)})

@@ -5,8 +5,9 @@
     python benchmarks/peers.py --cap-minutes 5 --seconds 5     # a first look
     python benchmarks/peers.py --scenes a.h5 b.h5 --json peers.json
 
-Both sides have the same scenes, prepared features, targets, reward and step limit, the paper's network (a head a scene,
-the same sizes; SB3's is held against ours at the start), and all cores.
+Both sides have the same scenes, prepared features, targets and reward, the paper's network (a head a scene, the same
+sizes; SB3's is held against ours at the start), and all cores. Episodes are cut after 40 steps on our side and in SB3's
+PPO with our recipe's values, after 500 in SB3's own settings.
 
 Frames/s. Ours is the package's A2C, 400 and 1600 environments x 20 steps, full network, exact gradients, in float32 as
 SB3's and with factors of matrix products in bfloat16 as by default (float32 again on machines without such

@@ -96,8 +96,21 @@ def test_a_target_that_nothing_leads_to() -> None:
     scene = corridor_scene(2)
     graph = scene.graph.copy()
     graph[graph == 4] = BLOCKED
-    with pytest.raises(SceneError, match="no state leads to target 4"):
+    with pytest.raises(SceneError, match="only 0 of 8 states lead to target 4"):
         make_world([replace(scene, graph=graph)], {scene.name: [4]})
+
+
+def test_a_target_on_an_island() -> None:
+    """In bedroom_04 a cell cannot be entered; there turning on the spot leads from state to state."""
+    scene = corridor_scene(5)
+    graph = scene.graph.copy()
+    graph[16:20, [Action.MOVE_FORWARD, Action.MOVE_BACKWARD]] = BLOCKED
+    inward = (graph[:16] >= 16) & (graph[:16] < 20)
+    graph[:16][inward] = BLOCKED
+    island = replace(scene, graph=graph)
+    with pytest.raises(SceneError, match=r"only 3 of 20 states lead to target 17.*largest component"):
+        make_world([island], {scene.name: [3, 17]})
+    assert make_world([island], {scene.name: [3]}).start_count.tolist() == [15]
 
 
 def test_scenes_of_one_name() -> None:

@@ -1,6 +1,7 @@
 """The oracle against typed-in numbers, brute force and walked episodes."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from clearway.errors import SceneError
 from clearway.evaluate.episodes import run_episodes
 from clearway.evaluate.optimum import optimum_policies, world_yardsticks
 from clearway.evaluate.oracle import action_values, make_task, optimal_policy, soft_policy, yardstick
+from clearway.evaluate.run import _optima
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
 from clearway.zones import Zone, pose_zones
 from made import corridor_scene, grid_scene
@@ -50,6 +52,19 @@ def test_two_cells_typed_in():
     # from cell 0: headings 0, 90, 180, 270 need 1, 2, 3, 2 steps; from cell 1: 90, 180, 270 need 1, 2, 1
     assert found.shortest_path_steps == pytest.approx((1 + 2 + 3 + 2 + 1 + 2 + 1) / 7)
     assert found.optimal.steps == pytest.approx(12 / 7)
+
+
+@pytest.mark.parametrize("alpha", [0.5, 0.05])
+def test_where_walking_on_earns_more_than_arriving_no_episode_ends(alpha: float) -> None:
+    """A step in the open that earns something for ever is worth more than a target that ends it."""
+    scene = grid_scene(1, width=5, depth=5)
+    world = make_world([scene], {scene.name: [0]})
+    reward = replace(COLLISION_AWARE, alpha=alpha, clip=True)
+    (found,) = world_yardsticks(world, reward)
+    assert found.yardstick.optimal.steps == found.yardstick.soft.steps == np.inf
+    assert found.to_json()["optimal"] == {"steps": None, "collision_visits": None, "precollision_visits": None}
+    walked = run_episodes(world, optimum_policies(world, [found])[0], episodes_per_target=20, step_cap=300, seed=0)
+    assert not walked.reached.all()
 
 
 def test_no_state_leads_to_the_target():
@@ -135,3 +150,17 @@ def test_policies_stand_on_the_worlds_numbering():
     history = torch.full((1, 4), first + 2)
     np.testing.assert_allclose(best(history, torch.tensor([1])).sum(1), 1.0, atol=1e-6)
     assert float(best(history, torch.tensor([0])).sum()) == 0
+
+
+def test_the_tables_soft_fixed_point_is_that_of_clipped_rewards() -> None:
+    """Published rewards are clipped; a run's own reward need not be."""
+    scene = grid_scene(2, width=4, depth=4)
+    world = make_world([scene], {scene.name: [5]})
+    policies = _optima(world, [COLLISION_AWARE])
+    for name, clip, kind in (("optimum", False, 0), ("soft fixed point", True, 1)):
+        expected = optimum_policies(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=clip)))[kind]
+        other = optimum_policies(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=not clip)))[kind]
+        history, target = torch.arange(scene.state_count)[:, None], torch.zeros(scene.state_count, dtype=torch.int64)
+        own = policies[f"{name} (collision-aware)"](history, target)
+        assert torch.equal(own, expected(history, target))
+        assert kind == 0 or not torch.allclose(own, other(history, target), atol=1e-3)

@@ -102,6 +102,8 @@ def test_as_a2c_makes_one_pass_and_changes_nothing_else() -> None:
     ("name", "value"),
     [
         ("frames", 0),
+        ("clip_norm", float("inf")),
+        ("balance", float("inf")),
         ("envs", 0),
         ("rollout_steps", -1),
         ("step_limit", 0),

@@ -272,8 +272,41 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     assert Progress(trainer.frames, trainer.updates, progress.seconds) == progress
 
 
+@pytest.mark.parametrize(
+    ("name", "began", "said"),
+    [("threads", 7, "threads 1 instead of 7"), ("feature_store", "float16", "feature_store memory instead of float16")],
+)
+def test_going_on_with_other_threads_or_another_store_is_said(
+    name: str, began: int | str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.set_num_threads(1)
+    request = small_request()
+    with monkeypatch.context() as patch:
+        interrupt_at(patch, 480, signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(request, tmp_path)
+    folder = RunFolder(tmp_path)
+    record = folder.read_record()
+    folder.write_record(replace(record, hardware={**record.hardware, name: began}))
+    with pytest.warns(UserWarning, match=f"{said}; results will not be those of an uninterrupted run"):
+        train.train(request, tmp_path, resume=True)
+    train.train(request, tmp_path, resume=True)  # nothing is left to do, so nothing to warn of
+
+
+def test_a_checkpoint_without_a_tensor_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    request = small_request()
+    with monkeypatch.context() as patch:
+        interrupt_at(patch, 480, signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(request, tmp_path)
+    whole = train.read_training
+    monkeypatch.setattr(train, "read_training", lambda path: {k: t for k, t in whole(path).items() if "drawn" not in k})
+    with pytest.raises(RunError, match=r"frames-\d+: does not fit its run .*drawn.*Remove it"):
+        train.train(request, tmp_path, resume=True)
+
+
 def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    for name in ("nonsense", "cuda:99"):
+    for name in ("nonsense", "cuda:99", "meta"):
         with pytest.raises(RunError, match=f"device {name}: cannot be used here"):
             train.train(small_request(device=name), tmp_path)
 

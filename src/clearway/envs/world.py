@@ -21,7 +21,7 @@ from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import Scene
 from clearway.zones import scene_zones
 
-FEWEST_STARTS = 1
+LEAST_SHARE = 0.5  # of the scene's largest component, from which a target must be reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,10 +178,9 @@ def _starts(scene: Scene, targets: Sequence[int]) -> list[tuple[np.ndarray, np.n
     found = []
     for target, steps in zip(targets, scene.distances_to(np.asarray(targets)), strict=True):
         state = np.flatnonzero(steps > 0)
-        if len(state) < FEWEST_STARTS:
-            raise SceneError(
-                scene.name, f"no state leads to target {target}", "Choose a target in the largest component", "graph"
-            )
+        if len(state) < max(1, LEAST_SHARE * (np.count_nonzero(scene.components == 0) - 1)):
+            problem = f"only {len(state)} of {scene.state_count} states lead to target {target}"
+            raise SceneError(scene.name, problem, "Choose a target in the scene's largest component", "graph")
         found.append((state, steps[state]))
     return found
 

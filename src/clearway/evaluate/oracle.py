@@ -68,6 +68,9 @@ class Expected:
     precollision_visits: float
 
 
+NEVER = Expected(np.inf, np.inf, np.inf, np.inf)
+
+
 @dataclass(frozen=True)
 class Yardstick:
     """What can be reached with one target.
@@ -169,15 +172,18 @@ def soft_policy(task: Task, discount: float = DISCOUNT, entropy_weight: float = 
 
 
 def expected(task: Task, policy: np.ndarray) -> Expected:
-    """Expected figures of an episode under a policy (S, A), averaged over all starts; inf where it may never end."""
+    """Expected figures of an episode under a policy (S, A), averaged over all starts.
+
+    Inf where an episode may never end, or so rarely that float64 cannot tell.
+    """
     walking = task.starts
     inside = np.zeros(len(task.reward), bool)
     inside[walking] = True
     mass = policy[walking]
     onward = task.next_state[walking]
     lost = ~inside[onward] & (onward != task.target)
-    if (mass[lost] > 0).any():
-        return Expected(np.inf, np.inf, np.inf, np.inf)
+    if (mass[lost] > 0).any() or not _arrives(task, policy):
+        return NEVER
     walked = _transitions(task, policy)[walking][:, walking]
 
     def arrivals(zone: Zone) -> np.ndarray:
@@ -192,9 +198,22 @@ def expected(task: Task, policy: np.ndarray) -> Expected:
         ],
         1,
     )
-    per_episode = _solve(eye_array(len(walking)) - walked, per_step)
+    try:
+        per_episode = _solve(eye_array(len(walking)) - walked, per_step)
+    except RuntimeError:  # singular: from some pose the chance to arrive is lost in rounding
+        return NEVER
+    lengths = per_episode[:, 0]
+    if not ((lengths >= 1) & (lengths < 1 / np.finfo(np.float64).eps)).all():
+        return NEVER
     steps, collisions, collision_visits, precollision_visits = per_episode.mean(0).tolist()
     return Expected(steps, collisions, collision_visits, precollision_visits)
+
+
+def _arrives(task: Task, policy: np.ndarray) -> bool:
+    """From every start some actions that the policy may take lead to the target."""
+    allowed = np.where(policy > 0, task.next_state, np.arange(len(policy))[:, None])
+    steps = distances_to(allowed, np.array([task.target]))[0]
+    return bool((steps[task.starts] > 0).all())
 
 
 def _transitions(task: Task, weights: np.ndarray) -> csr_array:

@@ -73,8 +73,10 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
     """What would be best under each reward, exactly, and where the published loss comes to rest (see `oracle`)."""
     found: dict[str, Policy] = {}
     for reward in dict.fromkeys(rewards):
-        best, _ = optimum_policies(world, world_yardsticks(world, reward))
-        _, soft = optimum_policies(world, world_yardsticks(world, replace(reward, clip=True)))
+        exact = world_yardsticks(world, reward)
+        best, soft = optimum_policies(world, exact)
+        if not reward.clip:
+            _, soft = optimum_policies(world, world_yardsticks(world, replace(reward, clip=True)))
         found[f"{OPTIMUM} ({reward.name})"] = best
         found[f"{SOFT_FIXED_POINT} ({reward.name})"] = soft
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
@@ -15,6 +16,8 @@ PresetName = Literal["default", "paper", "paper-a3c"]
 _A3C_NEEDS: dict[str, object] = {
     "heads": "scene",
     "scenes_at_once": 0,
+    "envs_by": "scenes",
+    "reward_scale": 1,
     "epochs": 1,
     "minibatches": 1,
     "siamese_lr": 1,
@@ -44,7 +47,8 @@ class Learner:
     frames: int = 3_000_000
     """Training frames over all environments; schedules end here."""
     envs: int = 400
-    """Environments side by side. Of a3c: workers, divided evenly among the targets."""
+    """Environments side by side, another number being another experiment whatever the seed. Of a3c: workers, worker i
+    for target i modulo the number of targets."""
     envs_by: Literal["states", "scenes"] = "states"
     """How environments are divided: in proportion to the scenes' states, or as many for each scene."""
     rollout_steps: int = 20
@@ -138,6 +142,9 @@ class Learner:
         Raises:
             RunError: a value is out of range.
         """
+        for name, value in asdict(self).items():
+            if isinstance(value, float) and not math.isfinite(value):
+                raise RunError(f"{name} is {value}, expected a finite figure. Give a large one instead")
         at_least_one = ("frames", "envs", "rollout_steps", "step_limit", "epochs", "minibatches", "width")
         for name in (*at_least_one, "scene_updates", "history_length"):
             if getattr(self, name) < 1:

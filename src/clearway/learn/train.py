@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -38,6 +39,7 @@ from clearway.scenes.scene import Scene
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
+SHAPES_BITS = ("threads", "bfloat16", "device", "feature_store")  # in a run's hardware
 NETWORK = "network."  # tensors of the network among a trainer's
 
 
@@ -93,9 +95,11 @@ class RunRequest:
 
     def record(self) -> RunRecord:
         """The record to be written to the run folder."""
-        return record_of(
+        record = record_of(
             self.scenes, self.paths or {}, self.targets, self.learner, self.reward, self.seed, self.zone_level
         )
+        where = {"device": self.device, "feature_store": self.feature_store}
+        return replace(record, hardware={**record.hardware, **where})
 
     def trainer(self) -> Learning:
         """A trainer at its first frame. A3C runs in as many processes as torch has threads."""
@@ -166,10 +170,30 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bo
         return 0.0
     checkpoint = newest_checkpoint(folder.checkpoints)
     progress = read_progress(checkpoint)
+    if progress.frames < record.learner.frames:
+        _warn_of_other_bits(folder, before, record)
     tensors = {**read_training(checkpoint), **read_network(checkpoint)}
-    trainer.load_tensors(tensors, progress.frames, progress.updates)
+    try:
+        trainer.load_tensors(tensors, progress.frames, progress.updates)
+    except (LookupError, RuntimeError) as error:
+        reason = " ".join(str(error).split())[:300]
+        raise RunError(
+            f"{checkpoint}: does not fit its run ({reason}). Remove it, to go on from the one before, or train again"
+        ) from error
     folder.forget_metrics_after(progress.frames)
     return progress.seconds
+
+
+def _warn_of_other_bits(folder: RunFolder, before: RunRecord, now: RunRecord) -> None:
+    """Say where a run goes on in another way than it began, so that an uninterrupted one would have other bits."""
+    differ = [
+        f"{name} {now.hardware[name]} instead of {before.hardware[name]}"
+        for name in SHAPES_BITS
+        if name in before.hardware and before.hardware[name] != now.hardware[name]
+    ]
+    if differ:
+        text = f"{folder.path}: goes on with {', '.join(differ)}; results will not be those of an uninterrupted run"
+        warnings.warn(text, stacklevel=2)
 
 
 def _run(
@@ -227,8 +251,9 @@ def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
 
 def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
     """Write what is needed to act, not to train on."""
+    tensors = trainer.tensors()  # first, since A3C's workers walk on until then
     progress = Progress(trainer.frames, trainer.updates, seconds)
-    write_checkpoint(folder, _agent(trainer, trainer.tensors()), {}, progress)
+    write_checkpoint(folder, _agent(trainer, tensors), {}, progress)
 
 
 def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
@@ -268,7 +293,7 @@ def usable_device(name: str) -> torch.device:
     """
     try:
         device = torch.device(name)
-        torch.empty(1, device=device)
+        torch.zeros(1, device=device).item()
     except (RuntimeError, AssertionError) as error:  # torch without CUDA asserts
         reason = str(error).splitlines()[0]
         raise RunError(f"device {name}: cannot be used here ({reason}). Give another --device, such as cpu") from error

@@ -1,7 +1,7 @@
 """A worker process: rounds of its workers, until its parent says otherwise, closes the connection or dies.
 
-The parent sends PAUSE and GO; the process sends `Round` reports, PAUSED, or an error. It never outlives its parent: a
-report or a command finds the connection closed.
+The parent sends PAUSE and GO; the process sends `Report`s and PAUSED. It never outlives its parent: a report or a
+command finds the connection closed.
 """
 
 from __future__ import annotations
