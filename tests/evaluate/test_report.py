@@ -103,3 +103,18 @@ def test_tables_show_every_row_and_the_encoder(evaluations, level, rows):
     console.print(rich_table(evaluations, level))
     shown = console.export_text()
     assert "Encoder: made-up." in shown and "shortest path" in shown and "…" not in shown
+
+
+def test_wherever_success_stands_on_a_page_the_stricter_scores_stand_beside_it(evaluations):
+    headings = [set(table_text(evaluations, width=width).headings) for width in ("terminal", "page", "all")]
+    assert headings[0] < headings[1] < headings[2]
+    assert {"sc %", "sc 4× %", "SPL %"} <= headings[1]
+    assert {"sc %", "SPL %"} <= headings[0]
+
+
+def test_the_terminal_s_table_fits_80_columns(evaluations):
+    console = Console(width=200, file=io.StringIO())
+    console.print(rich_table(evaluations))
+    rows = [line.rstrip() for line in console.file.getvalue().splitlines() if "–" in line or "steps" in line]
+    assert len(rows) > 5
+    assert max(map(len, rows[:-2])) <= 80

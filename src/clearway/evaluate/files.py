@@ -22,4 +22,4 @@ def write_evaluations(folder: Path, content: object, evaluations: Sequence[Evalu
     with written_whole(folder / "evaluation.json") as part:
         part.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     with written_whole(folder / "evaluation.md") as part:
-        part.write_text(markdown_table(evaluations, "scenes", narrow=True), encoding="utf-8")
+        part.write_text(markdown_table(evaluations, "scenes", width="page"), encoding="utf-8")

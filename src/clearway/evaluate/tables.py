@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT
 from clearway.evaluate.report import Evaluation, Result
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Level = Literal["average", "scenes", "targets"]
+Width = Literal["terminal", "page", "all"]
+"""How many columns there is room for; what a narrower table has, a wider one has too."""
+WIDTHS: tuple[Width, ...] = get_args(Width)
 MARK = "✗"
 REFERENCES = {
     OPTIMUM: "the exact best policy under that reward, ties taken alike",
@@ -54,7 +57,7 @@ class _Column:
     metric: str
     digits: int
     percent: bool = False
-    main: bool = False
+    least: Width = "all"
 
     def cell(self, result: Result) -> Cell:
         """The figure of this column. Large figures lose decimals, the ends of the interval keep as many."""
@@ -66,32 +69,33 @@ class _Column:
 
 
 COLUMNS = (
-    _Column("steps", "steps", 2, main=True),
+    _Column("steps", "steps", 2, least="terminal"),
     _Column("× shortest", "path_ratio", 2),
-    _Column("collisions", "collisions", 3, main=True),
+    _Column("collisions", "collisions", 3, least="terminal"),
     _Column("per 100 steps", "collisions_per_100_steps", 2),
     _Column("no collision %", "collision_free", 2, percent=True),
-    _Column("sc %", "sc", 2, percent=True, main=True),
-    _Column("SPL %", "spl", 2, percent=True, main=True),
+    _Column("sc %", "sc", 2, percent=True, least="terminal"),
+    _Column("sc 4× %", "sc_4x", 2, percent=True, least="page"),
+    _Column("SPL %", "spl", 2, percent=True, least="terminal"),
     _Column("collision-free SPL %", "collision_free_spl", 2, percent=True),
     _Column("in collision zone %", "share_collision", 2, percent=True),
     _Column("looped %", "looped", 2, percent=True),
 )
 
 
-def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, narrow: bool = False) -> TableText:
+def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all") -> TableText:
     """The rows of a table of one or more evaluations.
 
     Args:
         evaluations: at least one.
         level: one row an evaluation ("average"), or one for each of its "scenes" or "targets"; a single scene is the
             average.
-        narrow: the main figures alone, which fit a terminal.
+        width: which columns.
     """
     assert evaluations, "a table needs at least one evaluation"
     if level == "scenes" and len(evaluations[0].scenes) == 1:
         level = "average"
-    columns = [column for column in COLUMNS if column.main or not narrow]
+    columns = [column for column in COLUMNS if WIDTHS.index(column.least) <= WIDTHS.index(width)]
     where = () if level == "average" else ("scene",)
     headings = (*where, "agent", "solved", *(column.heading for column in columns))
     names = [evaluation.agent for evaluation in evaluations]
@@ -107,9 +111,9 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, n
     return TableText(headings, rows, tuple(_notes(evaluations)))
 
 
-def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", *, narrow: bool = False) -> str:
+def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all") -> str:
     """The table in Markdown, its notes under it."""
-    table = table_text(evaluations, level, narrow=narrow)
+    table = table_text(evaluations, level, width=width)
     lines = [_pipes(table.headings), _pipes("---" for _ in table.headings)]
     lines += [_pipes(_one_line(cell) for cell in row) for row in table.rows]
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"
@@ -121,7 +125,7 @@ def rich_table(evaluations: Sequence[Evaluation], level: Level = "average") -> T
     from rich.table import Table
     from rich.text import Text
 
-    content = table_text(evaluations, level, narrow=True)
+    content = table_text(evaluations, level, width="terminal")
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), caption="\n".join(content.notes), caption_justify="left")
     first_figure = content.headings.index("solved")
     for index, heading in enumerate(content.headings):
