@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from dataclasses import replace
 
 import torch
@@ -30,6 +31,7 @@ class PlainWorker:
         reward = replace(reward, clip=learner.clip_rewards)
         self.navigation = Navigation(world, reward, seeds, step_limit=learner.step_limit)
         self.actions = Streams(seeds, ACTION_STREAM)
+        self.ended, self.reached = 0, 0  # episodes
         self.navigation.reset(target=self.target)
 
     def output(self, network: SiameseActorCritic) -> tuple[Tensor, Tensor]:
@@ -54,6 +56,8 @@ class PlainWorker:
         if not step.reached and (not step.truncated or learner.bootstrap_cut):
             value_after = self.output(network)[1].detach()
         if step.ended:
+            self.ended += 1
+            self.reached += int(step.reached)
             nav.reset(target=self.target)
         loss, outcome = torch.zeros(()), value_after
         for log_pi, action, value, reward in reversed(steps):
@@ -91,7 +95,7 @@ class PlainA3C:
 
     def begin(self, network: SiameseActorCritic) -> None:
         """Learn from these parameters on."""
-        self.network = copy.deepcopy(network)
+        self.start, self.network = copy.deepcopy(network), copy.deepcopy(network)
         self.mean_square = copy.deepcopy(network)
         for tensor in self.mean_square.parameters():
             tensor.data.fill_(1.0)
@@ -99,7 +103,7 @@ class PlainA3C:
     def round(self, frames: int) -> int:
         """Returns the frames used."""
         learner = self.learner
-        entropy_weight = learner.entropy_start
+        entropy_weight = learner.entropy_weight_at(frames)
         gradients = []
         for worker in self.workers:
             local = copy.deepcopy(self.network)
@@ -116,6 +120,15 @@ class PlainA3C:
             self.step(scene, gradient, lr)
             used += steps
         return used
+
+    def assert_learnt(self, parameters: Mapping[str, Tensor], squares: Mapping[str, Tensor]) -> None:
+        """All has moved to these parameters, and to these mean squares plus epsilon."""
+        start, mean_square = (dict(network.named_parameters()) for network in (self.start, self.mean_square))
+        for name, expected in self.network.named_parameters():
+            moved = (expected.data - start[name]).abs().max().item()
+            assert moved > 0, name
+            torch.testing.assert_close(parameters[name], expected.data, rtol=0, atol=1e-4 * moved + 1e-7)
+            torch.testing.assert_close(squares[name] - EPSILON, mean_square[name].data, rtol=1e-5, atol=1e-6)
 
     @torch.no_grad()
     def step(self, scene: int, gradient: list[Tensor], lr: float) -> None:

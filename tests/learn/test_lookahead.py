@@ -9,7 +9,7 @@ from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from small_runs import small_learner, small_trainer
 
-TEMPERATURE = 0.05
+SHARP = 0.05  # a temperature
 
 
 @pytest.fixture
@@ -35,7 +35,9 @@ def made_rows(trainer: Trainer, each: int = 40) -> tuple[Tensor, Tensor, list[in
     return torch.cat(history), torch.cat(target), [each] * world.scene_count
 
 
-def better(trainer: Trainer, history: Tensor, target: Tensor, log_pi: Tensor, value: Tensor) -> Tensor:
+def better(
+    trainer: Trainer, history: Tensor, target: Tensor, log_pi: Tensor, value: Tensor, temperature: float = SHARP
+) -> Tensor:
     return better_policy(
         history,
         target,
@@ -46,15 +48,16 @@ def better(trainer: Trainer, history: Tensor, target: Tensor, log_pi: Tensor, va
         trainer.lookup,
         discount=0.9,
         reward_scale=0.1,
-        temperature=TEMPERATURE,
+        temperature=temperature,
     )
 
 
-def test_against_one_row_and_action_at_a_time(trainer: Trainer) -> None:
+@pytest.mark.parametrize("temperature", [SHARP, 1.0])  # the sharp one alone hides what is added to the target's reward
+def test_against_one_row_and_action_at_a_time(trainer: Trainer, temperature: float) -> None:
     history, target, rows = made_rows(trainer)
     kept = trainer.lookup.forward(history, target, rows)
     log_pi = torch.log_softmax(kept.scores, 1)
-    found = better(trainer, history, target, log_pi, kept.value)
+    found = better(trainer, history, target, log_pi, kept.value, temperature)
     world, table = trainer.world, trainer.navigation.reward_table
     features = trainer.lookup.first_layer.features
     known_at_goal = 0
@@ -75,7 +78,7 @@ def test_against_one_row_and_action_at_a_time(trainer: Trainer) -> None:
                         _, value = trainer.network(seen, wanted, world.target_scene[goal : goal + 1])
                     gain += 0.9 * float(value)
                 gain -= float(kept.value[row])
-            logits.append(float(log_pi[row, action]) + gain / TEMPERATURE)
+            logits.append(float(log_pi[row, action]) + gain / temperature)
         torch.testing.assert_close(found[row], torch.softmax(torch.tensor(logits), 0), rtol=1e-4, atol=1e-5)
     assert known_at_goal
 

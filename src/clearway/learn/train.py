@@ -210,24 +210,37 @@ def _run(
     """
     if trainer.finished:
         return
-    rows = _rows_due(trainer)
     log = MetricsLog(folder.metrics_path, folder.metrics(), seconds)
+    seen, rows = trainer.frames, _rows_due(trainer)
     saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
+    update: Update | None = None
+
+    def tell() -> None:
+        """Keep the milestones gone by, and write the row that is due."""
+        nonlocal seen, rows
+        for milestone in milestones:
+            if seen < milestone <= trainer.frames:
+                _save_agent(trainer, folder.milestone(milestone), seconds)
+        if update is not None and _rows_due(trainer) > rows:
+            log.write(metrics_row(trainer, update, seconds))
+            rows = _rows_due(trainer)
+        seen = trainer.frames
+
     try:
         while not trainer.finished and not interrupted.is_set():
-            before, started = trainer.frames, time.monotonic()
+            started = time.monotonic()
             update = trainer.update()
             seconds += time.monotonic() - started
-            for milestone in milestones:
-                if before < milestone <= trainer.frames:
-                    _save_agent(trainer, folder.milestone(milestone), seconds)
-            if _rows_due(trainer) > rows:
-                log.write(metrics_row(trainer, update, seconds))
-                rows = _rows_due(trainer)
+            saves = time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS
+            if saves or trainer.finished or any(seen < milestone <= trainer.frames for milestone in milestones):
+                trainer.tensors()  # A3C's workers walk on until then; what is told and what is saved must agree
+            tell()
             view.show(trainer.frames, trainer.statistics.solved, trainer.world.target_count)
-            if time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS:
+            if saves:
                 save(trainer, folder, seconds)
                 saved_at, saved_frames = time.monotonic(), trainer.frames
+        trainer.tensors()
+        tell()
         if saved_frames != trainer.frames:
             save(trainer, folder, seconds)
     finally:
@@ -251,7 +264,7 @@ def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
 
 def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
     """Write what is needed to act, not to train on."""
-    tensors = trainer.tensors()  # first, since A3C's workers walk on until then
+    tensors = trainer.tensors()
     progress = Progress(trainer.frames, trainer.updates, seconds)
     write_checkpoint(folder, _agent(trainer, tensors), {}, progress)
 

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from clearway.errors import RunError
-from clearway.learn import train
+from clearway.learn import statistics, train
 from clearway.learn.a3c.process import world_tensors
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.a3c.trainer import AsyncTrainer
@@ -25,7 +25,8 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Update
 from clearway.reward import COLLISION_AWARE
-from small_runs import equal_bits, small_learner, small_request, small_world
+from plain_a3c import PlainA3C
+from small_runs import equal_bits, small_learner, small_network, small_request, small_world
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 
@@ -36,10 +37,6 @@ def a3c_request(frames: int) -> RunRequest:
 
 def async_trainer(frames: int, processes: int) -> AsyncTrainer:
     return AsyncTrainer(small_world(), a3c_request(frames).learner, COLLISION_AWARE, 3, processes)
-
-
-def without_seconds(folder: RunFolder) -> list[dict[str, float]]:
-    return [{name: value for name, value in row.items() if name != "seconds"} for row in folder.metrics()]
 
 
 def children_of(process: int) -> list[int]:
@@ -88,11 +85,37 @@ def test_one_process_repeats_and_resumes_bit_for_bit(tmp_path: Path, monkeypatch
     assert equal_bits(*[read_training(end) for end in ends])
     progress = read_progress(ends[0])
     assert 400 <= progress.frames < 450  # ten workers of five steps: the round that reaches the budget is finished
+    counts = [sum(row["episodes"] for row in folder.metrics()) for folder in (whole, parts)]
+    assert counts[0] == counts[1] > 0  # rows fall elsewhere: workers walk on until they pause for a checkpoint
     assert whole.metrics()[-1]["lr"] < whole.metrics()[0]["lr"] <= PAPER_A3C.lr_start
     world = small_world()
     policy = load_agent(whole.path).policy(world)
     probabilities = policy(torch.zeros(2, 4, dtype=torch.int64), torch.tensor([0, 2]))
     assert torch.allclose(probabilities.sum(1), torch.ones(2))
+
+
+def test_one_process_learns_and_counts_what_plain_a3c_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(statistics, "WINDOW", 1)
+    learner = small_learner(PAPER_A3C, frames=300, rollout_steps=5, step_limit=200, lr_start=0.05, centre_features=True)
+    world = small_world()
+    with closing(AsyncTrainer(world, learner, COLLISION_AWARE, 3)) as trainer:
+        while not trainer.finished:
+            trainer.update()
+    prepared = replace(world, features=trainer.feature_map(world.features))
+    plain = PlainA3C(prepared, learner, COLLISION_AWARE, 3, workers=[0, 5, 1, 6, 2, 7, 3, 8, 4, 9])
+    plain.begin(small_network(world, seed=3))
+    frames = 0
+    while frames < learner.frames:
+        frames += plain.round(frames)
+    assert trainer.frames == frames
+    plain.assert_learnt(trainer.shared.part("parameters"), trainer.shared.part("squares"))
+    ended, reached = (torch.zeros(5) for _ in range(2))
+    for worker in plain.workers:
+        ended[worker.target] += worker.ended
+        reached[worker.target] += worker.reached
+    assert trainer.statistics.totals[:, :2].tolist() == torch.stack([ended, reached], 1).tolist()
+    assert torch.equal(ended, reached), "no episode was cut"
+    assert trainer.statistics.solved == int((ended > 0).sum()) > 0
 
 
 @pytest.fixture
@@ -213,3 +236,24 @@ def test_memory_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(os, "posix_fallocate", full, raising=False)
     with pytest.raises(RunError, match="no 0 MB of memory"):
         SharedTensors.holding({"a": torch.ones(3)})
+
+
+def test_workers_that_walk_on_until_a_checkpoint_skip_no_milestone_and_no_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    pause = AsyncTrainer.tensors
+
+    def walk_on_and_pause(trainer: AsyncTrainer) -> dict[str, torch.Tensor]:
+        while trainer._processes and not trainer._paused and not trainer.finished and trainer.frames % 200 < 150:
+            trainer.update()
+        return pause(trainer)
+
+    monkeypatch.setattr(AsyncTrainer, "tensors", walk_on_and_pause)
+    milestones = range(80, 600, 130)
+    folder = train.train(a3c_request(600), tmp_path, milestones=milestones)
+    for frames in milestones:
+        assert read_progress(newest_checkpoint(folder.milestone(frames))).frames >= frames
+    ended = read_progress(newest_checkpoint(folder.checkpoints))
+    last = folder.metrics()[-1]
+    assert (last["frames"], last["updates"]) == (ended.frames, ended.updates)
