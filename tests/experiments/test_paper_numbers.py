@@ -33,6 +33,11 @@ def test_of_some_rooms_their_own_mean_is_shown() -> None:
             True,
             "The paper's figures are of single runs on other scenes and features; compare rewards, not rooms.",
         ),
+        (
+            False,
+            False,
+            "The paper's figures are of single runs on other scenes, features and targets; compare rewards, not rooms.",
+        ),
         (True, False, "The paper's figures are of single runs on other targets; compare rewards, not rooms."),
     ],
 )

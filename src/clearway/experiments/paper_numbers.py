@@ -37,7 +37,8 @@ def reminder(original_scenes: bool, original_targets: bool = True) -> str:
     """What to keep in mind where the paper's figures stand beside others."""
     differ = [] if original_scenes else ["scenes", "features"]
     differ += [] if original_targets else ["targets"]
-    other = f" on other {' and '.join(differ)}" if differ else ""
+    *most, last = differ or [""]
+    other = f" on other {', '.join(most)}{' and ' if most else ''}{last}" if differ else ""
     return f"The paper's figures are of single runs{other}" + ("; compare rewards, not rooms." if differ else ".")
 
 
