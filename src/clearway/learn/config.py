@@ -134,7 +134,7 @@ class Learner:
     history_length: int = 4
     heads: Literal["scene", "shared"] = "scene"
     """Whether every scene has a last hidden layer and outputs of its own, as published, or all share one. Of 1,000
-    scenes they would be 263 million parameters, stepped with every minibatch."""
+    scenes they would be 265 million parameters, stepped with every minibatch."""
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot work.
