@@ -7,9 +7,10 @@ from typing import get_args
 import pytest
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName
-from clearway.experiments import setting
+from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.reproduce import ReproduceRequest
 from clearway.learn.config import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.scenes.thor_v1 import write_scene
 from small_runs import small_learner
@@ -139,3 +140,15 @@ def test_other_frames_and_rooms_show_on_top() -> None:
     assert (changed.frames, changed.default_frames, changed.rooms) == (2_000_000, 2_000_000, ("kitchen",))
     assert "2,000,000" in changed.warning and "10,000,000" in changed.warning
     assert BUDGETS["paper"].changed() == BUDGETS["paper"]
+
+
+def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
+    settings = {"out": tmp_path, "budget": "paper", "rooms": ("bathroom",), "learners": ("published",)}
+    first = ReproduceRequest(names=("fig3",), frames=8, commands=("one",), **settings)
+    content = reproduce._request_json(first)
+    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content))
+    second = ReproduceRequest(names=("table1",), frames=8, commands=("two",), workers=2, **settings)
+    joined = reproduce._with_earlier(second)
+    assert (list(joined.names), joined.commands) == (["table1", "fig3"], ("one", "two"))
+    other = replace(second, frames=9)
+    assert reproduce._with_earlier(other) == other

@@ -137,12 +137,16 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
         earlier = _read_request(request.out)
     except RunError:  # there is none, or none that could be gone on with: this one takes its place
         return request
-    own, other = ({n: v for n, v in _request_json(r).items() if n not in WHO_ASKED} for r in (request, earlier))
-    if own != other:
+    if _question(request) != _question(earlier):
         return request
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     return replace(request, names=[name for name in EXPERIMENTS if name in names], commands=tuple(commands))
+
+
+def _question(request: ReproduceRequest) -> str:
+    """All of a request that must agree for its experiments to stand in one report."""
+    return json.dumps({name: value for name, value in _request_json(request).items() if name not in WHO_ASKED})
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
