@@ -89,6 +89,11 @@ def probability_of_less(
     return Estimate(float(pairs.mean()), _interval(drawn, min(len(first), len(second))))
 
 
+def failed_targets(success: np.ndarray) -> str:
+    """Of the targets of all runs, how many some episode failed, for example "3 of 25"; success (R, M)."""
+    return f"{int((success < 1).sum())} of {success.size}"
+
+
 def _text(value: float) -> str:
     """To three significant digits, never with an exponent that hides thousands."""
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"

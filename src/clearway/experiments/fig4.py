@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clearway.evaluate.across_seeds import mean_estimate
+from clearway.evaluate.across_seeds import failed_targets, mean_estimate
 from clearway.experiments.convergence import settling
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import run_folder
@@ -55,8 +55,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     for group in groups:
         values = group.scores(setting.out, world.target_count)
         frames = group.runs[0].halfway if group.trial.halfway else group.runs[0].learner.frames
-        success = values.of("success")
-        figures: list[Value] = [f"{int((success < 1).sum())} of {success.size}" if len(values) else None]
+        figures: list[Value] = [failed_targets(values.of("success")) if len(values) else None]
         for metric in METRICS:
             if not len(values):
                 figures += [None, None]

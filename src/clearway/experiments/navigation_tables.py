@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from clearway.envs.world import World
-from clearway.evaluate.across_seeds import mean_estimate
+from clearway.evaluate.across_seeds import failed_targets, mean_estimate
 from clearway.evaluate.metrics import by_scene
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
@@ -71,13 +71,12 @@ def _group_row(world: World, group: Group, values: Scores, metric: str, of_paper
     learnt = (metric, group.learner, group.agent, len(values))
     if not len(values):
         return (*learnt, None, *(None for _ in world.scene_names for _ in range(2)), None, None, of_paper)
-    target_scene, success, own = world.target_scene.numpy(), values.of("success"), values.of(metric)
-    failed = f"{int((success < 1).sum())} of {success.size}"
+    target_scene, own = world.target_scene.numpy(), values.of(metric)
     parts = [target_scene == scene for scene in range(len(world.scene_names))]
     scenes = [mean_estimate(own[:, part], target_scene[part]) for part in parts]
     estimate = mean_estimate(own, target_scene)
     figures = (value for scene in scenes for value in (scene.value, scene.ends))
-    return (*learnt, failed, *figures, estimate.value, estimate.ends, of_paper)
+    return (*learnt, failed_targets(values.of("success")), *figures, estimate.value, estimate.ends, of_paper)
 
 
 def _reference_row(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.evaluate.across_seeds import Estimate, difference, mean_estimate, probability_of_less
+from clearway.evaluate.across_seeds import Estimate, difference, failed_targets, mean_estimate, probability_of_less
 from clearway.experiments.section import Claim, Verdict
 
 SAME = 0.02  # means within this share of each other count as equal
@@ -49,7 +49,7 @@ def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray) -> Claim:
     """
     if not first.size or not second.size:
         return claim
-    told = ", ".join(f"{int((success < 1).sum())} of {success.size}" for success in (first, second))
+    told = f"{failed_targets(first)}, {failed_targets(second)}"
     return replace(claim, evidence=f"{claim.evidence} Failed targets, over all seeds: {told}.")
 
 
