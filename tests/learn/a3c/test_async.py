@@ -197,7 +197,8 @@ def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -
     assert are_gone_soon(workers)
     trainer = a3c_request(10_000_000).trainer()
     folder = RunFolder(tmp_path)
-    train._prepare(folder, a3c_request(10_000_000).record(), trainer, resume=True)
+    with pytest.warns(UserWarning, match="threads 1 instead of 2"):
+        train._prepare(folder, a3c_request(10_000_000).record(), trainer, resume=True)
     assert trainer.frames == read_progress(newest_checkpoint(folder.checkpoints)).frames > 0
 
 
