@@ -158,6 +158,24 @@ def test_an_environment_lives_the_same_in_any_batch() -> None:
         assert together.target[17] == alone.target[0]
 
 
+def test_restart_begins_the_episodes_that_reset_would_begin() -> None:
+    world = corridor_world(targets=(0, 8, 16))
+    one, other = (Navigation(world, COLLISION_AWARE, torch.arange(20), step_limit=9) for _ in range(2))
+    for navigation in (one, other):
+        navigation.reset()
+    ended_in_all = 0
+    for step in range(40):
+        action = torch.arange(20).add(step) % 4
+        ended = one.step(action).ended
+        other.step(action)
+        ended_in_all += int(ended.sum())
+        one.reset(ended.nonzero()[:, 0])
+        other.restart(ended)
+        for name, tensor in one.tensors().items():
+            assert torch.equal(tensor, other.tensors()[name]), name
+    assert ended_in_all > 40
+
+
 def test_it_goes_on_from_its_tensors() -> None:
     world = corridor_world(targets=(16, 2))
     going, other = (Navigation(world, COLLISION_AWARE, torch.arange(8), step_limit=4) for _ in range(2))

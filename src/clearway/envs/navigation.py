@@ -67,9 +67,9 @@ class TargetChoice:
         total = weights.cumsum(1)
         self.bounds = total / total[:, -1:]  # the last bound is exactly 1, above every uniform number
 
-    def draw(self, uniform: Tensor, index: Tensor) -> Tensor:
-        """Targets (B,) int64 for the environments in index (B,), from uniform numbers (B,) in [0, 1)."""
-        group = self.groups[index]
+    def draw(self, uniform: Tensor, index: Tensor | None = None) -> Tensor:
+        """Targets (B,) int64 for the environments in index (B,), all by default, from uniform numbers (B,) below 1."""
+        group = self.groups if index is None else self.groups[index]
         column = (uniform[:, None] >= self.bounds[group]).sum(1)
         return self.members[group, column]
 
@@ -146,6 +146,17 @@ class Navigation:
         self.target[index] = target
         self.history[index] = start[:, None]
         self.elapsed[index] = 0
+
+    def restart(self, ended: Tensor) -> None:
+        """Begin new episodes where `ended` (N,) is True, as `reset` does, without telling the host where that is.
+
+        Tensors are replaced, not written to.
+        """
+        target = self.choice.draw(self.target_stream.uniform(ended))
+        start = self._draw_start(self.start_stream.uniform(ended), target)
+        self.target = torch.where(ended, target, self.target)
+        self.history = torch.where(ended[:, None], start[:, None], self.history)
+        self.elapsed = torch.where(ended, 0, self.elapsed)
 
     def reseed(self, seeds: Tensor, index: Tensor) -> None:
         """Begin the random streams of the environments in index (B,) anew, from seeds (B,) int64."""

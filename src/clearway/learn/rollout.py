@@ -103,7 +103,7 @@ class Collector:
         nav = self.navigation
         seen: list[tuple[Tensor, Tensor, Tensor, Transition, Tensor]] = []
         for t in range(self.steps):
-            history, target = nav.history, nav.target.clone()
+            history, target = nav.history, nav.target
             now = self.network.forward(history, target, self.rows_per_scene, self._memory(t))
             if not self.keep_hidden:
                 by_step(self.kept.output, self.steps)[t] = now.output
@@ -111,8 +111,7 @@ class Collector:
             step = nav.step(action)
             statistics.add(target, step)
             seen.append((history, target, action, step, nav.history))
-            nav.history = nav.history.clone()
-            nav.reset(torch.nonzero(step.ended)[:, 0])
+            nav.restart(step.ended)
         histories, targets, actions, steps, last_histories = zip(*seen, strict=True)
         return Rollout(
             history=torch.stack(histories),
@@ -125,7 +124,7 @@ class Collector:
             last_history=torch.stack(last_histories),
             kept=self.kept,
             history_after=nav.history,
-            target_after=nav.target.clone(),
+            target_after=nav.target,
         )
 
     def _memory(self, t: int) -> Activations:

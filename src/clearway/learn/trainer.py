@@ -164,13 +164,7 @@ class Trainer:
         self.updates += 1
         self._rebalance()
         result = Update(
-            loss=_mean([step.loss.total for step in steps]),
-            policy_loss=_mean([step.loss.policy for step in steps]),
-            value_loss=_mean([step.loss.value for step in steps]),
-            entropy=_mean([step.loss.entropy for step in steps]),
-            clipped=_mean([step.loss.clipped for step in steps]),
-            gradient_norm=_mean([step.norm for step in steps]),
-            explained_variance=explained,
+            **_figures(steps, explained),
             hindsight_rows=len(batch) - rows,
             distinct_pairs=sum(step.pairs for step in steps) / sum(step.rows for step in steps),
             distinct_histories=sum(step.histories for step in steps) / sum(step.rows for step in steps),
@@ -197,8 +191,8 @@ class Trainer:
         nav.elapsed = (nav.start_stream.uniform() * self.learner.step_limit).long()
 
     @torch.no_grad()
-    def _batch(self, rollout: Rollout) -> tuple[Batch, float]:
-        """The rollout's rows with their advantages, and the explained variance of the values."""
+    def _batch(self, rollout: Rollout) -> tuple[Batch, Tensor]:
+        """The rollout's rows with their advantages, and the explained variance of the values, a scalar."""
         learner = self.learner
         log_pi = torch.log_softmax(rollout.kept.scores, 1)
         action = as_rows(rollout.action)
@@ -228,7 +222,7 @@ class Trainer:
         if learner.lookahead:
             self.observed.add(batch.history[:, -1], action, as_rows(rollout.arrived))
             batch = replace(batch, better=self._better(batch, log_pi, rollout.kept.value))
-        return batch, float(explained)
+        return batch, explained
 
     def _better(self, batch: Batch, log_pi: Tensor, value: Tensor) -> Tensor:
         """(B, A) what looking one step ahead finds better."""
@@ -367,8 +361,14 @@ def scene_of_envs(envs_per_scene: Sequence[int], device: torch.device) -> Tensor
     return torch.arange(len(counts), device=device).repeat_interleave(counts)
 
 
-def _mean(scalars: list[Tensor]) -> float:
-    return float(torch.stack(scalars).mean())
+def _figures(steps: list[Step], explained: Tensor) -> dict[str, float]:
+    """What `Update` tells of the loss, read from the device at once: means over steps, and the explained variance."""
+    names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
+    told = [
+        torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped, s.norm]) for s in steps
+    ]
+    *means, last = torch.cat([torch.stack(told).mean(0), explained[None]]).tolist()
+    return {**dict(zip(names, means, strict=True)), "explained_variance": last}
 
 
 def check_finite(update: Update, frames: int) -> None:

@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn.functional import embedding_bag
 
 from clearway.model.padding import rounded_up, row_step
-from clearway.model.sums import multiply, sum_listed
+from clearway.model.sums import counted, multiply, sum_listed
 
 MOST_ROWS = 131_072  # projected states kept while nothing is being learnt from them: 1 GiB at the published size
 
@@ -84,7 +84,7 @@ class AllStates:
     def add(self, history: Tensor, grad_seen: Tensor, grad_wanted: Tensor, begin: bool) -> None:
         """Add gradients up by state and slot, (S, K * H)."""
         bag = self._table_row(history).flatten()
-        count = torch.bincount(bag, minlength=len(self.features) * self.history_length)
+        count = counted(bag, len(self.features) * self.history_length)
         sample = torch.argsort(bag) // self.history_length
         by_state = sum_listed(grad_seen, sample, count)  # (S * K, H)
         columns = by_state.view(len(self.features), -1).to(self.weight.dtype)

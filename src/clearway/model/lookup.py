@@ -29,7 +29,7 @@ from clearway.envs.feature_store import FEW_STATES
 from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
 from clearway.model.padding import Padding, row_step
-from clearway.model.sums import add_up, multiply, sum_ascending, sum_listed
+from clearway.model.sums import add_up, counted, multiply, sum_ascending, sum_listed
 from clearway.scenes.actions import ACTION_COUNT
 
 FEW_TARGETS = 1_024  # up to so many, the target branch is computed of all, beyond of those that occur
@@ -318,4 +318,4 @@ class LookupNetwork:
 
     def _sum_by_target(self, target: Tensor, rows: Tensor) -> Tensor:
         """Rows (B, H) added up by target, (M, H)."""
-        return sum_listed(rows, torch.argsort(target), torch.bincount(target, minlength=len(self.target_state)))
+        return sum_listed(rows, torch.argsort(target), counted(target, len(self.target_state)))
