@@ -54,7 +54,7 @@ def test_the_mark_is_twice_the_shortest_paths(tmp_path: Path) -> None:
     for scene, own in zip(setting.scenes, setting.targets, strict=True):
         paths = [steps_one_by_one(scene.graph.tolist(), target) for target in own]
         means.append(sum(sum(path) / len(path) for path in paths) / len(own))
-    assert mark_steps(setting) == pytest.approx(2 * sum(means) / len(means))
+    assert mark_steps(setting, setting.targets) == pytest.approx(2 * sum(means) / len(means))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_runs_that_never_settle_count_with_all_frames(
     done: Setting, detour: float, settled: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(convergence, "DETOUR", detour)
-    table, claims = settling(done, compared(done, PAIR))
+    table, claims = settling("fig4", done, compared(done, PAIR))
     for row, group in zip(table.rows, compared(done, PAIR), strict=True):
         named = dict(zip(table.headings, row, strict=True))
         first = [next(r for r in run_folder(done.out, run).metrics() if r["episodes"])["frames"] for run in group.runs]

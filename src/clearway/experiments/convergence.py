@@ -15,6 +15,7 @@ import numpy as np
 from clearway.evaluate.across_seeds import mean_estimate
 from clearway.experiments.groups import Group
 from clearway.experiments.job import run_folder
+from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import Claim, ReportTable, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less
@@ -26,10 +27,10 @@ ONE_TARGET = np.zeros(1, dtype=np.int64)  # a run has one figure, as if of one t
 Row = dict[str, float]
 
 
-def mark_steps(setting: Setting) -> float:
+def mark_steps(setting: Setting, targets: TargetSets) -> float:
     """Twice the mean steps of the shortest paths, over scenes, their targets and all starts."""
     means = []
-    for scene, own in zip(setting.scenes, setting.targets, strict=True):
+    for scene, own in zip(setting.scenes, targets, strict=True):
         steps = scene.distances_to(np.array(own)).astype(np.float64)
         means.append(np.nanmean(np.where(steps > 0, steps, np.nan), axis=1).mean())
     return DETOUR * float(np.mean(means))
@@ -43,9 +44,16 @@ def settled_row(rows: Sequence[Row], mark: float) -> Row | None:
     return known[first] if first < len(known) else None
 
 
-def settling(setting: Setting, groups: Sequence[Group]) -> tuple[ReportTable, list[Claim]]:
-    """How long each group trains until it has settled, and whether the collision-aware reward settles sooner."""
-    mark = mark_steps(setting)
+def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = "") -> tuple[ReportTable, list[Claim]]:
+    """How long each group trains until it has settled, and whether the collision-aware reward settles sooner.
+
+    Args:
+        name: of the experiment.
+        setting: see there.
+        groups: of any learners and rewards, all trained on the same targets.
+        where: behind each claim, for example " on hard targets".
+    """
+    mark = mark_steps(setting, groups[0].trial.targets)
     found = {(group.learner, group.agent): _frames(setting.out, group, mark) for group in groups}
     rows: list[tuple[Value, ...]] = []
     for (learner, agent), (frames, settled) in found.items():
@@ -55,14 +63,14 @@ def settling(setting: Setting, groups: Sequence[Group]) -> tuple[ReportTable, li
     claims = []
     for learner in dict.fromkeys(group.learner for group in groups):
         ours, baseline = (found[learner, reward.name][0] for reward in (COLLISION_AWARE, SHORTEST))
-        text = f"{learner}: learns faster (fewer frames until training has settled)"
+        text = f"{learner}: learns faster (fewer frames until training has settled){where}"
         claims.append(judged_less(text, "frames until settled", ours, baseline, ONE_TARGET))
     headings = ("learner", "agent", "seeds", "settled", "frames", "95 %")
     note = (
         f"Frames from which on training episodes take at most {mark:.3g} steps on average, {DETOUR:g} times the "
         "shortest paths'. A run that never gets there counts with all its frames."
     )
-    return ReportTable("fig4_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
+    return ReportTable(f"{name}_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
 
 
 def _frames(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:

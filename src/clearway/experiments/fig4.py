@@ -30,7 +30,7 @@ def jobs(setting: Setting) -> list[Job]:
 def section(setting: Setting) -> Section:
     """What came of it."""
     groups = _groups(setting)
-    settled, sooner = settling(setting, [group for group in groups if not group.trial.halfway])
+    settled, sooner = settling("fig4", setting, [group for group in groups if not group.trial.halfway])
     return Section(
         name="fig4",
         title="Speed of convergence (the paper's figure 4)",

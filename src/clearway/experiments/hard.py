@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
+from clearway.experiments.convergence import settling
 from clearway.experiments.groups import Group, all_jobs, all_missing, compared
 from clearway.experiments.hard_targets import hard_targets
 from clearway.experiments.kept import keep, kept
@@ -46,6 +47,9 @@ class HardTable:
         frames = " and ".join(dict.fromkeys(f"{group.runs[0].learner.frames:,}" for group in groups))
         times = "" if self.frames_factor == 1 else f"{self.frames_factor} times "
         title = f"Hard targets after {times}the main experiment's frames"
+        where = f" on hard targets after {times}the frames" if times else " on hard targets"
+        tables = navigation_tables(name, title, setting, chosen(setting), groups, self.paper)
+        settled, sooner = settling(name, setting, groups, where)
         return Section(
             name=name,
             title=f"{title} (the paper's table {self.number})",
@@ -53,8 +57,8 @@ class HardTable:
                 f"Agents trained for {frames} frames and tried on {RULE}. {FILE} holds the targets, how hard they are "
                 "and how far apart."
             ),
-            tables=navigation_tables(name, title, setting, chosen(setting), groups, self.paper),
-            claims=tuple(claims(setting, groups, where=" on hard targets")),
+            tables=(*tables, settled),
+            claims=(*claims(setting, groups, where), *sooner),
             missing=all_missing(groups, setting.out),
         )
 
