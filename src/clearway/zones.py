@@ -13,10 +13,12 @@ The target comes before all zones; that is the reward's business (`clearway.rewa
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import get_args
 
 import numpy as np
 
 from clearway.choices import ZoneLevel
+from clearway.errors import ClearwayError
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.graph import next_states
 from clearway.scenes.scene import Scene
@@ -49,7 +51,13 @@ def cell_zones(graph: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def scene_zones(scene: Scene, level: ZoneLevel = "pose") -> np.ndarray:
-    """Zone of each pose of a scene, (S,) int8."""
+    """Zone of each pose of a scene, (S,) int8.
+
+    Raises:
+        ClearwayError: there is no such level.
+    """
+    if level not in get_args(ZoneLevel):
+        raise ClearwayError(f"zone_level={level!r} is unknown. Use one of {', '.join(map(repr, get_args(ZoneLevel)))}")
     return pose_zones(scene.graph) if level == "pose" else cell_zones(scene.graph, scene.cells)
 
 

@@ -129,13 +129,11 @@ def test_evaluation_that_cannot_be(clearway, trained, words, part):
     assert clearway("evaluate", trained.run, *words).refusal(part)
 
 
-def test_a_checkpoint_of_another_network_is_one_line_too(clearway, trained, tmp_path, small):
+def test_a_checkpoint_of_another_run_is_one_line_too(clearway, trained, tmp_path, small):
     wider = tmp_path / "wider"
     assert clearway("train", trained.scene, "--out", wider, *small, "width=24").code == 0
     checkpoint = newest_checkpoint(wider / "checkpoints")
-    assert clearway("evaluate", trained.run, "--checkpoint", checkpoint).refusal(
-        str(checkpoint), "does not fit its run"
-    )
+    assert clearway("evaluate", trained.run, "--checkpoint", checkpoint).refusal(str(checkpoint), "not a checkpoint of")
 
 
 def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
@@ -148,3 +146,10 @@ def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
     assert clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))
     assert clearway(*evaluate, "--pictures", below).refusal(str(tmp_path / "file"))
     assert clearway("demo", "--out", below).refusal(str(tmp_path / "file"))
+
+
+def test_a_scene_is_not_written_over_by_a_map_or_an_exported_agent(clearway, trained):
+    before = trained.scene.read_bytes()
+    clearway("scenes", "inspect", trained.scene, "--map", trained.scene).refusal(".h5", "ends in .png", "--map")
+    clearway("export", trained.run, "--no-encoder", "--out", trained.scene).refusal(".h5", "ends in .onnx", "--out")
+    assert trained.scene.read_bytes() == before

@@ -79,6 +79,23 @@ def test_sb3_s_spaces_are_a_single_environment_s(sb3) -> None:
     assert set(envs.reset()) == {"observation", "target"}
 
 
+def test_sb3_s_options_hold_for_the_next_reset_alone(sb3) -> None:
+    envs = sb3.SB3VecEnv(two_scenes(), num_envs=3)
+    target = envs.envs._world.scene_state(0)
+    envs.seed(5)
+    envs.set_options([{"scene": "first", "target": target, "start": start} for start in (1, 2, 3)])
+    envs.reset()
+    assert [(info["scene"], info["target"], info["state"]) for info in envs.reset_infos] == [
+        (0, target, start) for start in (1, 2, 3)
+    ]
+    scenes = {info["scene"] for _ in range(20) for info in (envs.reset(), envs.reset_infos)[1]}
+    assert scenes == {0, 1}
+    envs.set_options([{"scene": "first"}, {}, {}])
+    with pytest.raises(EnvError, match="Give all environments the same options"):
+        envs.reset()
+    assert envs.env_method("close", indices=[0, 2]) == [None, None]
+
+
 def test_the_example_trains_sb3_s_ppo(sb3, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     write_scene(corridor_scene(4), tmp_path / "corridor.h5")
     spec = importlib.util.spec_from_file_location("train_sb3_ppo", EXAMPLES / "train_sb3_ppo.py")

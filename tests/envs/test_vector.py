@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
-from clearway.errors import EnvError, SceneError
+from clearway.errors import ClearwayError, EnvError, SceneError
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from made import corridor_scene, grid_scene
@@ -358,3 +358,33 @@ def test_pictures_are_read_when_they_are_seen_first() -> None:
     assert pictures.read == [[0, 4, 16], [8]]
     assert np.array_equal(observation["observation"][1, 3], scene.observations[8])
     assert np.array_equal(observation["target"][0], scene.observations[16])
+
+
+def test_zones_of_cells_are_paid_where_they_are_asked_for() -> None:
+    zones = {}
+    for level in ("pose", "cell"):
+        envs = ImageGoalVectorEnv(grid_scene(1), num_envs=40, zone_level=level)
+        _, info = envs.reset(seed=0)
+        zones[level] = info["zone"].tolist()
+    assert zones["pose"] != zones["cell"]
+    with pytest.raises(ClearwayError, match=r"zone_level='cells' is unknown\. Use one of 'pose', 'cell'"):
+        ImageGoalVectorEnv(grid_scene(1), zone_level="cells")
+
+
+def test_features_are_held_once_and_not_at_all_where_pictures_are_seen() -> None:
+    scene = grid_scene(1)
+    envs = ImageGoalVectorEnv(scene)
+    assert np.shares_memory(envs._source._table, envs._world.features.numpy())
+    assert ImageGoalVectorEnv(scene, observations="pictures")._world.features is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ({"options": {"scene": 0}}, r"options\['scene'\]: expected a name, or one for each of the 2, got 0"),
+        ({"seed": 1.5}, "seed: expected an integer, or one for each of the 2 environments, got 1.5"),
+    ],
+)
+def test_a_reset_that_makes_no_sense_is_refused(arguments: dict, problem: str) -> None:
+    with pytest.raises(EnvError, match=problem):
+        ImageGoalVectorEnv(grid_scene(1), num_envs=2).reset(**arguments)

@@ -131,3 +131,10 @@ def test_features_that_do_not_belong_together() -> None:
     for message, second in cases.items():
         with pytest.raises(SceneError, match=message):
             make_world([first, second], targets)
+
+
+def test_a_target_that_is_no_whole_number_is_refused() -> None:
+    scene = corridor_scene(4)
+    with pytest.raises(SceneError, match=r"target 1\.9 is no state id"):
+        make_world([scene], {scene.name: [1.9]})
+    assert make_world([scene], {scene.name: np.array([3])}).target_state.tolist() == [3]

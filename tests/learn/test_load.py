@@ -1,5 +1,6 @@
 """A trained agent brought back through its run folder and scene files."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,7 +62,9 @@ def test_an_earlier_checkpoint_can_be_asked_for(tmp_path: Path) -> None:
     untrained = newest_checkpoint(folder.checkpoints)
     trainer.update()
     save(trainer, folder, seconds=1.0)
-    weights = [load_agent(folder.path, path).network.siamese_weight for path in (None, untrained)]
+    agents = [load_agent(folder.path, path) for path in (None, untrained)]
+    assert [agent.frames for agent in agents] == [trainer.frames, 0]
+    weights = [agent.network.siamese_weight for agent in agents]
     assert torch.equal(weights[0], trainer.network.siamese_weight)
     assert not torch.equal(*weights)
 
@@ -111,8 +114,12 @@ def test_a_scene_in_memory_and_read_back_from_its_file_are_the_same_to_a_run(tmp
 def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
     run = train(small_request(learner=small_learner(frames=80)), tmp_path / "run")
     wider = train(small_request(learner=small_learner(frames=80, width=24)), tmp_path / "wider")
+    theirs = newest_checkpoint(wider.checkpoints)
+    with pytest.raises(RunError, match=r"frames-\d+: not a checkpoint of .*run\. Name one in its check"):
+        load_agent(run.path, theirs)
+    copied = shutil.copytree(theirs, run.path / "milestones" / theirs.name)
     with pytest.raises(RunError, match="does not fit its run"):
-        load_agent(run.path, newest_checkpoint(wider.checkpoints))
+        load_agent(run.path, copied)
     with pytest.raises(RunError, match="no run here"):
         load_agent(tmp_path)
 

@@ -47,6 +47,13 @@ def check_positive(**values: float) -> None:
             raise ClearwayError(f"{_option(name)} is {value}, expected more than 0. Give a positive number")
 
 
+def check_ending(ending: str, **paths: Path | None) -> None:
+    """Check that files to be written, by option, have names that end so: no scene is lost. Raises ClearwayError."""
+    for name, path in paths.items():
+        if path is not None and path.suffix.lower() != ending:
+            raise ClearwayError(f"{path}: expected a name that ends in {ending}. Give another {_option(name)}")
+
+
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from clearway.cli.arguments import scene_files
+from clearway.cli.arguments import check_ending, scene_files
 from clearway.cli.console import stderr_console
 from clearway.errors import EncoderError
 
@@ -40,6 +40,7 @@ class ExportAgent:
         from clearway.deploy.export import export_onnx
         from clearway.deploy.from_run import load_scene_agent
 
+        check_ending(".onnx", out=self.out)
         files = scene_files(self.scenes) if self.scenes else None
         chosen = load_scene_agent(self.folder, self.scene, checkpoint=self.checkpoint, files=files)
         try:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from clearway.choices import RoomName
-from clearway.cli.arguments import check_at_least, check_seeds, scene_files
+from clearway.cli.arguments import check_at_least, check_ending, check_seeds, scene_files
 from clearway.cli.console import print_json, stderr_console
 from clearway.errors import ClearwayError
 from clearway.ray_cluster import kept_connected
@@ -82,6 +82,7 @@ class Inspect:
         from clearway.scenes.thor_v1 import read_scene
         from clearway.zones import scene_zones, zone_counts
 
+        check_ending(".png", map=self.map)
         path, *others = scene_files([self.file])
         if others:
             raise ClearwayError(f"{self.file}: a folder of {1 + len(others)} scene files. Name one, such as {path}")

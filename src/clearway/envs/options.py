@@ -96,7 +96,9 @@ def _scenes(value: str | Sequence[str] | None, world: World, env_count: int) -> 
             have = ", ".join(world.scene_names)
             raise EnvError(f"options: the state could be of several scenes. Add 'scene', one of {have}")
         return np.zeros(env_count, np.int64)
-    names = [value] * env_count if isinstance(value, str) else list(value)
+    names = [value] * env_count if isinstance(value, str) else value
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise EnvError(f"options['scene']: expected a name, or one for each of the {env_count}, got {value!r}")
     if len(names) != env_count:
         raise EnvError(f"options['scene']: expected a name, or one for each of the {env_count}, got {len(names)}")
     for name in names:

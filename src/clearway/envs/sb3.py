@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -44,9 +44,17 @@ class SB3VecEnv(VecEnv):
         self._actions = np.zeros(num_envs, np.int64)
 
     def reset(self) -> Observation:
-        """Begin all episodes, with the seeds given by `seed` the first time."""
-        seen, info = self.envs.reset(seed=[None if seed is None else int(seed) for seed in self._seeds])
+        """Begin all episodes, with the seeds of `seed` and the options of `set_options`, which count once.
+
+        Raises:
+            EnvError: an option does not fit, or is given for some environments alone.
+        """
+        seeds = [None if seed is None else int(seed) for seed in self._seeds]
+        seen, info = self.envs.reset(seed=seeds, options=_joined(self._options))
         self._reset_seeds()
+        self._reset_options()
+        told = {name: values for name, values in info.items() if not name.startswith("_")}
+        self.reset_infos = [{name: values[env] for name, values in told.items()} for env in range(self.num_envs)]
         return self._with_scene(seen, info["scene"])
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -89,14 +97,24 @@ class SB3VecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call the method once, for all."""
-        return [getattr(self.envs, method_name)(*method_args, **method_kwargs)]
+        """Call the method once, for all; its result, once for each environment asked for."""
+        result = getattr(self.envs, method_name)(*method_args, **method_kwargs)
+        return [result] * len(list(self._get_indices(indices)))
 
     def env_is_wrapped(
         self, wrapper_class: type[gymnasium.Wrapper], indices: int | Iterable[int] | None = None
     ) -> list[bool]:
         """Never."""
         return [False] * len(list(self._get_indices(indices)))
+
+
+def _joined(options: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Each environment's options as one mapping to a value an environment."""
+    names = options[0].keys()
+    for own in options:
+        if own.keys() != names:
+            raise EnvError(f"options: {list(own)} and {list(names)}. Give all environments the same options")
+    return {name: [own[name] for own in options] for name in names}
 
 
 def scene_space(scene_count: int) -> spaces.Box:

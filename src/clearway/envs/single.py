@@ -72,7 +72,8 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     ## Episode End
 
     1. Termination: the agent is in the target's pose, position and heading. There is no action to stop.
-    2. Truncation: after `max_episode_steps` steps (500 through `gymnasium.make`) that did not reach the target.
+    2. Truncation: after `max_episode_steps` steps (500 through `gymnasium.make`). Where the last of them reaches the
+       target, `gymnasium.make`'s time limit says both, the vector environment termination alone.
 
     ## Information
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from gymnasium import spaces
 
+from clearway.envs.world import World
 from clearway.errors import EnvError
 from clearway.scenes.scene import Observations, Scene
 
@@ -21,19 +22,21 @@ OBSERVATION_KINDS = ("features", "pictures")
 class Features:
     """The features of states.
 
+    Args:
+        world: the tables, which are shared, not copied.
+
     Attributes:
         shape: (F,).
 
     Raises:
-        EnvError: a scene has no features.
+        EnvError: there are no features.
     """
 
-    def __init__(self, scenes: Sequence[Scene]) -> None:
-        for scene in scenes:
-            if scene.features is None:
-                remedy = "Encode it, or ask for observations='pictures'"
-                raise EnvError(f"{scene.name}: the scene has no features. {remedy}")
-        self._table = np.concatenate([np.asarray(scene.features, np.float32) for scene in scenes])
+    def __init__(self, world: World) -> None:
+        if world.features is None:
+            remedy = "Encode it, or ask for observations='pictures'"
+            raise EnvError(f"{world.scene_names[0]}: the scene has no features. {remedy}")
+        self._table = world.features.numpy()
         self._bound = _power_of_two_above(self._table)
         self.shape = self._table.shape[1:]
 
@@ -102,7 +105,7 @@ def _power_of_two_above(values: np.ndarray) -> float:
     return float(2.0 ** np.ceil(np.log2(max(largest, 1.0))))
 
 
-def observation_source(scenes: Sequence[Scene], kind: ObservationKind) -> Features | Pictures:
+def observation_source(scenes: Sequence[Scene], kind: ObservationKind, world: World) -> Features | Pictures:
     """Where observations of a kind come from.
 
     Raises:
@@ -110,7 +113,7 @@ def observation_source(scenes: Sequence[Scene], kind: ObservationKind) -> Featur
     """
     if kind not in OBSERVATION_KINDS:
         raise EnvError(f"observations={kind!r} is unknown. Use one of {', '.join(map(repr, OBSERVATION_KINDS))}")
-    return Features(scenes) if kind == "features" else Pictures(scenes)
+    return Features(world) if kind == "features" else Pictures(scenes)
 
 
 def observation_space(source: Features | Pictures, history_length: int) -> spaces.Dict:

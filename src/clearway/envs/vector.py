@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -106,9 +107,10 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
 
-        self._world = make_world(loaded, chosen, zone_level)
+        seen = loaded if observations == "features" else [replace(scene, features=None) for scene in loaded]
+        self._world = make_world(seen, chosen, zone_level)
         self._distances = self._world.distance_table()
-        self._source = observation_source(loaded, observations)
+        self._source = observation_source(loaded, observations, self._world)
         self.single_observation_space = observation_space(self._source, history_length)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = Discrete(ACTION_COUNT)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from numbers import Integral
 
 import numpy as np
 import torch
@@ -139,7 +140,8 @@ def make_world(
 
     Raises:
         SceneError: names repeat, a scene has no target, targets are given for a scene that is not there, a target is
-            out of range, repeated or out of reach, or the scenes' features do not belong together or fit the store.
+            no state id, out of range, repeated or out of reach, or the scenes' features do not belong together or fit
+            the store.
         RunError: there is no room for the features.
     """
     _check_set(scenes, targets)
@@ -199,6 +201,8 @@ def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) ->
         if not chosen:
             raise SceneError(scene.name, "the scene has no target", "Give at least one state id as its target")
         for target in chosen:
+            if not isinstance(target, Integral):
+                raise SceneError(scene.name, f"target {target!r} is no state id", "Give whole numbers as targets")
             if not 0 <= target < scene.state_count:
                 valid = f"states are 0 to {scene.state_count - 1}"
                 raise SceneError(scene.name, f"target {target} is out of range ({valid})", "Choose another target")

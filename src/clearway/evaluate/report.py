@@ -6,14 +6,16 @@ Axis letters: J metrics, M targets, C scenes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from clearway.choices import ZoneLevel
 from clearway.envs.world import World
 from clearway.evaluate import bootstrap, metrics
 from clearway.evaluate.episodes import EpisodeTable
 from clearway.evaluate.selection import ActionSelection
+from clearway.reward import Reward
 
 Interval = tuple[float, float]
 
@@ -26,6 +28,29 @@ class Protocol:
     step_cap: int
     seed: int
     action_selection: ActionSelection
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What an agent was trained with.
+
+    Attributes:
+        frames: it has learnt from.
+        seed: of its training.
+        reward: as training paid it.
+        zone_level: whose zones the reward spoke of.
+    """
+
+    frames: int
+    seed: int
+    reward: Reward
+    zone_level: ZoneLevel
+
+    def __str__(self) -> str:
+        values = {name: value for name, value in asdict(self.reward).items() if name not in ("name", "clip")}
+        told = ", ".join(f"{name} {value:g}" for name, value in values.items() if value is not None)
+        clipped = ", clipped to [-1, 1]" if self.reward.clip else ""
+        return f"{self.frames:,} frames, seed {self.seed}, reward {told}{clipped}, zones of {self.zone_level}s"
 
 
 @dataclass(frozen=True)
@@ -83,6 +108,7 @@ class Evaluation:
         targets: one result a target, in the world's order.
         scenes: one result a scene.
         average: the plain mean over scenes.
+        trained: what it was trained with; None of what was not trained.
     """
 
     agent: str
@@ -91,12 +117,14 @@ class Evaluation:
     targets: tuple[Result, ...]
     scenes: tuple[Result, ...]
     average: Result
+    trained: Trained | None = None
 
     def to_json(self) -> dict[str, object]:
         """All of it as JSON values; target numbers are states in their scene's own numbering."""
         return {
             "agent": self.agent,
             "encoder": self.encoder,
+            **({"trained": asdict(self.trained)} if self.trained else {}),
             "episodes_per_target": self.protocol.episodes_per_target,
             "step_cap": self.protocol.step_cap,
             "seed": self.protocol.seed,

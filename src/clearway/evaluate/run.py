@@ -10,7 +10,7 @@ from clearway.errors import RunError
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_policies, world_yardsticks
 from clearway.evaluate.protocol import evaluate_agents
-from clearway.evaluate.report import Evaluation
+from clearway.evaluate.report import Evaluation, Trained
 from clearway.learn.load import Agent, run_world
 from clearway.model.policy import Policy
 from clearway.reward import Reward
@@ -57,16 +57,18 @@ def evaluate_runs(
         if (record.targets, record.learner.history_length) != (first.targets, first.learner.history_length):
             raise RunError("the runs differ in their targets or history length. Evaluate them one by one")
     world = run_world(first, scenes)
-    return evaluate_agents(
+    evaluations = evaluate_agents(
         world,
         {name: agent.policy(world) for name, agent in agents.items()},
-        references=_optima(world, [record.reward for record in records]),
+        references=_optima(world, [record.paid for record in records]),
         encoder=encoder_names(scenes),
         episodes_per_target=episodes_per_target,
         step_cap=step_cap,
         seed=seed,
         history_length=first.learner.history_length,
     )
+    trained = {name: _trained(agent) for name, agent in agents.items()}
+    return [replace(evaluation, trained=trained.get(evaluation.agent)) for evaluation in evaluations]
 
 
 def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
@@ -77,9 +79,14 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
         best, soft = optimum_policies(world, exact)
         if not reward.clip:
             _, soft = optimum_policies(world, world_yardsticks(world, replace(reward, clip=True)))
-        found[f"{OPTIMUM} ({reward.name})"] = best
+        found[f"{OPTIMUM} ({reward.name}{'' if reward.clip else ', unclipped'})"] = best
         found[f"{SOFT_FIXED_POINT} ({reward.name})"] = soft
     return found
+
+
+def _trained(agent: Agent) -> Trained:
+    record = agent.record
+    return Trained(agent.frames, record.seed, record.paid, record.zone_level)
 
 
 def encoder_names(scenes: Sequence[Scene]) -> str:

@@ -22,7 +22,7 @@ Width = Literal["terminal", "page", "all"]
 WIDTHS: tuple[Width, ...] = get_args(Width)
 MARK = "✗"
 REFERENCES = {
-    OPTIMUM: "the exact best policy under that reward, ties taken alike",
+    OPTIMUM: "the exact best policy under that reward (discount 0.99), ties taken alike",
     SOFT_FIXED_POINT: "where the published loss comes to rest, exactly (entropy weight 0.01, rewards clipped)",
 }
 
@@ -174,6 +174,7 @@ def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
     encoders = ", ".join(dict.fromkeys(evaluation.encoder for evaluation in evaluations))
     notes = [
         f"Encoder: {encoders}.",
+        *dict.fromkeys(f"{found.agent}: {found.trained}." for found in evaluations if found.trained),
         f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_cap:,} "
         f"steps, seed {protocol.seed}. Ranges: 95 % bootstrap intervals over episodes.",
     ]

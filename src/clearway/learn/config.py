@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from clearway.choices import MatmulPrecision
 from clearway.errors import RunError
+
+if TYPE_CHECKING:
+    from clearway.reward import Reward
 
 Algorithm = Literal["ppo", "a2c", "a3c"]
 PresetName = Literal["default", "paper", "paper-a3c"]
@@ -182,6 +185,10 @@ class Learner:
     def told_apart_by(self) -> dict[str, object]:
         """The settings by name, without those in `ADDED_LATER` that are as they always were."""
         return {name: value for name, value in asdict(self).items() if ADDED_LATER.get(name) != value}
+
+    def paid(self, reward: Reward) -> Reward:
+        """The reward as training pays it: clipped, where it or these settings say so."""
+        return replace(reward, clip=reward.clip or self.clip_rewards)
 
     def head_count(self, scenes: int) -> int:
         """Heads of a network for so many scenes."""

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
-from clearway.learn.checkpoint import newest_checkpoint, read_network
-from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
+from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
+from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord, scene_digest
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -28,11 +28,13 @@ class Agent:
         record: of its run.
         network: the parameters.
         feature_map: prepares features for it.
+        frames: it has learnt from.
     """
 
     record: RunRecord
     network: SiameseActorCritic
     feature_map: FeatureMap
+    frames: int
 
     def policy(self, world: World) -> Policy:
         """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
@@ -52,12 +54,14 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     """The agent of a run, from its newest checkpoint or the one given.
 
     Raises:
-        RunError: there is no such run or checkpoint, or it is damaged.
+        RunError: there is no such run, the checkpoint is damaged or lies in another folder.
     """
     run = RunFolder(folder)
     record = run.read_record()
     path = checkpoint or newest_checkpoint(run.checkpoints)
-    tensors = read_network(path)
+    if run.path.resolve() not in path.resolve().parents:
+        raise RunError(f"{path}: not a checkpoint of {folder}. Name one in its {CHECKPOINTS} or {MILESTONES} folder")
+    tensors, frames = read_network(path), read_progress(path).frames
     broken = [name for name, tensor in tensors.items() if not tensor.isfinite().all()]
     if broken:
         raise RunError(f"{path}: its {broken[0]} holds NaN or Inf. Use another checkpoint")
@@ -67,7 +71,7 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     except (LookupError, RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())[:300]
         raise RunError(f"{path}: does not fit its run ({reason}). Use another checkpoint") from error
-    return Agent(record, network, feature_map)
+    return Agent(record, network, feature_map, frames)
 
 
 def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tensor]) -> SiameseActorCritic:

@@ -71,6 +71,11 @@ class RunRecord:
         """Targets by scene name."""
         return {scene.name: scene.targets for scene in self.scenes}
 
+    @property
+    def paid(self) -> Reward:
+        """The reward as training paid it."""
+        return self.learner.paid(self.reward)
+
     def same_experiment(self, other: RunRecord) -> bool:
         """Both would give the same agent: all but versions, hardware, paths and command agree."""
 

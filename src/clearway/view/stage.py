@@ -34,8 +34,7 @@ class StageAgent:
     @property
     def reward(self) -> Reward:
         """What it learnt from: clipped, if its learner clipped rewards, so that values and rewards compare."""
-        record = self.agent.record
-        return record.reward.with_changes(clip=record.reward.clip or record.learner.clip_rewards)
+        return self.agent.record.paid
 
 
 @dataclass(frozen=True)

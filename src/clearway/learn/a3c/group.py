@@ -107,7 +107,7 @@ class WorkerGroup:
         seeds = workers + (seed << 32)
         self.navigation = Navigation(
             world,
-            replace(reward, clip=reward.clip or learner.clip_rewards),
+            learner.paid(reward),
             seeds,
             step_limit=learner.step_limit,
             history_length=learner.history_length,
