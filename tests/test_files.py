@@ -1,14 +1,16 @@
 """Files written whole or not at all."""
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from clearway import files
-from clearway.files import written_whole
+from clearway.files import json_text, written_whole
 
 WRITER = """
 import sys; sys.path[:] = {path!r}
@@ -77,3 +79,12 @@ def test_json_too_large_is_not_read(tmp_path: Path) -> None:
     assert files.read_json(tmp_path / "a.json") == [1, 2]
     with pytest.raises(ValueError, match="larger than"):
         files.read_json(tmp_path / "a.json", most_bytes=5)
+
+
+def test_json_holds_no_number_that_json_does_not_know() -> None:
+    content = {"steps": float("inf"), "rows": [(1, float("nan")), {"deep": np.float64("-inf")}], "fine": 0.5}
+    assert json.loads(json_text(content), parse_constant=pytest.fail) == {
+        "steps": None,
+        "rows": [[1, None], {"deep": None}],
+        "fine": 0.5,
+    }

@@ -153,3 +153,24 @@ def test_a_scene_is_not_written_over_by_a_map_or_an_exported_agent(clearway, tra
     clearway("scenes", "inspect", trained.scene, "--map", trained.scene).refusal(".h5", "ends in .png", "--map")
     clearway("export", trained.run, "--no-encoder", "--out", trained.scene).refusal(".h5", "ends in .onnx", "--out")
     assert trained.scene.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "words", [("--encoder-seed", 3), ("--workers", 2), ("--ray", "local")], ids=lambda words: words[0]
+)
+def test_flags_of_encoding_need_something_to_encode(clearway, dump, tmp_path, words):
+    out = tmp_path / "out"
+    answer = clearway("scenes", "import", "thor-v1", dump(tmp_path / "attic.h5"), "--out", out, *words)
+    assert answer.refusal(words[0], "--encoder is not given")
+    assert not out.exists()
+    plan = tmp_path / "plan.txt"
+    plan.write_text("...\n...\n...\n")
+    answer = clearway("scenes", "import", "floor-plan", plan, "--out", out, "--features", 8, *words)
+    assert answer.refusal(words[0], "--features makes features up")
+    assert not out.exists()
+
+
+def test_flags_of_the_live_evaluation_that_say_nothing(clearway, trained):
+    clearway("evaluate", trained.run, "--live", "--strengths", "0.25").refusal("--strengths", "Add --sweep")
+    clearway("evaluate", trained.run, "--live", "--targets").refusal("--targets", "Leave it out with --live")
+    clearway("evaluate", trained.run, "--selection", "argmax").refusal("--selection", "need --live")

@@ -182,3 +182,15 @@ def test_warnings_are_shown_once_whatever_python_was_told(capsys):
     assert shown.out == ""
     assert shown.err.count("another encoder stands in") == shown.err.count("─ warning ─") == 1
     assert "of no use" not in shown.err
+
+
+@pytest.mark.parametrize(
+    ("into", "code", "told"), [("> /dev/full", 2, "No space left on device"), ("| true", 0, ""), ("| head -n 1", 0, "")]
+)
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device")
+def test_what_cannot_be_printed_is_told_in_one_line_or_let_be(trained, into, code, told):
+    command = f"{shlex.quote(sys.executable)} -m clearway oracle {shlex.quote(str(trained.scene))} --json {into}"
+    line = f"set -o pipefail; {command}; exit ${{PIPESTATUS[0]:-$?}}"
+    done = subprocess.run(["bash", "-c", line], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == code, done.stderr
+    assert told in done.stderr and len(done.stderr.splitlines()) == bool(told)

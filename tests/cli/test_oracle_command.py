@@ -59,6 +59,15 @@ def test_a_table_without_json(clearway, corridor):
     assert answer.out.count("corridor") == 5  # seeded targets
 
 
+def test_the_table_fits_a_narrow_terminal(clearway, corridor, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = clearway("oracle", corridor).out.splitlines()
+    (heading,) = [line.split() for line in lines if "target" in line]
+    assert heading == ["scene", "target", "shortest", "optimal", "in", "zone", "soft", "collisions", "in", "zone"]
+    rows = [line.split() for line in lines if "corridor" in line]
+    assert [len(row) for row in rows] == [8] * 5 and all(len(line) <= 80 for line in lines)
+
+
 @pytest.mark.parametrize(
     ("words", "part"),
     [

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
+
+from clearway.files import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 def print_json(content: object) -> None:
     """Print JSON to standard output."""
-    print(json.dumps(content, indent=2))
+    print(json_text(content), end="")
 
 
 def stderr_console() -> Console:

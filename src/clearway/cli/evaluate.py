@@ -13,6 +13,7 @@ from clearway.cli.console import print_json, stderr_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
 from clearway.cli.live import STEP_CAP as LIVE_STEP_CAP
 from clearway.cli.live import Live, evaluate_live
+from clearway.errors import ClearwayError
 
 EPISODES, STEP_CAP = 100, 10_000
 
@@ -50,6 +51,8 @@ class Evaluate:
         if not self.room.live:
             self._on_grid(_or(self.episodes, EPISODES), _or(self.step_cap, STEP_CAP))
             return
+        if self.targets:
+            raise ClearwayError("--targets prints rows of the evaluation on the grid. Leave it out with --live")
         evaluate_live(
             self.folder,
             self.checkpoint,

@@ -40,7 +40,7 @@ class Live:
         """Check the flags; without --live they must be as they are by default."""
         if not self.live:
             if self != Live():
-                raise ClearwayError("perturbations, --against and --sweep need --live. Add it")
+                raise ClearwayError("perturbations, --against, --selection, --sweep, --strengths need --live. Add it")
             return
         numbers = {k: v for k, v in self.perturbations.to_json().items() if not isinstance(v, bool)}
         check_finite(**numbers)
@@ -49,6 +49,8 @@ class Live:
             raise ClearwayError(f"--{negative[0]} is below 0. Give 0 or more")
         if self.sweep and self.perturbations != Perturbations():
             raise ClearwayError("--sweep sets the perturbations itself. Leave their flags out")
+        if not self.sweep and self.strengths != Live().strengths:
+            raise ClearwayError("--strengths are a sweep's. Add --sweep, or leave it out")
         if not self.strengths:
             raise ClearwayError("--strengths is empty. Give one or more numbers above 0")
         for strength in self.strengths:

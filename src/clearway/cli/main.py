@@ -5,6 +5,7 @@ Exit codes: 0 success; 2 bad input, with one line that says what, where and the 
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -91,15 +92,27 @@ def _exit_code(words: Sequence[str]) -> int:
             )
         with showing_warnings():
             command.run()
+        sys.stdout.flush()  # here, where it can still be told that nothing could be written
     except ClearwayError as error:
         return _refused(str(error))
+    except BrokenPipeError:  # whoever reads has had enough
+        _print_no_more()
     except OSError as error:
+        _print_no_more()
         where = f"{error.filename}: " if error.filename else ""
         return _refused(f"{where}{error.strerror or error}. Check the path, its permissions and the space left")
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
     return 0
+
+
+def _print_no_more() -> None:
+    """Drop what standard output still holds, which could not be written, if it could not."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _refused(message: str) -> int:

@@ -73,14 +73,21 @@ class Oracle:
             _print_table(found)
 
 
+CAPTION = (
+    "Means over all starts. Steps: shortest path, optimal and soft policy; in zone: arrivals in the collision zone, of "
+    "the policy to the left."
+)
+
+
 def _print_table(found: list[TargetYardstick]) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, caption="means over all starts; a visit is an arrival", caption_justify="left")
-    for heading in ("scene", "target", "shortest", "optimal", "collision visits", "soft", "collisions", "visits"):
-        table.add_column(heading, justify="left" if heading == "scene" else "right")
+    table = Table(box=SIMPLE_HEAD, caption=CAPTION, caption_justify="left", padding=(0, 1, 0, 0))
+    table.add_column("scene", overflow="fold")
+    for heading in ("target", "shortest", "optimal", "in zone", "soft", "collisions", "in zone"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for one in found:
         optimal, soft = one.yardstick.optimal, one.yardstick.soft
         figures = (optimal.steps, optimal.collision_visits, soft.steps, soft.collisions, soft.collision_visits)

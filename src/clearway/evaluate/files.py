@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from clearway.evaluate.report import Evaluation
 from clearway.evaluate.tables import markdown_table
-from clearway.files import written_whole
+from clearway.files import json_text, written_whole
 
 
 def write_evaluations(folder: Path, content: object, evaluations: Sequence[Evaluation]) -> None:
@@ -20,6 +19,6 @@ def write_evaluations(folder: Path, content: object, evaluations: Sequence[Evalu
         evaluations: rows of the table, the main figures.
     """
     with written_whole(folder / "evaluation.json") as part:
-        part.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        part.write_text(json_text(content), encoding="utf-8")
     with written_whole(folder / "evaluation.md") as part:
         part.write_text(markdown_table(evaluations, "scenes", width="page"), encoding="utf-8")

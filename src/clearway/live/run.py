@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from pathlib import Path
 
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
-from clearway.files import written_whole
+from clearway.files import json_text, written_whole
 from clearway.learn.load import Agent
 from clearway.live.agent import live_policy
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
@@ -136,6 +135,6 @@ def live_json(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: st
 def write_live(folder: Path, results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> None:
     """Leave live.json and live.md in a run folder."""
     with written_whole(folder / JSON_FILE) as part:
-        part.write_text(json.dumps(live_json(results, protocol, encoder), indent=2) + "\n", encoding="utf-8")
+        part.write_text(json_text(live_json(results, protocol, encoder)), encoding="utf-8")
     with written_whole(folder / MARKDOWN_FILE) as part:
         part.write_text(markdown_tables(results, protocol, encoder), encoding="utf-8")

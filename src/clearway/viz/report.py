@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import base64
 import csv
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from html import escape
 from pathlib import Path
 
 from clearway.experiments.section import Claim, ReportTable, Section, Value
-from clearway.files import read_json, written_whole
+from clearway.files import json_text, read_json, written_whole
 from clearway.scenes.scene import Scene
 from clearway.viz.page_style import CSS
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
@@ -56,7 +55,7 @@ def write_report(
             draw_report_map(shown, scenes, folder / FIGURES / f"{shown.name}.png")
     content = {"title": title, "warning": warning, "facts": dict(facts), "sections": [asdict(s) for s in sections]}
     texts = {
-        JSON: json.dumps(content, indent=2) + "\n",
+        JSON: json_text(content),
         MARKDOWN: _markdown(title, sections, facts, warning),
         HTML: _page(folder, title, sections, facts, warning),
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import tyro
 
@@ -15,9 +15,6 @@ from clearway.cli.arguments import (
     scene_files,
 )
 from clearway.cli.imports.writing import Encoding, encode_and_write, write_scenes
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)
@@ -45,15 +42,15 @@ class ImportDumps:
         from clearway.scenes.importers.archives import unpacked
         from clearway.scenes.thor_v1 import read_scene
 
-        if self.encoder:
-            check_seeds(encoder_seed=self.encoder_seed)
+        encoding = Encoding(self.encoder or "auto", self.encoder_seed, self.workers, self.ray)
+        encoding.check()
+        if self.encoder is None:
+            encoding.check_unused("--encoder is not given: the files' features stay. Add it")
         with unpacked(self.files, SCENE_SUFFIXES) as paths:  # pictures stay in the files until they are written
             files = scene_files(paths)
             scenes = [read_scene(path) for path in files]
             if self.encoder:
-                encode_and_write(
-                    scenes, self.out, Encoding(self.encoder, self.encoder_seed, self.workers, self.ray), files
-                )
+                encode_and_write(scenes, self.out, encoding, files)
             else:
                 write_scenes(scenes, self.out, files)
 

@@ -50,6 +50,7 @@ class ImportFloorPlan:
         if self.features is None:
             self._render(plans)
             return
+        self.encoding.check_unused("--features makes features up. Leave out --features")
         for plan in plans:
             write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,13 @@ class Encoding:
         """Check the flags. Raises ClearwayError."""
         check_seeds(encoder_seed=self.encoder_seed)
         check_at_least(1, workers=self.workers)
+
+    def check_unused(self, why: str) -> None:
+        """Check that no flag is given where nothing is encoded. Raises ClearwayError, which says why."""
+        for field in fields(self):
+            if field.name != "encoder" and getattr(self, field.name) != field.default:
+                flag = f"--{field.name.replace('_', '-')}"
+                raise ClearwayError(f"{flag} says how to encode, but {why}, or leave out {flag}")
 
 
 def encode_and_write(scenes: Sequence[Scene], out: Path, encoding: Encoding, files: Sequence[Path] = ()) -> None:
