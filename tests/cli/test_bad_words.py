@@ -174,3 +174,15 @@ def test_flags_of_the_live_evaluation_that_say_nothing(clearway, trained):
     clearway("evaluate", trained.run, "--live", "--strengths", "0.25").refusal("--strengths", "Add --sweep")
     clearway("evaluate", trained.run, "--live", "--targets").refusal("--targets", "Leave it out with --live")
     clearway("evaluate", trained.run, "--selection", "argmax").refusal("--selection", "need --live")
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"), [("savn", "folder"), ("avd", "folder"), ("ai2thor", "room"), ("miniworld", "environment")]
+)
+def test_imports_of_nothing(clearway, tmp_path, kind, what):
+    clearway("scenes", "import", kind, "--out", tmp_path / "out").refusal(f"no {what} given. Name at least one")
+
+
+def test_a_scene_is_no_run_and_a_folder_no_scene(clearway, trained, tmp_path):
+    clearway("evaluate", trained.scene).refusal(str(trained.scene), "no run here")
+    clearway("scenes", "export", trained.scene.parent, "--out", tmp_path / "x.h5").refusal("a folder. Name one scene")

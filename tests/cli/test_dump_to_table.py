@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from clearway.errors import ClearwayError
+from clearway.evaluate import single
 from clearway.scenes.targets import ZHU_TARGETS
 from clearway.scenes.thor_v1 import read_scene
 
@@ -138,3 +140,30 @@ def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert {scene["name"]: scene["targets"] for scene in record["scenes"]} == {"one": [0, 5], "two": [7]}
     assert record["reward"]["name"] == "shortest"
+
+
+def test_another_seed_walks_other_episodes(clearway, trained):
+    words = ("evaluate", trained.run, "--episodes", 3, "--step-cap", 100, "--json")
+    first, again, other = (clearway(*words, "--seed", seed).json for seed in (0, 0, 1))
+    assert first == again
+    assert first["targets"] != other["targets"] and other["seed"] == 1
+
+
+def test_training_takes_the_zones_that_are_asked_for(clearway, trained, small, tmp_path):
+    assert clearway("train", trained.scene, "--out", tmp_path / "run", "--zones", "cell", *small).code == 0
+    levels = [json.loads((run / "run.json").read_text())["zone_level"] for run in (trained.run, tmp_path / "run")]
+    assert levels == ["pose", "cell"]
+
+
+@pytest.mark.parametrize("selection", ["sampled", "argmax", "argmax-untried"])
+def test_a_film_shows_actions_as_they_are_asked_for(clearway, trained, tmp_path, monkeypatch, selection):
+    asked = {}
+
+    def noted(*_, **settings):
+        asked.update(settings)
+        raise ClearwayError("enough")
+
+    monkeypatch.setattr(single, "single_episode", noted)
+    out = tmp_path / "film.gif"
+    clearway("video", trained.run, "--out", out, "--selection", selection, "--seed", 7).refusal("enough")
+    assert (asked["selection"], asked["seed"]) == (selection, 7)

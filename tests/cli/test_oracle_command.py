@@ -59,6 +59,14 @@ def test_a_table_without_json(clearway, corridor):
     assert answer.out.count("corridor") == 5  # seeded targets
 
 
+@pytest.mark.parametrize("words", [("--discount", 0.9), ("--entropy", 0.05), ("--zones", "cell")], ids=lambda w: w[0])
+def test_every_setting_moves_the_figures(clearway, corridor, words):
+    plain, moved = (
+        [row["soft"]["collision_visits"] for row in asked(clearway, corridor, *given)] for given in ((), words)
+    )
+    assert all(abs(one - other) > 1e-3 for one, other in zip(plain, moved, strict=True))
+
+
 def test_the_table_fits_a_narrow_terminal(clearway, corridor, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     lines = clearway("oracle", corridor).out.splitlines()

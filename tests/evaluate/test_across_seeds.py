@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from clearway.evaluate.across_seeds import difference, mean_estimate, probability_of_less
+from clearway.evaluate.across_seeds import _interval, difference, mean_estimate, probability_of_less
 
 SCENE = np.array([0, 0, 0, 1])  # three targets in one scene, one in another
 
@@ -64,3 +64,9 @@ def test_probability_of_less_by_hand() -> None:
 def test_probability_of_less_is_a_half_among_equals() -> None:
     scores = np.random.default_rng(1).normal(size=(6, 4))
     assert probability_of_less(scores, scores, SCENE).value == pytest.approx(0.5)
+
+
+def test_an_interval_of_five_runs_is_expanded_as_student_s_t_asks() -> None:
+    """t of 4 degrees of freedom is 2.776; times sqrt(5 / 4) it is 3.104, where the normal leaves 0.00095."""
+    low, high = _interval(np.linspace(0, 1, 1_000_001), 5) or (0, 0)
+    assert (low, 1 - high) == (pytest.approx(0.000954, rel=0.01), pytest.approx(0.000954, rel=0.01))

@@ -161,6 +161,6 @@ def test_the_tables_soft_fixed_point_is_that_of_clipped_rewards() -> None:
         expected = optimum_policies(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=clip)))[kind]
         other = optimum_policies(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=not clip)))[kind]
         history, target = torch.arange(scene.state_count)[:, None], torch.zeros(scene.state_count, dtype=torch.int64)
-        own = policies[f"{name} (collision-aware)"](history, target)
+        own = policies[f"{name} (collision-aware{'' if clip else ', unclipped'})"](history, target)
         assert torch.equal(own, expected(history, target))
         assert kind == 0 or not torch.allclose(own, other(history, target), atol=1e-3)

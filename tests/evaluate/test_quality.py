@@ -56,6 +56,7 @@ def test_the_shortest_path_meets_every_criterion() -> None:
     ("found", "failing"),
     [
         (GOOD, set()),
+        (Quality(2, 2, 10.5, 10.0, 0.04, 1.15, "corridor", 3), set()),  # at most is held
         (Quality(2, 1, 10.4, 10.0, 0.04, 1.1, "corridor", 3), {"solved_targets"}),
         (Quality(2, 2, 10.6, 10.0, 0.04, 1.1, "corridor", 3), {"path_ratio"}),
         (Quality(2, 2, 10.4, 10.0, 0.04, 1.16, "corridor", 3), {"worst_path_ratio"}),

@@ -8,10 +8,11 @@ import pytest
 from rich.console import Console
 
 from clearway.envs.world import make_world
+from clearway.evaluate.episodes import run_episodes
 from clearway.evaluate.metrics import METRIC_NAMES
 from clearway.evaluate.policies import argmax, random_policy
 from clearway.evaluate.protocol import evaluate_agents
-from clearway.evaluate.report import Evaluation
+from clearway.evaluate.report import Evaluation, Protocol, summarise
 from clearway.evaluate.tables import MARK, markdown_table, rich_table, table_text
 from made import corridor_scene, grid_scene
 
@@ -118,3 +119,49 @@ def test_the_terminal_s_table_fits_80_columns(evaluations):
     rows = [line.rstrip() for line in console.file.getvalue().splitlines() if "–" in line or "steps" in line]
     assert len(rows) > 5
     assert max(map(len, rows[:-2])) <= 80
+
+
+def test_every_column_shows_its_own_figure(evaluations):
+    values = {
+        "steps": 12.345,
+        "path_ratio": 1.234,
+        "collisions": 0.2345,
+        "collisions_per_100_steps": 2.5,
+        "collision_free": 0.91,
+        "sc": 0.82,
+        "sc_4x": 0.73,
+        "spl": 0.64,
+        "collision_free_spl": 0.55,
+        "share_collision": 0.46,
+        "looped": 0.015,
+    }
+    others = dict.fromkeys(set(METRIC_NAMES) - values.keys(), -1.0)
+    known = {**values, **others}
+    ends = {name: (value, 2 * value) for name, value in known.items()}
+    average = replace(evaluations[0].average, values=known, intervals=ends, failed_targets=(), target_count=5)
+    table = table_text([replace(evaluations[0], average=average)])
+    shown = {heading: (cell.text, cell.below) for heading, cell in zip(table.headings, table.rows[0], strict=True)}
+    assert shown == {
+        "agent": ("first", ""),
+        "solved": ("5/5", ""),
+        "steps": ("12.3", "12.3–24.7"),
+        "× shortest": ("1.23", "1.23–2.47"),
+        "collisions": ("0.234", "0.234–0.469"),
+        "per 100 steps": ("2.50", "2.50–5.00"),
+        "no collision %": ("91.0", "91.0–182.0"),
+        "sc %": ("82.0", "82.0–164.0"),
+        "sc 4× %": ("73.0", "73.0–146.0"),
+        "SPL %": ("64.0", "64.0–128.0"),
+        "collision-free SPL %": ("55.0", "55.0–110.0"),
+        "in collision zone %": ("46.0", "46.0–92.0"),
+        "looped %": ("1.50", "1.50–3.00"),
+    }
+
+
+def test_the_seed_is_that_of_the_bootstrap_too():
+    scene = grid_scene(2)
+    world = make_world([scene], {scene.name: [3, 17]})
+    table = run_episodes(world, random_policy(), episodes_per_target=30, step_cap=400)
+    first, again, other = (summarise(world, table, "a", "e", Protocol(30, 400, seed, "sampled")) for seed in (0, 0, 1))
+    assert first.average.values == other.average.values
+    assert first.average.intervals == again.average.intervals != other.average.intervals

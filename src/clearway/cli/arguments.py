@@ -47,6 +47,12 @@ def check_positive(**values: float) -> None:
             raise ClearwayError(f"{_option(name)} is {value}, expected more than 0. Give a positive number")
 
 
+def check_named(what: str, named: Sequence[object]) -> None:
+    """Check that at least one thing of a kind, for example "folder", was named. Raises ClearwayError."""
+    if not named:
+        raise ClearwayError(f"no {what} given. Name at least one")
+
+
 def check_ending(ending: str, **paths: Path | None) -> None:
     """Check that files to be written, by option, have names that end so: no scene is lost. Raises ClearwayError."""
     for name, path in paths.items():

@@ -118,6 +118,8 @@ class Export:
         from clearway.scenes.export import export_thor_v1
         from clearway.scenes.thor_v1 import read_scene
 
+        if self.file.is_dir():
+            raise ClearwayError(f"{self.file}: a folder. Name one scene file")
         if self.out.resolve() == self.file.resolve():
             raise ClearwayError(f"{self.out}: would be written over the scene itself. Give another file with --out")
         export_thor_v1(read_scene(self.file), self.out)

@@ -189,7 +189,7 @@ class RunFolder:
         try:
             content = read_json(path)
             found = int(content["format_version"])
-        except FileNotFoundError as error:
+        except (FileNotFoundError, NotADirectoryError) as error:
             raise RunError(
                 f"{self.path}: no run here ({RUN_FILE} is missing). Name a folder that clearway train made"
             ) from error

@@ -11,7 +11,7 @@ import tyro
 from clearway.cli.arguments import (
     SCENE_SUFFIXES,
     check_at_least,
-    check_seeds,
+    check_named,
     scene_files,
 )
 from clearway.cli.imports.writing import Encoding, encode_and_write, write_scenes
@@ -81,15 +81,16 @@ class ImportSavn:
         """Read, encode and write."""
         from clearway.scenes.importers.savn import read_savn
 
-        check_seeds(encoder_seed=self.encoder_seed)
+        check_named("folder", self.folders)
+        encoding = Encoding(self.encoder or "auto", self.encoder_seed, self.workers, self.ray)
+        encoding.check()
         scenes = [read_savn(folder, step_m=self.step) for folder in self.folders]
         featured = all(scene.features is not None for scene in scenes)
         if self.encoder is None and featured:
+            encoding.check_unused("--encoder is not given: the data's features stay. Add it")
             write_scenes(scenes, self.out)
         else:
-            encode_and_write(
-                scenes, self.out, Encoding(self.encoder or "auto", self.encoder_seed, self.workers, self.ray)
-            )
+            encode_and_write(scenes, self.out, encoding)
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,7 @@ class ImportAvd:
         """Read, encode and write."""
         from clearway.scenes.importers.avd import read_avd
 
+        check_named("folder", self.folders)
         check_at_least(1, height=self.height)
         scenes = [read_avd(folder, height_px=self.height) for folder in self.folders]
         encode_and_write(scenes, self.out, self.encoding)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds
+from clearway.cli.arguments import check_at_least, check_finite, check_named, check_positive, check_seeds
 from clearway.cli.imports.writing import Encoding, encode_and_write
 from clearway.ray_cluster import kept_connected
 
@@ -36,6 +36,7 @@ class ImportAi2Thor:
         """Photograph, encode and write."""
         from clearway.scenes.importers.ai2thor import photographed, started
 
+        check_named("room", self.rooms)
         check_at_least(1, width=self.width, height=self.height)
         check_positive(step=self.step)
         self.encoding.check()  # before anything that takes minutes
@@ -136,6 +137,7 @@ class ImportMiniWorld:
         from clearway.scenes.build import scene_name
         from clearway.scenes.importers.miniworld import photographed, started
 
+        check_named("environment", self.environments)
         check_positive(step=self.step)
         check_seeds(seed=self.seed)
         self.encoding.check()
