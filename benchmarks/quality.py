@@ -46,7 +46,6 @@ from clearway.evaluate.metrics import average, by_scene
 from clearway.evaluate.optimum import world_yardsticks
 from clearway.evaluate.oracle import DISCOUNT, ENTROPY_WEIGHT
 from clearway.evaluate.report import Protocol
-from clearway.evaluate.run import encoder_names
 from clearway.files import written_whole
 from clearway.learn.config import PRESETS, Learner
 from clearway.learn.provenance import hardware, package_versions
@@ -54,7 +53,7 @@ from clearway.learn.settings import with_settings
 from clearway.learn.train import RunRequest, set_threads
 from clearway.perception import encode_scenes
 from clearway.reward import REWARDS, Reward
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, seeded_targets
 
 ROOMS = "rooms"

@@ -70,9 +70,9 @@ def evaluate_live(
     json: bool,
 ) -> None:
     """Walk the episodes, print, leave live.json and live.md in the run folder, and draw what is asked for."""
-    from clearway.evaluate.run import encoder_names
     from clearway.learn.load import load_agent, run_scenes
     from clearway.live.settings import Setting, label_of, sweep_settings
+    from clearway.scenes.scene import encoder_names
 
     check_at_least(1, episodes=episodes, step_cap=step_cap)
     check_seeds(seed=seed)

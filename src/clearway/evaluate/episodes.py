@@ -17,8 +17,8 @@ from clearway.envs.streams import Streams, stream_keys
 from clearway.envs.world import World
 from clearway.evaluate.loops import LoopSkipper, Tally
 from clearway.evaluate.policies import argmax
-from clearway.evaluate.selection import ActionSelection, UntriedActions, sampled
-from clearway.model.policy import Policy
+from clearway.evaluate.selection import ActionSelection, UntriedActions
+from clearway.model.policy import Policy, sampled
 from clearway.reward import COLLISION_AWARE
 
 EPISODES_PER_TARGET = 100

@@ -14,7 +14,7 @@ from clearway.evaluate.report import Evaluation, Trained
 from clearway.learn.load import Agent, run_world
 from clearway.model.policy import Policy
 from clearway.reward import Reward
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Scene, encoder_names
 
 
 def evaluate_run(
@@ -87,8 +87,3 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
 def _trained(agent: Agent) -> Trained:
     record = agent.record
     return Trained(agent.frames, record.seed, record.paid, record.zone_level)
-
-
-def encoder_names(scenes: Sequence[Scene]) -> str:
-    """The encoders behind the scenes' features, for the notes under a table."""
-    return ", ".join(sorted({scene.encoder.name if scene.encoder else "unknown" for scene in scenes}))

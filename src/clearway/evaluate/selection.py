@@ -27,12 +27,6 @@ ActionSelection = Literal["sampled", "argmax", "argmax-untried"]
 _ALL_TRIED = (1 << ACTION_COUNT) - 1
 
 
-def sampled(probabilities: Tensor, uniform: Tensor) -> Tensor:
-    """Actions (B,) int64 drawn by probabilities (B, A), which need not sum to one, from uniform (B,) in [0, 1)."""
-    bounds = probabilities.to(torch.float64).cumsum(1)
-    return ((uniform * bounds[:, -1])[:, None] >= bounds[:, :-1]).sum(1)
-
-
 class UntriedActions:
     """Which actions every episode has not tried yet in which pose.
 

@@ -16,7 +16,7 @@ from clearway.learn.run_folder import scene_digest
 from clearway.perception import encode_scenes
 from clearway.reward import Reward
 from clearway.scenes.library import cached_room_scene
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import ZHU_TARGETS, default_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
@@ -58,7 +58,7 @@ class Setting:
     @property
     def encoder(self) -> str:
         """Name of what made the features."""
-        return ", ".join(sorted({scene.encoder.name if scene.encoder else "unknown" for scene in self.scenes}))
+        return encoder_names(self.scenes)
 
     def world(self, targets: TargetSets | None = None, zone_level: ZoneLevel = "pose") -> World:
         """The scenes with some targets, the paper's by default."""

@@ -11,6 +11,7 @@ from torch import Tensor
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
+from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord, scene_digest
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
@@ -66,8 +67,8 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     if broken:
         raise RunError(f"{path}: its {broken[0]} holds NaN or Inf. Use another checkpoint")
     try:
-        feature_map = FeatureMap.from_tensors(_part(tensors, "features."))
-        network = _network(record, feature_map.input_count, _part(tensors, "network."))
+        feature_map = FeatureMap.from_tensors(part_of(tensors, "features"))
+        network = _network(record, feature_map.input_count, part_of(tensors, "network"))
     except (LookupError, RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())[:300]
         raise RunError(f"{path}: does not fit its run ({reason}). Use another checkpoint") from error
@@ -85,10 +86,6 @@ def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tenso
     network = SiameseActorCritic(NetworkShape(heads, input_count, learner.width, learner.history_length))
     network.load_state_dict(parameters)
     return network
-
-
-def _part(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
-    return {name[len(prefix) :]: tensor for name, tensor in tensors.items() if name.startswith(prefix)}
 
 
 def run_scenes(record: RunRecord, files: Sequence[Path] | None = None) -> list[Scene]:

@@ -17,16 +17,14 @@ from clearway.envs.navigation import Navigation, Transition
 from clearway.envs.streams import Streams
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.lookup import Activations, LookupNetwork
-from clearway.scenes.actions import ACTION_COUNT
+from clearway.model.policy import sampled
 
 ACTION_STREAM = 3
 
 
 def sample_actions(scores: Tensor, uniform: Tensor) -> Tensor:
     """Actions (B,) int64 drawn from softmax(scores (B, A)) with uniform numbers (B,) in [0, 1)."""
-    bounds = torch.softmax(scores.double(), 1).cumsum(1)  # in float32 a number near 1 would round to 1: the last action
-    threshold = uniform[:, None] * bounds[:, -1:]
-    return (threshold >= bounds).sum(1).clamp_(max=ACTION_COUNT - 1)
+    return sampled(torch.softmax(scores.double(), 1), uniform)
 
 
 def as_rows(values: Tensor) -> Tensor:

@@ -116,7 +116,7 @@ def record_of(
                 name=scene.name,
                 path=str(paths[scene.name].resolve()) if scene.name in paths else None,
                 digest=scene_digest(scene),
-                encoder=scene.encoder.name if scene.encoder else "unknown",
+                encoder=scene.encoder_name,
                 targets=tuple(int(target) for target in targets[scene.name]),
             )
             for scene in scenes

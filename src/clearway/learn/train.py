@@ -29,6 +29,7 @@ from clearway.learn.checkpoint import (
 )
 from clearway.learn.config import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
+from clearway.learn.named_tensors import joined
 from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.learn.statistics import EpisodeStatistics
@@ -272,7 +273,7 @@ def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
 def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """The parameters, and the map that prepares features."""
     network = {key: value for key, value in tensors.items() if key.startswith(NETWORK)}
-    return network | {f"features.{name}": tensor for name, tensor in trainer.feature_map.tensors().items()}
+    return network | joined({"features": trainer.feature_map.tensors()})
 
 
 @contextmanager

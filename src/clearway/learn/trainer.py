@@ -21,6 +21,7 @@ from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.lookahead import Observed, better_policy
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient, merged
 from clearway.learn.minibatches import Minibatch, dealt_epochs
+from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
@@ -331,22 +332,17 @@ class Trainer:
             "choice": {"weights": self.navigation.choice.weights},
             "observed": {"next_state": self.observed.next_state},
         }
-        return {f"{part}.{name}": t.detach() for part, tensors in parts.items() for name, t in tensors.items()}
+        return {name: tensor.detach() for name, tensor in joined(parts).items()}
 
     @torch.no_grad()
     def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
         """Go on from where `tensors` was called, after that many frames and updates."""
-
-        def part(name: str) -> dict[str, Tensor]:
-            prefix = f"{name}."
-            return {key[len(prefix) :]: value for key, value in tensors.items() if key.startswith(prefix)}
-
         for name, parameter in self.network.named_parameters():
             parameter.copy_(tensors[f"network.{name}"])
         for optimiser in (self.siamese_optimiser, self.optimiser):
-            optimiser.load_tensors(part("optimiser"))
-        self.navigation.load_tensors(part("navigation"))
-        self.statistics.load_tensors(part("statistics"))
+            optimiser.load_tensors(part_of(tensors, "optimiser"))
+        self.navigation.load_tensors(part_of(tensors, "navigation"))
+        self.statistics.load_tensors(part_of(tensors, "statistics"))
         self.action_stream.drawn = tensors["actions.drawn"].to(self.world.device).clone()
         self.observed.next_state = tensors["observed.next_state"].to(self.world.device).clone()
         self.navigation.choice.reweigh(tensors["choice.weights"].to(self.world.device).clone())

@@ -25,6 +25,7 @@ from clearway.live.draws import FURNITURE, OBSTACLE, Draws
 from clearway.live.layout import Layout, arranged, as_built, furniture_moved, with_obstacle_on_path
 from clearway.live.room import LiveRoom
 from clearway.live.settings import Perturbations
+from clearway.model.policy import sampled
 from clearway.perception.encoder import Encoder
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import Action
@@ -223,10 +224,7 @@ def _features(walkers: list[_Walker], camera: Camera, encoder: Encoder) -> Tenso
 
 def _chosen(probabilities: Tensor, chance: Tensor, selection: LiveSelection) -> Tensor:
     """Actions (B,) int64 by probabilities (B, A); chance: (B,) in [0, 1)."""
-    if selection == "argmax":
-        return probabilities.argmax(1)
-    bounds = probabilities.to(torch.float64).cumsum(1)
-    return ((chance * bounds[:, -1])[:, None] >= bounds[:, :-1]).sum(1)
+    return probabilities.argmax(1) if selection == "argmax" else sampled(probabilities, chance)
 
 
 def _table(walkers: list[_Walker], target: np.ndarray, distance: np.ndarray) -> LiveTable:

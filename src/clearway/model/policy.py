@@ -20,6 +20,15 @@ A pure function: the same history and target give the same probabilities. They n
 """
 
 
+def sampled(probabilities: Tensor, uniform: Tensor) -> Tensor:
+    """Actions (B,) int64 drawn by probabilities (B, A), which need not sum to one, from uniform (B,) in [0, 1).
+
+    In float64: in float32 a number near 1 would round to 1, and the last action be drawn where it is impossible.
+    """
+    bounds = probabilities.to(torch.float64).cumsum(1)
+    return ((uniform * bounds[:, -1])[:, None] >= bounds[:, :-1]).sum(1)
+
+
 Critic = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
 """As a `Policy`, with the value of the history too: probabilities (B, A) and values (B,)."""
 

@@ -5,7 +5,7 @@ Axis letters, here and everywhere: S states (poses), A actions, F features.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -164,6 +164,16 @@ class Scene:
         """(S,) int, strongly connected component of each state; 0 is the largest."""
         return graphs.components(self.graph)
 
+    @property
+    def encoder_name(self) -> str:
+        """Name of what made the features."""
+        return self.encoder.name if self.encoder else "unknown"
+
     def with_features(self, features: np.ndarray, encoder: EncoderRecord) -> Scene:
         """The same scene with other features, (S, F) float32, and the record of what made them."""
         return replace(self, features=features, encoder=encoder)
+
+
+def encoder_names(scenes: Iterable[Scene]) -> str:
+    """Names of what made the scenes' features, each once."""
+    return ", ".join(sorted({scene.encoder_name for scene in scenes}))

@@ -12,8 +12,8 @@ from clearway.envs.navigation import Navigation
 from clearway.envs.streams import Streams
 from clearway.envs.world import World
 from clearway.evaluate.episodes import ACTION_STREAM
-from clearway.evaluate.selection import ActionSelection, UntriedActions, sampled
-from clearway.model.policy import Critic
+from clearway.evaluate.selection import ActionSelection, UntriedActions
+from clearway.model.policy import Critic, sampled
 from clearway.reward import Reward
 from clearway.view.episode import MOST_STEPS
 

@@ -21,6 +21,7 @@ from clearway.learn.a3c.trainer import AsyncTrainer
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.config import PAPER_A3C
 from clearway.learn.load import load_agent
+from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Update
@@ -108,7 +109,7 @@ def test_one_process_learns_and_counts_what_plain_a3c_does(monkeypatch: pytest.M
     while frames < learner.frames:
         frames += plain.round(frames)
     assert trainer.frames == frames
-    plain.assert_learnt(trainer.shared.part("parameters"), trainer.shared.part("squares"))
+    plain.assert_learnt(part_of(trainer.shared, "parameters"), part_of(trainer.shared, "squares"))
     ended, reached = (torch.zeros(5) for _ in range(2))
     for worker in plain.workers:
         ended[worker.target] += worker.ended
@@ -225,7 +226,7 @@ def test_shared_tensors_keep_shapes_types_and_values() -> None:
     assert equal_bits(dict(shared), tables)
     assert [shared[name].dtype for name in tables] == [tensor.dtype for tensor in tables.values()]
     shared["world.zone"][3] = 77
-    assert shared.part("world")["zone"][3] == 77
+    assert part_of(shared, "world")["zone"][3] == 77
     tables["world.zone"][3] = 77
     assert equal_bits(dict(shared), tables)
 

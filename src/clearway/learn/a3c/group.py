@@ -23,6 +23,7 @@ from clearway.learn.a3c.local import LocalNetwork
 from clearway.learn.a3c.rmsprop import SharedRMSPropUpdate
 from clearway.learn.config import Learner
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient
+from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
@@ -256,14 +257,13 @@ class WorkerGroup:
     def tensors(self) -> dict[str, Tensor]:
         """What `load_tensors` needs of these workers to go on bit for bit, a row a worker, beside the parameters."""
         return {
-            **{f"navigation.{name}": tensor for name, tensor in self.navigation.tensors().items()},
+            **joined({"navigation": self.navigation.tensors()}),
             "actions.drawn": self.action_stream.drawn,
             "open_collisions": self.open_collisions,
         }
 
     def load_tensors(self, tensors: Mapping[str, Tensor]) -> None:
         """Go on from where `tensors` was called."""
-        prefix = "navigation."
-        self.navigation.load_tensors({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
+        self.navigation.load_tensors(part_of(tensors, "navigation"))
         self.action_stream.drawn = tensors["actions.drawn"].clone()
         self.open_collisions = tensors["open_collisions"].clone()

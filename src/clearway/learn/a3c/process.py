@@ -19,6 +19,7 @@ from clearway.envs.world import World
 from clearway.learn.a3c.group import Round, WorkerGroup
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.config import Learner
+from clearway.learn.named_tensors import part_of
 from clearway.learn.trainer import Update
 from clearway.reward import Reward
 
@@ -69,11 +70,11 @@ class Assignment:
             self.reward,
             self.seed,
             torch.tensor(self.workers),
-            self.shared.part("parameters"),
-            self.shared.part("squares"),
+            part_of(self.shared, "parameters"),
+            part_of(self.shared, "squares"),
         )
         rows = torch.tensor(self.workers)
-        group.load_tensors({name: tensor[rows] for name, tensor in self.shared.part("workers").items()})
+        group.load_tensors({name: tensor[rows] for name, tensor in part_of(self.shared, "workers").items()})
         return group
 
 
@@ -122,5 +123,5 @@ def world_tensors(world: World) -> dict[str, Tensor]:
 
 def world_from(shared: SharedTensors, scene_names: tuple[str, ...]) -> World:
     """The world whose tables lie in shared memory."""
-    tables: dict[str, Any] = shared.part("world")
+    tables: dict[str, Any] = part_of(shared, "world")
     return World(scene_names=scene_names, **tables)

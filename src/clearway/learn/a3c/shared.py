@@ -66,11 +66,6 @@ class SharedTensors(Mapping[str, Tensor]):
     def __len__(self) -> int:
         return len(self._tensors)
 
-    def part(self, name: str) -> dict[str, Tensor]:
-        """The tensors whose names begin with `name` and a dot, by the rest of their names."""
-        prefix = f"{name}."
-        return {key[len(prefix) :]: tensor for key, tensor in self.items() if key.startswith(prefix)}
-
     def __reduce__(self) -> tuple[Any, ...]:
         return _attached, (self._layout, DupFd(self._handle))
 

@@ -25,6 +25,7 @@ from clearway.learn.a3c.process import Assignment, Message, Report, work, world_
 from clearway.learn.a3c.rmsprop import EPSILON
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.config import Learner
+from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.setup import check_seed, checked_features, fitted_features
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.trainer import Update, check_finite
@@ -32,6 +33,8 @@ from clearway.model.feature_map import prepared_features
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
+PLACES = {"parameters": "network", "squares": "optimiser.square_plus_epsilon", "workers": "workers"}
+"""Parts of the shared memory, and what they are called in a checkpoint."""
 SECONDS_TO_END = 5.0  # a round takes a fraction of a second
 
 
@@ -136,22 +139,16 @@ class AsyncTrainer:
                         assert isinstance(message, Report)
                         self._add(message)
             self._paused = True
-        return {
-            **{f"network.{name}": tensor for name, tensor in self.shared.part("parameters").items()},
-            **{f"optimiser.square_plus_epsilon.{name}": t for name, t in self.shared.part("squares").items()},
-            **{f"workers.{name}": tensor for name, tensor in self.shared.part("workers").items()},
-            **{f"statistics.{name}": tensor for name, tensor in self.statistics.tensors().items()},
-        }
+        shared = {name: part_of(self.shared, part) for part, name in PLACES.items()}
+        return joined({**shared, "statistics": self.statistics.tensors()})
 
     def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
         """Go on from where `tensors` was called, after that many frames and updates; before the first `update`."""
         assert not self._processes, "the workers are under way"
-        places = {"parameters": "network", "squares": "optimiser.square_plus_epsilon", "workers": "workers"}
-        for part, name in places.items():
-            for key, tensor in self.shared.part(part).items():
+        for part, name in PLACES.items():
+            for key, tensor in part_of(self.shared, part).items():
                 tensor.copy_(tensors[f"{name}.{key}"])
-        prefix = "statistics."
-        self.statistics.load_tensors({k[len(prefix) :]: t for k, t in tensors.items() if k.startswith(prefix)})
+        self.statistics.load_tensors(part_of(tensors, "statistics"))
         self.frames, self.updates = frames, updates
 
     def close(self) -> None:
