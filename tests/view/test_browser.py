@@ -229,6 +229,24 @@ def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[...,
     shown(page, "1 / 1")
 
 
+def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Callable[..., Page]) -> None:
+    page = opened("scene=bare&start=59&target=30")
+    page.locator("#scene").select_option("corridor")
+    expect(page).to_have_url(re.compile("scene=corridor&"))
+    page.locator("#layer").get_by_text("Value").click()
+    page.evaluate("""() => {
+        for (const name of ["bare", "corridor", "grid", "bare", "corridor"]) {
+            document.querySelector("#scene").value = name;
+            document.querySelector("#scene").dispatchEvent(new Event("change"));
+        }
+    }""")
+    page.keyboard.press("n")
+    shown(page, "1 / 1")
+    expect(page).to_have_url(re.compile("scene=corridor&.*walk="))
+    expect(page.locator("#scene")).to_have_value("corridor")
+    expect(page.locator("#legend")).to_contain_text("value")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: str) -> None:

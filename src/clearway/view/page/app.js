@@ -14,6 +14,7 @@ const known = { stage: null, scene: null, sceneIndex: -1, episode: null, walkers
 let shown = 0; // the step looked at
 let playing = false;
 let turn = 0; // of playing: an older loop notices that it is over
+let asked = Promise.resolve(); // done when the last question's answer is taken in
 
 const map = createMap($("map"), pick, (state) => ($("cursor").textContent = state === null ? "" : `Cursor: ${nameOf(state)}`));
 const viewer = connect(() => say("The viewer has ended. Start it again, then load its new address.", true, false));
@@ -54,8 +55,12 @@ function nameOf(state) {
   return `pose ${state}, heading ${headings_deg[state]}°, ${["free", "precollision", "collision"][zones[state]]} zone`;
 }
 
-// Asks, takes in the answer, and says whether it was not refused.
-async function ask(message) {
+// Asks, takes in the answer, and says whether it was not refused; the next question waits until that is done.
+function ask(message) {
+  return (asked = asked.catch(() => {}).then(() => askNow(message)));
+}
+
+async function askNow(message) {
   const answer = await viewer.ask(message);
   if (answer.kind === "refused") {
     say(answer.text, true);
@@ -67,12 +72,12 @@ async function ask(message) {
 
 async function takeEpisode(answer) {
   const before = known.episode;
-  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link });
   if (answer.scene !== known.sceneIndex) {
-    known.scene = await fetched(`scenes/${answer.scene}/map.json`);
-    known.sceneIndex = answer.scene;
-    await map.setScene(known.scene, `scenes/${answer.scene}/above.jpg`);
+    const scene = await fetched(`scenes/${answer.scene}/map.json`);
+    await map.setScene(scene, `scenes/${answer.scene}/above.jpg`);
+    Object.assign(known, { scene, sceneIndex: answer.scene });
   }
+  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link });
   if (!before || before.scene !== answer.scene || before.target !== answer.target) known.minds.clear();
   shown = 0;
   $("scene").value = known.scene.name;
@@ -86,7 +91,7 @@ async function takeEpisode(answer) {
   known.cards = known.walkers.map((walker, index) => createCard(walker, index, pictures, drive));
   $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
   showTarget(pictures);
-  await showLayer();
+  await showLayer(askNow);
   keepLink();
   show();
 }
@@ -150,10 +155,13 @@ function showTarget(pictures) {
   );
 }
 
-async function showLayer() {
-  const kind = document.querySelector("input[name=layer]:checked").value, mind = Number($("mind").value);
+const chosenLayer = () => document.querySelector("input[name=layer]:checked").value;
+
+async function showLayer(asking = ask) {
+  const kind = chosenLayer(), mind = Number($("mind").value);
   $("mind-field").hidden = kind === "zones" || known.stage.agents.length < 2;
-  if (kind !== "zones" && !known.minds.has(mind)) await ask({ do: "map", walker: mind });
+  if (kind !== "zones" && !known.minds.has(mind)) await asking({ do: "map", walker: mind });
+  if (kind !== chosenLayer() || mind !== Number($("mind").value)) return; // another was chosen meanwhile
   const { values, probabilities } = known.minds.get(mind) ?? {};
   const layer = { kind, values, probabilities, range: values && [Math.min(...values), Math.max(...values)] };
   map.setLayer(layer);
@@ -262,8 +270,8 @@ const help = () => $("help-dialog").showModal();
 
 $("scene").addEventListener("change", () => begin({ scene: $("scene").value, start: null, target: null }));
 $("selection").addEventListener("change", () => begin({ selection: $("selection").value }));
-$("layer").addEventListener("change", showLayer);
-$("mind").addEventListener("change", showLayer);
+$("layer").addEventListener("change", () => showLayer());
+$("mind").addEventListener("change", () => showLayer());
 $("timeline").addEventListener("input", () => {
   play(false);
   shown = Number($("timeline").value);

@@ -227,15 +227,16 @@ export function createMap(canvas, onPick, onCursor) {
   }
 
   return {
+    // All at once, after the wait; ways and target of the scene before go, `show` brings this one's.
     async setScene(json, picturePath) {
-      above = null;
-      layer = { kind: "zones" };
-      if (json.has_above) {
-        const picture = new Image();
+      const picture = json.has_above ? new Image() : null;
+      if (picture) {
         picture.src = picturePath;
         await picture.decode();
-        above = picture;
       }
+      above = picture;
+      shown = null;
+      layer = { kind: "zones" };
       scene = { ...json, firstOfCell: [] };
       json.cells.forEach((cell, state) => (scene.firstOfCell[cell] ??= state));
       cursor = 0;
