@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from clearway.deploy.model import MAX_PICTURE_SIDE
 from clearway.serve.faults import Fault
 from clearway.serve.pictures import decoded
 from serving import picture_bytes
@@ -72,6 +73,13 @@ def test_sizes_are_checked_before_decoding(width, height, monkeypatch) -> None:
     """A few bytes that would unpack to gigabytes."""
     monkeypatch.setattr(Image.Image, "convert", lambda *_: pytest.fail("it was decoded"))
     assert code(png(width, height)) == "picture_too_large"
+
+
+def test_pictures_are_no_longer_than_a_navigator_takes() -> None:
+    """Their resizing takes memory by the side, not by the area."""
+    for width, height in ((MAX_PICTURE_SIDE + 1, 1), (1, MAX_PICTURE_SIDE + 1)):
+        assert code(png(width, height, bytes((width + 1) * height))) == "picture_too_large"
+    assert decoded(png(MAX_PICTURE_SIDE, 1, bytes(MAX_PICTURE_SIDE + 1)), LIMIT).shape == (1, MAX_PICTURE_SIDE, 3)
 
 
 def test_a_file_larger_inside_than_it_says_is_not_unpacked_further() -> None:

@@ -7,6 +7,7 @@ import io
 import numpy as np
 from PIL import Image
 
+from clearway.deploy.model import MAX_PICTURE_SIDE
 from clearway.serve.faults import Fault
 
 FORMATS = ("JPEG", "PNG", "WEBP")
@@ -18,13 +19,14 @@ def decoded(content: bytes, most_pixels: int) -> np.ndarray:
     """The picture in a JPEG, PNG or WebP file, (height, width, 3) uint8 RGB; transparency and orientation are ignored.
 
     Raises:
-        Fault: it is in no such format, has more pixels than allowed, or is damaged or cut off.
+        Fault: it is in no such format, is larger than allowed, or is damaged or cut off.
     """
     try:
         with Image.open(io.BytesIO(content), formats=FORMATS) as file:
             width, height = file.size
-            if width * height > most_pixels:
-                raise Fault("picture_too_large", f"{width} x {height} pixels, at most {most_pixels} are taken")
+            if width * height > most_pixels or max(width, height) > MAX_PICTURE_SIDE:
+                bounds = f"at most {most_pixels} in all and {MAX_PICTURE_SIDE} a side are taken"
+                raise Fault("picture_too_large", f"{width} x {height} pixels, {bounds}")
             return np.array(file.convert("RGB"))
     except Fault:
         raise
