@@ -48,6 +48,24 @@ def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
     assert clearway("serve", "x.onnx", *words).refusal(part)
 
 
+@pytest.fixture
+def served(monkeypatch) -> list[str]:
+    """Tokens of the services that would have run."""
+    tokens: list[str] = []
+    monkeypatch.setattr("clearway.serve.run.open_model", lambda source, scene: Sums())
+    monkeypatch.setattr("clearway.serve.run.run_service", lambda model, listener, token, limits: tokens.append(token))
+    return tokens
+
+
+def test_a_random_token_is_said_also_where_the_variable_is_empty(clearway, monkeypatch, served):
+    for own in ("", "a-token-of-one-s-own"):
+        monkeypatch.setenv("CLEARWAY_TOKEN", own)
+        answer = clearway("serve", "x.onnx")
+        assert answer.code == 0
+        assert (f"token: {served[-1]}" in answer.err) == (own == "")
+    assert served[1] == "a-token-of-one-s-own"
+
+
 PROGRAM = """
 import clearway.serve.run
 from clearway.cli.main import main

@@ -48,7 +48,8 @@ class Serve:
         from clearway.web.local import listening, port_of
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
-        token = os.environ.get(TOKEN_VARIABLE) or new_token()
+        own = os.environ.get(TOKEN_VARIABLE)
+        token = own or new_token()
         if len(token) < FEWEST_TOKEN_LETTERS or not (token.isascii() and token.isprintable()) or " " in token:
             problem = f"the variable {TOKEN_VARIABLE} holds no token of at least {FEWEST_TOKEN_LETTERS} plain letters"
             raise ClearwayError(f"{problem}. Choose another, or unset it for a random one")
@@ -60,6 +61,6 @@ class Serve:
         model = servable_model(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener:
             say(f"scene {model.card.scene}: http://{self.host}:{port_of(listener)}")
-            if TOKEN_VARIABLE not in os.environ:
+            if not own:
                 say(f"token: {token}")
             run_service(model, listener, token, limits)
