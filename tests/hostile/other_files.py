@@ -362,6 +362,10 @@ def run_cases() -> Iterator[Case]:
         learner = record["learner"] | {name: value}
         whole = record | ({"learner": learner} if name in record["learner"] else {name: value})
         yield run_case(files, f"{name} is {str(value)[:20]}", {"run.json": json.dumps(whole).encode()}, says)
+    for name in ("", "..", "../../attic", "..\\attic", "attic\0"):  # pictures are files named by the scene
+        scenes = [record["scenes"][0] | {"name": name}, *record["scenes"][1:]]
+        whole = json.dumps(record | {"scenes": scenes}).encode()
+        yield run_case(files, f"a scene is {name!r}", {"run.json": whole}, "cannot be part of a file's name")
     for kind, content in tensor_files(files[f"{checkpoint}/{NETWORK_FILE}"]).items():
         sums = {NETWORK_FILE: content, TRAINING_FILE: files[f"{checkpoint}/{TRAINING_FILE}"]}
         kept = {name: hashlib.sha256(held).hexdigest() for name, held in sums.items()}

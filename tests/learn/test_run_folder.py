@@ -77,6 +77,15 @@ def changed(content: dict, name: str, value: object) -> str:
     return json.dumps(content | {name: value})
 
 
+UNFIT_FOR_FILES = ("", ".", "..", "../../attic", "/attic", "room/attic", "..\\attic", "attic\0")
+
+
+def renamed(content: dict, name: str) -> str:
+    """A run.json whose first scene has this name: pictures and exported agents are files named by it."""
+    first, *others = content["scenes"]
+    return changed(content, "scenes", [first | {"name": name}, *others])
+
+
 def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
     content = {"format_version": 1, **asdict(made_record())}
@@ -90,6 +99,7 @@ def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) 
         (changed(content, "learner", content["learner"] | {"magic": 1}), "magic"),
         (changed(content, "scenes", [{"name": "x"}]), "missing or unknown"),
         (json.dumps({k: v for k, v in content.items() if k != "seed"}), "seed"),
+        *((renamed(content, name), "cannot be part of a file's name") for name in UNFIT_FOR_FILES),
     ]
     for text, message in cases:
         (tmp_path / "run.json").write_text(text)

@@ -264,6 +264,8 @@ def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
     texts = (scene.name, scene.digest, scene.encoder, scene.path or "")
     if not all(_fits(text, str) for text in texts) or not all(_fits(target, int) for target in scene.targets):
         raise TypeError(f"scene {scene.name!r:.40}")
+    if scene.name in ("", ".", "..") or any(letter in scene.name for letter in "/\\\0"):
+        raise RunError(f"scene {scene.name!r:.40} cannot be part of a file's name")
     return scene
 
 
