@@ -1,11 +1,15 @@
 """The client in the package."""
 
+import socket
+import threading
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from clearway.errors import ClearwayError, DeployError
-from clearway.serve.client import Client, ServiceError, picture_file
+from clearway.serve import protocol
+from clearway.serve.client import KEEP_ALIVE_S, Client, ServiceError, picture_file
 from imported import imported_by
 from serving import TOKEN, grey, picture_bytes
 from sums import plain
@@ -46,6 +50,28 @@ def test_a_wrong_token_and_an_address_where_nobody_answers(called, service) -> N
     with Client("http://127.0.0.1:9", TOKEN) as nobody, pytest.raises(ServiceError, match=r"unreachable: .*:9"):
         nobody.agent()
     assert issubclass(ServiceError, ClearwayError)
+
+
+def test_connections_are_given_up_before_the_service_does() -> None:
+    with Client("http://127.0.0.1:9", TOKEN) as client:
+        assert client._http._transport._pool._keepalive_expiry == KEEP_ALIVE_S < protocol.KEEP_ALIVE_S
+
+
+def test_a_service_that_says_no_more_is_told_in_one_sentence() -> None:
+    """What httpx says ends in a full stop itself."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+
+        def hang_up() -> None:
+            with listener.accept()[0] as connection:
+                connection.recv(65536)
+
+        hanging_up = threading.Thread(target=hang_up)
+        hanging_up.start()
+        with Client(f"http://127.0.0.1:{port}", TOKEN) as client, pytest.raises(ServiceError) as caught:
+            client.agent()
+        hanging_up.join()
+    assert caught.value.message.endswith(". Check the address") and ".." not in caught.value.message
 
 
 def test_how_pictures_are_sent(tmp_path) -> None:

@@ -23,6 +23,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 import clearway
+from clearway.serve.client import KEEP_ALIVE_S as CLIENT_KEEP_ALIVE_S
 from clearway.serve.client import Client, ServiceError
 from serving import TOKEN, grey, picture_bytes
 from sums import Sums, plain
@@ -148,6 +149,19 @@ def test_an_upload_that_trickles_is_refused_and_one_cut_off_changes_nothing(hast
                 pass  # cut off in the middle, as it should be
             assert until_closed(connection)[:13] in (b"HTTP/1.1 413 ", b"")
         assert session.act(plain(2)).value == 5
+
+
+def test_a_connection_stays_open_for_longer_than_clients_keep_theirs(hasty) -> None:
+    """A robot that steps every few seconds would else send pictures while the service closes."""
+    with hasty.connected() as connection:
+        for pause_s in (CLIENT_KEEP_ALIVE_S + 3, 0):
+            connection.sendall(b"GET /health HTTP/1.1\r\n" + HEAD + b"\r\n")
+            answer = b""
+            while b'{"status":"ok"}' not in answer:
+                part = connection.recv(65536)
+                assert part, "the connection was closed"
+                answer += part
+            time.sleep(pause_s)
 
 
 def test_a_client_that_does_not_read_is_cut_off(hasty) -> None:

@@ -17,6 +17,7 @@ from clearway.errors import ClearwayError
 from clearway.scenes.actions import Action
 
 TIMEOUT_S = 30.0
+KEEP_ALIVE_S = 3.0  # of an idle connection; the service's is longer, so that it never closes one that is used
 KINDS = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png", b"RIFF": "image/webp"}
 
 
@@ -52,7 +53,8 @@ class Client:
         except ImportError as fault:
             raise ClearwayError("the client needs httpx. Install it: pip install 'clearway[serve]'") from fault
         headers = {"authorization": f"Bearer {token}"}
-        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s, trust_env=False)
+        limits = httpx.Limits(keepalive_expiry=KEEP_ALIVE_S)
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s, limits=limits, trust_env=False)
         self._unreachable = httpx.HTTPError
 
     def agent(self) -> dict[str, Any]:
@@ -70,7 +72,8 @@ class Client:
         try:
             answer = self._http.request(method, path, **content)
         except self._unreachable as fault:
-            raise ServiceError("unreachable", f"{self._http.base_url}: {fault}. Check the address") from fault
+            reason = str(fault).rstrip(".")
+            raise ServiceError("unreachable", f"{self._http.base_url}: {reason}. Check the address") from fault
         if answer.is_success:
             return answer
         try:

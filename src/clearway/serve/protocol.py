@@ -11,6 +11,8 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+KEEP_ALIVE_S = 75  # of an idle connection; longer than clients and proxies commonly keep theirs
+
 
 def reset(transport: asyncio.Transport) -> None:
     """Cut a connection off and let the system forget what it still had to send, which it would else keep trying to."""
@@ -76,10 +78,12 @@ class ImpatientHttp(_Impatient, H11Protocol):
         super().handle_websocket_upgrade(event)
 
     def timeout_keep_alive_handler(self) -> None:
-        """End an idle connection; at once where its client has left an answer unread all the while."""
+        """Uvicorn calls it `patience_s` after an answer: who has left it unread is cut off, others may stay idle."""
         if self.transport.get_write_buffer_size():
             reset(self.transport)
-        super().timeout_keep_alive_handler()
+        else:
+            end = super().timeout_keep_alive_handler
+            self.timeout_keep_alive_task = self.loop.call_later(KEEP_ALIVE_S, end)
 
     def _await_headers(self) -> None:
         self._headers = self.loop.call_later(self.patience_s, reset, self.transport)

@@ -64,5 +64,6 @@ def run_service(model: AgentModel, listener: socket.socket, token: str, limits: 
         ws_max_size=limits.body_bytes,
         ws_per_message_deflate=False,
         limit_concurrency=limits.connections,
+        timeout_keep_alive=limits.patience_s,
         timeout_graceful_shutdown=int(limits.deadline_s) + 1,
     )
