@@ -1,8 +1,10 @@
-"""Pictures to send to a service, and its token."""
+"""Pictures to send to a service, its token, and the environment of one in a process of its own."""
 
 from __future__ import annotations
 
 import io
+import os
+import sys
 
 import numpy as np
 from PIL import Image
@@ -10,6 +12,7 @@ from PIL import Image
 from sums import plain
 
 TOKEN = "a-token-for-the-tests"
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 def picture_bytes(picture: np.ndarray, kind: str = "PNG", **settings: object) -> bytes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import signal
 import socket
 import struct
@@ -25,10 +24,9 @@ from websockets.sync.client import connect
 import clearway
 from clearway.serve.client import KEEP_ALIVE_S as CLIENT_KEEP_ALIVE_S
 from clearway.serve.client import Client, ServiceError
-from serving import TOKEN, grey, picture_bytes
+from serving import ENVIRONMENT, TOKEN, grey, picture_bytes
 from sums import Sums, plain
 
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
 HEAD = f"Host: x\r\nAuthorization: Bearer {TOKEN}\r\n".encode()
 PATIENT_S = 60  # for what must happen, on a busy machine

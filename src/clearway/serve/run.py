@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import warnings
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from clearway.serve.protocol import impatient
 from clearway.serve.service import Service
 from clearway.web.local import serve
 
+OTHER_FILES = 200  # beside connections that a service may open
 SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
 
 
@@ -38,6 +40,28 @@ def servable_model(source: Path, scene: str | None, tell: Callable[[str], object
     from clearway.deploy.from_run import load_scene_agent
 
     return cached_model(load_scene_agent(source, scene), tell)
+
+
+def allowed_connections(wanted: int) -> int:
+    """As many connections as wanted, or as the files that this process may open allow; raises that limit if need be."""
+    try:
+        import resource
+    except ImportError:  # not Unix: no such limit
+        return wanted
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    unlimited, needed = resource.RLIM_INFINITY, wanted + OTHER_FILES
+    if soft == unlimited or soft >= needed:
+        return wanted
+    limit = needed if hard == unlimited else min(needed, hard)
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
+    except (OSError, ValueError):  # some systems allow less than they say
+        limit = soft
+    allowed = max(min(wanted, limit - OTHER_FILES), 1)
+    if allowed < wanted:
+        told = f"at most {allowed} connections at a time, not {wanted}: this process may open {limit} files"
+        logging.getLogger("clearway.serve").warning("%s. Raise the limit, for example by ulimit -Hn", told)
+    return allowed
 
 
 def run_service(model: AgentModel, listener: socket.socket, token: str, limits: Limits) -> None:
@@ -63,7 +87,7 @@ def run_service(model: AgentModel, listener: socket.socket, token: str, limits: 
         ws=sockets,
         ws_max_size=limits.body_bytes,
         ws_per_message_deflate=False,
-        limit_concurrency=limits.connections,
+        limit_concurrency=allowed_connections(limits.connections),
         timeout_keep_alive=limits.patience_s,
         timeout_graceful_shutdown=int(limits.deadline_s) + 1,
     )
