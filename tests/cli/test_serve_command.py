@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 
@@ -64,6 +65,15 @@ def test_a_random_token_is_said_also_where_the_variable_is_empty(clearway, monke
         assert answer.code == 0
         assert (f"token: {served[-1]}" in answer.err) == (own == "")
     assert served[1] == "a-token-of-one-s-own"
+
+
+@pytest.mark.parametrize(("host", "shown"), [("::1", "[::1]"), ("localhost", "localhost")])
+def test_addresses_are_printed_as_a_browser_takes_them(clearway, served, host, shown):
+    try:
+        socket.create_server((host, 0), family=socket.AF_INET6 if ":" in host else socket.AF_INET).close()
+    except OSError:
+        pytest.skip(f"this machine has no {host}")
+    assert re.search(rf"http://{re.escape(shown)}:\d+\n", clearway("serve", "x.onnx", "--host", host).err)
 
 
 PROGRAM = """

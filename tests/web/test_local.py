@@ -49,6 +49,13 @@ def test_what_is_no_port_is_refused(port: int) -> None:
         listening(port)
 
 
+def test_a_host_without_a_name_is_refused() -> None:
+    """To the system it is every network interface."""
+    for host in ("", " "):
+        with pytest.raises(ClearwayError, match="--host is empty, expected an address"):
+            listening(0, host)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_service_ends_cleanly_when_told_to(number: signal.Signals) -> None:
     command = [sys.executable, "-c", SERVICE]

@@ -45,7 +45,7 @@ class Serve:
         from clearway.serve.limits import Limits
         from clearway.serve.run import run_service, servable_model
         from clearway.web.guard import new_token
-        from clearway.web.local import listening, port_of
+        from clearway.web.local import address_of, listening
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
         own = os.environ.get(TOKEN_VARIABLE)
@@ -60,7 +60,7 @@ class Serve:
 
         model = servable_model(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener:
-            say(f"scene {model.card.scene}: http://{self.host}:{port_of(listener)}")
+            say(f"scene {model.card.scene}: {address_of(listener, self.host)}")
             if not own:
                 say(f"token: {token}")
             run_service(model, listener, token, limits)

@@ -36,6 +36,8 @@ def listening(port: int, host: str = LOOPBACK) -> socket.socket:
     """
     if not 0 <= port <= MOST_PORT:
         raise ClearwayError(f"--port is {port}, expected 0 to {MOST_PORT}. Give a port in that range")
+    if not host.strip():  # to the system: every network interface
+        raise ClearwayError("--host is empty, expected an address. Leave it out to be reached from this machine alone")
     where = f"--port {port}" if host == LOOPBACK else f"--host {host} --port {port}"
     try:
         listener = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
@@ -50,6 +52,12 @@ def listening(port: int, host: str = LOOPBACK) -> socket.socket:
 def port_of(listener: socket.socket) -> int:
     """The port that a socket listens on."""
     return int(listener.getsockname()[1])
+
+
+def address_of(listener: socket.socket, host: str = LOOPBACK) -> str:
+    """The address of a service by the host that it was asked to listen on, as a browser takes it, without a path."""
+    name = f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port_of(listener)}"
 
 
 def serve(app: Application, listener: socket.socket, **settings: Any) -> None:
