@@ -3,6 +3,8 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from clearway.deploy import cached
 
 
@@ -35,3 +37,21 @@ def test_another_agent_has_another_file(deployed) -> None:
     weight[0, 0] = before
     assert changed != key
     assert cached._key(deployed.chosen) == key
+
+
+@pytest.mark.parametrize("package", ["deploy", "model", "perception"])
+def test_other_code_of_what_is_exported_makes_another_file(deployed, monkeypatch, package) -> None:
+    key = cached._key(deployed.chosen)
+    read = Path.read_bytes
+
+    def changed(path: Path) -> bytes:
+        return read(path) + (b"# new" if path.parent.name == package else b"")
+
+    monkeypatch.setattr(Path, "read_bytes", changed)
+    assert cached._key(deployed.chosen) != key
+
+
+def test_another_version_makes_another_file(deployed, monkeypatch) -> None:
+    key = cached._key(deployed.chosen)
+    monkeypatch.setattr(cached, "__version__", "99", raising=False)
+    assert cached._key(deployed.chosen) != key

@@ -6,14 +6,17 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
-import clearway.deploy
+import clearway
 from clearway import files
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import SceneAgent
 from clearway.deploy.onnx_file import OnnxModel
 from clearway.errors import DeployError
+from clearway.version import __version__
 
 KEY_LETTERS = 16
+PACKAGES = Path(clearway.__file__).parent
+SHAPING = ("deploy", "model", "perception")  # packages whose code shapes the file
 
 
 def cached_model(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxModel:
@@ -37,13 +40,15 @@ def cached_model(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxModel
 
 
 def _key(chosen: SceneAgent) -> str:
-    """Hash of all that shapes the file: parameters, scene, encoder and the code that writes it."""
+    """Hash of all that shapes the file: parameters, scene, encoder, the code of all three and clearway's version."""
     agent, digest = chosen.agent, hashlib.sha256()
     for tensors in (agent.network.state_dict(), agent.feature_map.tensors()):
         for name, tensor in sorted(tensors.items()):
             digest.update(f"{name} {tuple(tensor.shape)}\n".encode())
             digest.update(tensor.detach().contiguous().numpy().tobytes())
     digest.update(f"{chosen.index} {chosen.scene.name} {chosen.encoder_record.identity}\n".encode())
-    for source in sorted(Path(clearway.deploy.__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
+    digest.update(f"{__version__}\n".encode())
+    for package in SHAPING:
+        for source in sorted((PACKAGES / package).glob("*.py")):
+            digest.update(source.read_bytes())
     return digest.hexdigest()[:KEY_LETTERS]
