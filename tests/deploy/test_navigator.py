@@ -157,6 +157,13 @@ def test_sources_that_cannot_be_used(deployed, tmp_path) -> None:
     assert open_model(str(deployed.agent), "cellar").card.scene == "cellar"
 
 
+@pytest.mark.parametrize("seed", [-1, "x", 1.5, True, np.array([1])])
+def test_seeds_that_are_none_are_refused(seed) -> None:
+    with pytest.raises(DeployError, match=r"seed is .*, expected a whole number from 0"):
+        clearway.Navigator(Sums(), seed=seed)
+    clearway.Navigator(Sums(), seed=np.int64(3))
+
+
 def test_a_robot_needs_neither_pytorch_nor_the_learner(deployed) -> None:
     statement = f"""
 import clearway, numpy

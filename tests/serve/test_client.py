@@ -42,6 +42,8 @@ def test_refusals_become_errors_with_the_service_s_code(client, service) -> None
         session.close()
     with pytest.raises(ServiceError, match="invalid_request"):
         agent.session(selection="best")
+    with agent.session(seed=np.int64(3)), pytest.raises(DeployError, match="seed is -1, expected a whole number"):
+        agent.session(seed=-1)
 
 
 def test_a_wrong_token_and_an_address_where_nobody_answers(called, service) -> None:

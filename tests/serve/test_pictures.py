@@ -75,6 +75,13 @@ def test_sizes_are_checked_before_decoding(width, height, monkeypatch) -> None:
     assert code(png(width, height)) == "picture_too_large"
 
 
+def test_deeper_greys_are_refused() -> None:
+    """Converted to 8 bits, all but the darkest would be white."""
+    file = io.BytesIO()
+    Image.fromarray(np.full((4, 5), 20_000, np.uint16)).save(file, "PNG")
+    assert code(file.getvalue()) == "unsupported_picture"
+
+
 def test_pictures_are_no_longer_than_a_navigator_takes() -> None:
     """Their resizing takes memory by the side, not by the area."""
     for width, height in ((MAX_PICTURE_SIDE + 1, 1), (1, MAX_PICTURE_SIDE + 1)):

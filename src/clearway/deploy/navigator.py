@@ -63,7 +63,7 @@ class Navigator:
         seed: of the draws; None for one that differs every time.
 
     Raises:
-        ClearwayError: see `open_model`.
+        ClearwayError: there is no such selection or seed; see `open_model`.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Navigator:
             raise DeployError(f"selection is {selection!r}. Choose one of {', '.join(get_args(Selection))}")
         self._model = open_model(source, scene) if isinstance(source, str | Path) else source
         self.card = self._model.card
-        self._selection, self._rng, self._lock = selection, np.random.default_rng(seed), Lock()
+        self._selection, self._rng, self._lock = selection, np.random.default_rng(checked_seed(seed)), Lock()
         self._target: np.ndarray | None = None
         self._history: np.ndarray | None = None
 
@@ -114,6 +114,15 @@ class Navigator:
             self._history = step.history
             action = choose(step.probabilities[0], None if self._selection == "argmax" else self._rng.random())
         return Decision(action, step.probabilities[0], float(step.value[0, 0]))
+
+
+def checked_seed(seed: object) -> int | None:
+    """The seed of draws, or None where there is none. Raises DeployError where it is no whole number from 0."""
+    if seed is None:
+        return None
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
+        raise DeployError(f"seed is {seed!r:.40}, expected a whole number from 0. Leave it out for a random one")
+    return int(seed)
 
 
 def choose(probabilities: np.ndarray, uniform: float | None) -> Action:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clearway.deploy.model import checked_picture
-from clearway.deploy.navigator import Decision, Selection
+from clearway.deploy.navigator import Decision, Selection, checked_seed
 from clearway.errors import ClearwayError
 from clearway.scenes.actions import Action
 
@@ -63,8 +63,8 @@ class Client:
         return found
 
     def session(self, *, selection: Selection = "sampled", seed: int | None = None) -> ClientSession:
-        """Open a session; the arguments are `Navigator`'s. Raises ServiceError."""
-        answer = self.ask("POST", "/sessions", json={"selection": selection, "seed": seed})
+        """Open a session; the arguments are `Navigator`'s. Raises ServiceError, DeployError."""
+        answer = self.ask("POST", "/sessions", json={"selection": selection, "seed": checked_seed(seed)})
         return ClientSession(self, answer.json()["session_id"])
 
     def ask(self, method: str, path: str, **content: Any) -> Any:

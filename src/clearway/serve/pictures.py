@@ -19,7 +19,7 @@ def decoded(content: bytes, most_pixels: int) -> np.ndarray:
     """The picture in a JPEG, PNG or WebP file, (height, width, 3) uint8 RGB; transparency and orientation are ignored.
 
     Raises:
-        Fault: it is in no such format, is larger than allowed, or is damaged or cut off.
+        Fault: it is in no such format, has greys of more than 8 bits, is larger than allowed, or is damaged.
     """
     try:
         with Image.open(io.BytesIO(content), formats=FORMATS) as file:
@@ -27,6 +27,8 @@ def decoded(content: bytes, most_pixels: int) -> np.ndarray:
             if width * height > most_pixels or max(width, height) > MAX_PICTURE_SIDE:
                 bounds = f"at most {most_pixels} in all and {MAX_PICTURE_SIDE} a side are taken"
                 raise Fault("picture_too_large", f"{width} x {height} pixels, {bounds}")
+            if file.mode.startswith(("I", "F")):
+                raise Fault("unsupported_picture", "more than 8 bits a grey level. Send 8 bits, grey or RGB")
             return np.array(file.convert("RGB"))
     except Fault:
         raise
