@@ -247,6 +247,15 @@ def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Cal
     expect(page.locator("#legend")).to_contain_text("value")
 
 
+def test_a_film_that_fails_is_said_and_can_be_tried_again(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor")
+    page.evaluate("window.fetch = async () => new Response('Internal Server Error', { status: 500 })")
+    button = page.get_by_role("button", name="Save MP4")
+    button.click()
+    expect(page.locator("#status")).to_have_text("The viewer failed. Its terminal says why")
+    expect(button).to_be_enabled()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: str) -> None:

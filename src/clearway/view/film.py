@@ -37,7 +37,7 @@ def write_film(stage: Stage, episode: Episode, path: Path, frames_per_s: int) ->
             if walker.step() is None:
                 break
     shown = [_frames(stage, session, index) for index in range(len(session.walkers))]
-    write_video(path, _stacked(shown, session.names(session.episode)), frames_per_s)
+    write_video(path, stacked(shown, session.names(session.episode)), frames_per_s)
 
 
 def _frames(stage: Stage, session: Session, index: int) -> Iterator[np.ndarray]:
@@ -57,18 +57,25 @@ def _walked(walker: Walker) -> Walked:
     return Walked(walker.world, walker.target, trajectory, probabilities)
 
 
-def _stacked(shown: list[Iterator[np.ndarray]], names: list[str]) -> Iterator[np.ndarray]:
+def stacked(shown: list[Iterator[np.ndarray]], names: list[str]) -> Iterator[np.ndarray]:
     """Frames of several walkers one above the other, each under its name; who has ended waits in the last one."""
     last: list[np.ndarray] = []
     for together in itertools.zip_longest(*shown):
         last = [frame if frame is not None else last[index] for index, frame in enumerate(together)]
-        yield np.concatenate(
-            [part for name, frame in zip(names, last, strict=True) for part in (_title(name, frame), frame)]
-        )
+        width = max(frame.shape[1] for frame in last)
+        pairs = [(_title(name, width), _wide(frame, width)) for name, frame in zip(names, last, strict=True)]
+        yield np.concatenate([part for pair in pairs for part in pair])
 
 
-def _title(name: str, frame: np.ndarray) -> np.ndarray:
-    image = Image.new("RGB", (frame.shape[1], NAME_PX), colours.PAPER)
+def _wide(frame: np.ndarray, width: int) -> np.ndarray:
+    """The frame, with an empty margin on its right up to that width."""
+    image = Image.new("RGB", (width, len(frame)), colours.PAPER)
+    image.paste(Image.fromarray(frame), (0, 0))
+    return np.asarray(image)
+
+
+def _title(name: str, width: int) -> np.ndarray:
+    image = Image.new("RGB", (width, NAME_PX), colours.PAPER)
     place = MARGIN_PX, NAME_PX // 2 + 4
     ImageDraw.Draw(image).text(place, name, colours.INK, ImageFont.load_default(TEXT_PX), anchor="lm")
     return np.asarray(image)

@@ -233,16 +233,21 @@ async function copyLink() {
 async function saveFilm() {
   $("save-film").disabled = true;
   say("Making the film …", false, false);
-  const response = await fetch(`film.mp4?${known.link}`).catch(() => null);
-  if (response?.ok) {
-    const address = URL.createObjectURL(await response.blob());
-    element("a", { href: address, download: "episode.mp4" }).click();
-    URL.revokeObjectURL(address);
-    say("Film saved as episode.mp4");
-  } else {
-    say(response ? (await response.json()).text : "The viewer did not answer", true);
+  try {
+    const response = await fetch(`film.mp4?${known.link}`);
+    if (response.ok) {
+      const address = URL.createObjectURL(await response.blob());
+      element("a", { href: address, download: "episode.mp4" }).click();
+      URL.revokeObjectURL(address);
+      say("Film saved as episode.mp4");
+    } else {
+      say((await response.json().catch(() => null))?.text ?? "The viewer failed. Its terminal says why", true);
+    }
+  } catch {
+    say("The viewer did not answer", true);
+  } finally {
+    $("save-film").disabled = false;
   }
-  $("save-film").disabled = false;
 }
 
 let forget = 0;
