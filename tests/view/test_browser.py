@@ -5,11 +5,13 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import av
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
+from websockets.sync.client import connect
 
 CHROMIUM_VARIABLE = "CLEARWAY_CHROMIUM"
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -245,6 +247,15 @@ def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Cal
     expect(page).to_have_url(re.compile("scene=corridor&.*walk="))
     expect(page.locator("#scene")).to_have_value("corridor")
     expect(page.locator("#legend")).to_contain_text("value")
+
+
+def test_one_page_too_many_is_told_to_close_another(browser: Browser, address: str) -> None:
+    with ExitStack() as others:
+        for _ in range(16):
+            others.enter_context(connect(address.replace("http", "ws") + "live", open_timeout=60))
+        page = others.enter_context(closing(browser.new_page()))
+        page.goto(address)
+        expect(page.locator("#status")).to_have_text("16 pages are open. Close one, then load this one again")
 
 
 def test_a_film_that_fails_is_said_and_can_be_tried_again(opened: Callable[..., Page]) -> None:

@@ -14,7 +14,7 @@ OWN = f"http://{HOST}"
 class Asked:
     """An application that notes what reaches it, and the answer that goes out."""
 
-    def __init__(self, path: str, *headers: tuple[str, str], kind: str = "http") -> None:
+    def __init__(self, path: str, *headers: tuple[str, str], kind: str = "http", port: int = PORT) -> None:
         self.seen: list[str] = []
         self.sent: list[dict] = []
         scope = {
@@ -22,7 +22,7 @@ class Asked:
             "path": path,
             "headers": [(name.lower().encode(), value.encode()) for name, value in headers],
         }
-        asyncio.run(guarded(self.app, TOKEN, PORT)(scope, self.receive, self.send))
+        asyncio.run(guarded(self.app, TOKEN, port)(scope, self.receive, self.send))
 
     async def app(self, scope, receive, send) -> None:
         self.seen.append(scope["path"])
@@ -51,6 +51,21 @@ def test_the_page_sees_the_path_after_the_token() -> None:
     asked = Asked(f"/{TOKEN}/page/app.js", ("Host", HOST), ("Origin", OWN))
     assert (asked.status, asked.seen) == (200, ["/page/app.js"])
     assert Asked(f"/{TOKEN}/", ("Host", f"localhost:{PORT}")).seen == ["/"]
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+def test_clients_leave_port_80_out(name) -> None:
+    for host in (name, f"{name}:80"):
+        assert Asked(f"/{TOKEN}/", ("Host", host), ("Origin", f"http://{name}"), port=80).seen == ["/"]
+    assert Asked(f"/{TOKEN}/", ("Host", name)).status == 421
+    assert Asked(f"/{TOKEN}/", ("Host", HOST), ("Origin", f"http://{name}")).status == 403
+
+
+def test_an_address_without_its_last_slash_leads_to_the_page() -> None:
+    asked = Asked(f"/{TOKEN}", ("Host", HOST))
+    assert (asked.status, asked.headers["location"], asked.seen) == (308, f"/{TOKEN}/", [])
+    assert asked.headers["referrer-policy"] == "no-referrer"
+    assert Asked("/wrong-token", ("Host", HOST)).status == 404
 
 
 def test_every_answer_keeps_the_page_to_itself() -> None:

@@ -41,6 +41,7 @@ PAGE = {
 }
 """Kinds of the page's files, by ending."""
 MOST_PAGES = 16  # open at a time
+TOO_MANY_PAGES = 4001  # WebSocket close code; the page shows the reason that comes with it
 FILM_FRAMES_PER_S = 3
 JPEG = {"quality": 90, "subsampling": 0}
 
@@ -95,7 +96,9 @@ def make_app(stage: Stage) -> FastAPI:
     @app.websocket("/live")
     async def live(socket: WebSocket) -> None:
         if pages.locked():
-            return await socket.close()
+            await socket.accept()  # a page is told nothing about a refused socket
+            reason = f"{MOST_PAGES} pages are open. Close one, then load this one again"
+            return await socket.close(TOO_MANY_PAGES, reason)
         async with pages:
             await socket.accept()
             session = Session(stage)

@@ -19,6 +19,7 @@ Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 TOKEN_BYTES = 24
 LOOPBACK_NAMES = ("127.0.0.1", "localhost")
+HTTP_PORT = 80
 POLICY_VIOLATION = 1008  # WebSocket close code
 HEADERS = {
     "x-content-type-options": "nosniff",
@@ -50,6 +51,7 @@ def content_security_policy(port: int) -> str:
 def guarded(app: Application, token: str, port: int) -> Application:
     """The application, for requests to `/TOKEN/...` from this machine's own page; it sees the path after the token.
 
+    `/TOKEN` itself is redirected to `/TOKEN/`, from where the page finds its files.
     Refused are another Host (421), another Origin (403) and a wrong token (404), without a word about which part of it.
     Every answer carries headers that keep the page to itself.
 
@@ -59,6 +61,8 @@ def guarded(app: Application, token: str, port: int) -> Application:
         port: the port that the service listens on.
     """
     hosts = {f"{name}:{port}" for name in LOOPBACK_NAMES}
+    if port == HTTP_PORT:  # clients leave it out
+        hosts |= set(LOOPBACK_NAMES)
     origins = {f"http://{host}" for host in hosts}
     headers = HEADERS | {"content-security-policy": content_security_policy(port)}
 
@@ -68,6 +72,8 @@ def guarded(app: Application, token: str, port: int) -> Application:
         status, rest = _judged(scope, hosts, origins, token)
         if status is not None:
             return await _refuse(scope["type"], status, send)
+        if scope["type"] == "http" and scope["path"] == f"/{token}":
+            return await _answer(308, _with_headers(send, headers), location=f"/{token}/")
         return await app({**scope, "path": rest, "raw_path": rest.encode()}, receive, _with_headers(send, headers))
 
     return guard
@@ -91,7 +97,13 @@ def _judged(scope: Scope, hosts: set[str], origins: set[str], token: str) -> tup
 async def _refuse(kind: str, status: int, send: Send) -> None:
     if kind == "websocket":
         return await send({"type": "websocket.close", "code": POLICY_VIOLATION})
-    headers = [(b"content-length", b"0"), (b"cache-control", b"no-store")]
+    await _answer(status, send)
+
+
+async def _answer(status: int, send: Send, **more: str) -> None:
+    """Answer without content; more: headers."""
+    given = {"content-length": "0", "cache-control": "no-store"} | more
+    headers = [(name.encode(), value.encode()) for name, value in given.items()]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": b""})
 

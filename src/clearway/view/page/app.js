@@ -17,7 +17,7 @@ let turn = 0; // of playing: an older loop notices that it is over
 let asked = Promise.resolve(); // done when the last question's answer is taken in
 
 const map = createMap($("map"), pick, (state) => ($("cursor").textContent = state === null ? "" : `Cursor: ${nameOf(state)}`));
-const viewer = connect(() => say("The viewer has ended. Start it again, then load its new address.", true, false));
+const viewer = connect((reason) => say(reason ?? "The viewer has ended. Start it again, then load its new address.", true, false));
 
 async function start() {
   known.stage = await fetched("stage.json");
