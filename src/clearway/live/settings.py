@@ -27,11 +27,6 @@ class Perturbations:
     new_obstacle: bool = False
     """A bin stands on the shortest path in every episode in which there is another way."""
 
-    @property
-    def rearranges(self) -> bool:
-        """Whether the room is not as it was built."""
-        return self.move_furniture > 0 or self.new_obstacle
-
     def scaled(self, strength: float) -> Perturbations:
         """All magnitudes times `strength`; a new obstacle is there or not."""
         values = self.to_json()

@@ -19,8 +19,7 @@ import numpy as np
 from PIL import Image
 
 from clearway.errors import ClearwayError
-from clearway.scenes.actions import ACTION_NAMES
-from clearway.view.episode import MOST_STEPS, read_episode
+from clearway.view.episode import read_episode
 from clearway.view.film import write_film
 from clearway.view.session import Session
 from clearway.view.stage import Stage
@@ -132,18 +131,9 @@ def _parsed(text: str) -> object:
 
 def _stage_json(stage: Stage) -> dict[str, Any]:
     return {
-        "agents": [
-            {"name": shown.name, "reward": shown.reward.name, "encoder": _encoder(shown.scenes[0])}
-            for shown in stage.agents
-        ],
+        "agents": [{"name": shown.name} for shown in stage.agents],
         "scenes": [scene.name for scene in stage.scenes],
-        "actions": list(ACTION_NAMES),
-        "most_steps": MOST_STEPS,
     }
-
-
-def _encoder(scene: Any) -> str:
-    return scene.encoder.name if scene.encoder else "unknown"
 
 
 def _map_json(stage: Stage, index: int) -> dict[str, Any]:

@@ -65,7 +65,6 @@ pre { background: var(--code); border: 1px solid var(--line); border-radius: 10p
 .facts { display: grid; grid-template-columns: max-content 1fr; margin: 0; padding: .4rem 0; font-size: .92rem; }
 .facts dt, .facts dd { padding: .35rem 1.1rem; margin: 0; overflow-wrap: anywhere; }
 .facts dt { color: var(--soft); }
-footer { color: var(--soft); font-size: .85rem; padding: 0 0 3rem; }
 @media (max-width: 36rem) {
   header.top { padding-top: 1.8rem; } section { margin: 2.2rem 0; }
   .figures { grid-template-columns: 1fr 1fr; } .figures dd { font-size: 1.4rem; }
