@@ -249,6 +249,30 @@ def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Cal
     expect(page.locator("#legend")).to_contain_text("value")
 
 
+def test_a_browser_that_keeps_no_more_addresses_shows_the_steps_nevertheless(opened: Callable[..., Page]) -> None:
+    """Safari throws after 100 in 30 s."""
+    page = opened("scene=corridor&target=8")
+    page.evaluate("""() => {
+        history.replaceState = () => { throw new DOMException("too many", "SecurityError"); };
+        const writeText = async (text) => { window.copied = text; };
+        Object.defineProperty(navigator, "clipboard", { value: { writeText } });
+    }""")
+    page.keyboard.press("n")
+    shown(page, "1 / 1")
+    expect(page.locator("#value-chart")).to_be_visible()
+    page.get_by_role("button", name="Copy link").click()
+    expect(page.locator("#status")).to_contain_text("Link copied")
+    assert re.search("#scene=corridor&.*&walk=", page.evaluate("copied"))
+
+
+def test_choosing_a_target_by_keyboard_keeps_the_focus(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor&target=16")
+    page.get_by_role("button", name="Target pose 8,").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#goal-where")).to_contain_text("pose 8,")
+    expect(page.get_by_role("button", name="Target pose 8,")).to_be_focused()
+
+
 def test_one_page_too_many_is_told_to_close_another(browser: Browser, address: str) -> None:
     with ExitStack() as others:
         for _ in range(16):

@@ -92,8 +92,8 @@ async function takeEpisode(answer) {
   $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
   showTarget(pictures);
   await showLayer(askNow);
-  keepLink();
   show();
+  keepLink();
 }
 
 function takeSteps(answer) {
@@ -105,8 +105,8 @@ function takeSteps(answer) {
     const { name, steps } = known.walkers[index], { collisions } = steps.at(-1);
     say(`${name}: target reached in ${counted(steps.length - 1, "step")}, ${counted(collisions, "collision")}`);
   }
-  if (!playing) keepLink();
   show();
+  if (!playing) keepLink();
   return answer.steps.some((step) => step);
 }
 
@@ -145,6 +145,7 @@ function showTarget(pictures) {
   }
   const trained = known.stage.agents.length ? (known.scene.targets.includes(target) ? ", trained on" : ", not trained on") : "";
   $("goal-where").textContent = heading(target) + trained;
+  const focused = $("targets").contains(document.activeElement);
   $("targets").replaceChildren(
     ...known.scene.targets.map((state) => {
       const inside = pictures.any ? element("img", { src: pictures.path(state), alt: "" }) : String(state);
@@ -153,6 +154,7 @@ function showTarget(pictures) {
       return button;
     }),
   );
+  if (focused) $("targets").querySelector("[aria-pressed=true]")?.focus();
 }
 
 const chosenLayer = () => document.querySelector("input[name=layer]:checked").value;
@@ -217,13 +219,17 @@ async function drive(action) {
 }
 
 function keepLink() {
-  if (known.link) history.replaceState(null, "", `#${known.link}`);
+  try {
+    if (known.link) history.replaceState(null, "", `#${known.link}`);
+  } catch {
+    return; // some browsers take only so many in a while; a later one will do
+  }
 }
 
 async function copyLink() {
   keepLink();
   try {
-    await navigator.clipboard.writeText(location.href);
+    await navigator.clipboard.writeText(new URL(`#${known.link}`, location.href).href);
     say("Link copied: it replays this episode as long as this viewer runs");
   } catch {
     say("The link is in the address bar");
