@@ -1,6 +1,8 @@
 """`clearway view` and `clearway scenes view`: what they refuse; the page itself is tested in tests/view."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -27,7 +29,14 @@ def test_it_says_where_the_page_is(clearway, trained, served):
 
 def test_it_opens_the_browser_only_when_asked_to(clearway, trained, served, monkeypatch):
     opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
+
+    @contextmanager
+    def note(address: str) -> Iterator[None]:
+        assert not served[1:]  # before it serves
+        opened.append(address)
+        yield
+
+    monkeypatch.setattr("clearway.web.browser.opened_in_browser", note)
     clearway("scenes", "view", trained.scene)
     assert opened == []
     answer = clearway("scenes", "view", trained.scene, "--open")

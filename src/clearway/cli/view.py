@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -76,6 +77,7 @@ def _show(stage: Stage, port: int, episode: str, in_browser: bool) -> None:
     from clearway.view.episode import read_episode
     from clearway.view.server import make_app
     from clearway.view.session import Session
+    from clearway.web.browser import opened_in_browser
     from clearway.web.guard import guarded, new_token
     from clearway.web.local import listening, port_of, serve
 
@@ -90,8 +92,5 @@ def _show(stage: Stage, port: int, episode: str, in_browser: bool) -> None:
     console = stderr_console()
     console.print("clearway view, for this machine's user alone (end with Ctrl+C):", highlight=False)
     print(address, flush=True)
-    if in_browser:
-        import webbrowser
-
-        webbrowser.open(address)
-    serve(app, listener)
+    with opened_in_browser(address) if in_browser else nullcontext():
+        serve(app, listener)
