@@ -15,6 +15,7 @@ from clearway.evaluate.policies import random_policy, shortest_path_policy
 from clearway.live.episodes import LivePolicy, LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.settings import Perturbations
 from clearway.perception.encode import encoder_from_record
+from clearway.perception.encoder import Encoder
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.rooms.camera import eye_view, first_person_shot
 from clearway.scenes.rooms.render import Camera, studio
@@ -109,6 +110,36 @@ def test_argmax_takes_the_most_probable_action(live, world, camera):
     table = walked(live, world, camera, turning, protocol)
     for walk in table.walks:
         assert (np.diff(walk[:, 2]) % 360 == 90).all()
+
+
+class Looking:
+    """An encoder that keeps the pictures that it sees."""
+
+    def __init__(self, encoder: Encoder) -> None:
+        self.encoder, self.seen = encoder, []
+
+    def encode(self, pictures: np.ndarray) -> np.ndarray:
+        self.seen.append(pictures.copy())
+        return self.encoder.encode(pictures)
+
+
+def first_pictures(live, world, camera, **changes: float) -> np.ndarray:
+    """What two episodes see at their start, (2, height, width, 3)."""
+    looking = Looking(encoder_from_record(live.scene.encoder))
+    protocol = replace(PROTOCOL, episodes_per_target=1, step_cap=1)
+    run_live_episodes(live, world, uniform, looking, camera, Perturbations(**changes), protocol)
+    return looking.seen[0].astype(int)
+
+
+CHANGES_OF_PICTURES = {"light": 0.3, "pixel_noise": 10.0, "camera_height_jitter": 0.05, "camera_pitch_jitter": 3.0}
+
+
+@pytest.mark.parametrize("name", CHANGES_OF_PICTURES)
+def test_each_perturbation_of_the_camera_alone_changes_what_the_encoder_sees(live, world, camera, name) -> None:
+    plain = first_pictures(live, world, camera)
+    np.testing.assert_array_equal(first_pictures(live, world, camera), plain)
+    changed = first_pictures(live, world, camera, **{name: CHANGES_OF_PICTURES[name]})
+    assert (np.abs(changed - plain).mean(axis=(1, 2, 3)) > 0.1).all()
 
 
 def forwards(history: torch.Tensor, target: torch.Tensor) -> torch.Tensor:

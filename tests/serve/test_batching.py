@@ -8,6 +8,8 @@ import pytest
 from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
+from clearway.serve.service import Answer, Service
+from serving import grey
 from sums import Sums, plain
 
 TARGET = np.array([1.0, 1.0], np.float32)
@@ -43,6 +45,18 @@ def test_pictures_of_different_sizes_share_no_batch_and_none_is_passed_over() ->
 
     assert asyncio.run(ask()) == [1000.0 + 4 * level for level in range(5)]
     assert sorted(model.batches) == [1, 2, 2]
+
+
+def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() -> None:
+    """The second rests on the history that the first left."""
+
+    async def run() -> list[Answer]:
+        service = Service(Sums(seconds=0.05), Limits())
+        session = service.sessions.open("argmax", None)
+        await service.set_target(session, grey(0))
+        return await asyncio.gather(*(service.step(session, grey(level)) for level in (1, 2)))
+
+    assert [(answer.step, answer.decision.value) for answer in asyncio.run(run())] == [(1, 4.0), (2, 5.0)]
 
 
 def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:

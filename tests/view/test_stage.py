@@ -66,6 +66,12 @@ def test_values_and_rewards_are_of_one_scale(stage: Stage) -> None:
     assert replace(shown, agent=replace(shown.agent, record=clipping)).reward.table().max() == 1
 
 
+def test_the_map_shows_the_zones_that_the_first_agent_learnt_from(stage: Stage) -> None:
+    shown, other = stage.agents
+    by_cell = replace(shown, agent=replace(shown.agent, record=replace(shown.agent.record, zone_level="cell")))
+    assert (stage.zone_level, replace(stage, agents=(by_cell, other)).zone_level) == ("pose", "cell")
+
+
 def test_a_scene_alone_has_no_agents(stage: Stage) -> None:
     shown = scene_stage(stage.scenes[1])
     assert (shown.agents, shown.zone_level, shown.reward.name) == ((), "pose", "collision-aware")

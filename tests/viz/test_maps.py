@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from clearway import colours
+from clearway.viz import maps
+from clearway.viz.figures import LINES
 from clearway.viz.maps import Walk, _triangles, draw_map
 from clearway.zones import scene_zones
 from made import corridor_scene, grid_scene
@@ -36,6 +39,40 @@ def test_a_map_is_drawn(tmp_path, from_above):
     picture = np.asarray(Image.open(path).convert("RGB"))
     assert picture.shape[1] > 800 and picture.std() > 10
     assert [file.name for file in path.parent.iterdir()] == ["map.png"]
+
+
+def rgb(colour: str) -> list[int]:
+    return list(bytes.fromhex(colour[1:]))
+
+
+def test_star_and_line_stand_at_their_poses(tmp_path, monkeypatch):
+    scene, kept = grid_scene(1), []
+    monkeypatch.setattr(maps, "_draw_scale_bar", lambda axes, right_m, low_m: kept.append(axes))
+    states = [0]
+    while len(states) < 30:  # along the walls: forward, or else to the right
+        ahead, aside = (int(scene.graph[states[-1], action]) for action in (0, 1))
+        states.append(ahead if ahead >= 0 else aside)
+    target = int(np.flatnonzero(~np.isin(scene.cells, scene.cells[states]))[0])
+    draw_map(
+        scene,
+        tmp_path / "map.png",
+        zones=np.zeros(scene.state_count, int),
+        target=target,
+        walks=[Walk("", np.array(states))],
+    )
+    picture = np.asarray(Image.open(tmp_path / "map.png").convert("RGB"))
+
+    def at(place_m: np.ndarray) -> list[int]:
+        column, row = kept[0].transData.transform(place_m)
+        return picture[len(picture) - 1 - round(row), round(column)].tolist()
+
+    assert at(scene.locations_m[target]) == rgb(colours.TARGET)
+    places_m = scene.locations_m[states]
+    moved = (places_m[1:] != places_m[:-1]).any(axis=1)
+    on_line = (0.7 * places_m[:-1] + 0.3 * places_m[1:])[moved]
+    middle_m = (scene.locations_m.min(axis=0) + scene.locations_m.max(axis=0)) / 2
+    assert len(np.unique(on_line, axis=0)) >= 4 and (np.abs(on_line - middle_m) > 0.1).any(axis=0).all()
+    assert [at(place_m) for place_m in on_line] == [rgb(LINES[0].colour)] * len(on_line)
 
 
 def test_zones_change_the_map_and_nothing_else_is_needed(tmp_path):
