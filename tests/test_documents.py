@@ -104,7 +104,7 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[0] in ("True", "False")
     made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx"]
-    made += [f"imported/{name}.h5" for name in ("dump", "hall", "poses", "scene")]
+    made += [f"imported/{name}.h5" for name in ("dump", "hall", "office", "lab")]
     assert all((tmp_path / name).exists() for name in made)
 
 
@@ -113,7 +113,8 @@ def prepare_stand_ins(folder: Path) -> None:
     (folder / "dumps").mkdir()
     (folder / "hall.txt").write_text("....\n....\n..#.\n")
     (folder / "office").mkdir()
-    (folder / "office/scene.xml").write_text(ROOM)
+    (folder / "lab").mkdir()
+    (folder / "lab/scene.xml").write_text(ROOM)
     build = "clearway scenes build --room bathroom --out room.h5\n"
     export = "clearway scenes export room.h5 --out dumps/dump.h5\n"
     photographs = next(b for b in code_blocks(ROOT / "docs/tutorial.md") if b.language == "python")

@@ -27,6 +27,18 @@ def test_photographs_become_a_scene_that_can_be_inspected(clearway, tmp_path: Pa
     assert found["source"] == "images"
 
 
+def test_tables_of_one_name_become_scenes_of_their_folders(clearway, tmp_path: Path) -> None:
+    words = ("--out", tmp_path / "scenes", "--height", 30, "--encoder", "random-resnet50")
+    answers = []
+    for place in ("office", "lab", "lab"):
+        (tmp_path / place).mkdir(exist_ok=True)
+        table = photographed(tmp_path / place).rename(tmp_path / place / "poses.csv")
+        answers.append(clearway("scenes", "import", "images", table, *words))
+    assert [answer.code for answer in answers] == [0, 0, 0], answers
+    assert sorted(path.name for path in (tmp_path / "scenes").iterdir()) == ["lab.h5", "office.h5"]
+    assert ["replaces the scene" in " ".join(answer.err.split()) for answer in answers] == [False, False, True]
+
+
 def test_a_missing_photograph_is_named_and_nothing_is_written(clearway, tmp_path: Path) -> None:
     table = photographed(tmp_path)
     (tmp_path / "0.5-90.png").unlink()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from clearway.cli.arguments import check_at_least
-from clearway.cli.imports.writing import Encoding, encode_and_write, write_scenes
+from clearway.cli.imports.writing import Encoding, encode_and_write, place_name, write_scenes
 from clearway.ray_cluster import kept_connected
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class ImportImages:
     blocked: Path | None = None
     """CSV file with the columns x1, z1, x2, z2: pairs of neighbouring locations without a way between them."""
     name: str | None = None
-    """Of the scene; by default the table's."""
+    """Of the scene; by default the table's, or its folder's where the table is named poses.csv."""
     height: int = 300
     """Of the scene's pictures, pixels; the width follows from the first photograph, others are cut to fit."""
     encoding: Encoding = field(default_factory=Encoding)
@@ -95,5 +95,6 @@ class ImportImages:
         from clearway.scenes.importers.images import read_images
 
         check_at_least(1, height=self.height)
-        scene = read_images(self.table, step_m=self.step, blocked=self.blocked, name=self.name, height_px=self.height)
+        name = self.name or place_name(self.table)
+        scene = read_images(self.table, step_m=self.step, blocked=self.blocked, name=name, height_px=self.height)
         encode_and_write([scene], self.out, self.encoding)

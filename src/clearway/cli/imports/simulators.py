@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from clearway.cli.arguments import check_at_least, check_finite, check_named, check_positive, check_seeds
-from clearway.cli.imports.writing import Encoding, encode_and_write
+from clearway.cli.imports.writing import Encoding, encode_and_write, place_name
 from clearway.ray_cluster import kept_connected
 
 
@@ -76,7 +76,7 @@ class ImportMjcf:
     all_geoms: bool = False
     """Geoms that collide with nothing (contype and conaffinity 0) block the way too; by default they are only seen."""
     name: str | None = None
-    """Of the scene; by default the file's."""
+    """Of the scene; by default the file's, or its folder's where the file is named scene.xml."""
     width: int = 400
     """Of the pictures, pixels."""
     height: int = 300
@@ -101,7 +101,7 @@ class ImportMjcf:
                 self.file,
                 World(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
                 AgentShape(self.agent_radius, self.agent_height, self.step),
-                name=self.name,
+                name=self.name or place_name(self.file),
                 height_px=self.height,
                 width_px=self.width,
                 workers=workers,

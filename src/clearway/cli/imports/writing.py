@@ -14,6 +14,8 @@ from clearway.errors import ClearwayError
 if TYPE_CHECKING:
     from clearway.scenes.scene import Scene
 
+COMMON_STEMS = ("poses", "scene")  # of files that lie in a folder for each place
+
 
 @dataclass(frozen=True)
 class Encoding:
@@ -70,8 +72,16 @@ def write_scenes(scenes: Sequence[Scene], out: Path, files: Sequence[Path] = ())
     from clearway.scenes.thor_v1 import write_scene
 
     for scene, path in zip(scenes, _paths(scenes, out, files), strict=True):
+        replaces = ", replaces the scene that was there" if path.exists() else ""
         write_scene(scene, path)
-        stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
+        said = f"{path}: {scene.state_count} states, {scene.cell_count} cells{replaces}"
+        stderr_console().print(said, highlight=False)
+
+
+def place_name(file: Path) -> str:
+    """Name of the place that a file describes: the file's stem, or its folder's name where all such files are alike."""
+    folder = file.resolve().parent.name if file.stem in COMMON_STEMS else ""
+    return folder or file.stem
 
 
 def _paths(scenes: Sequence[Scene], out: Path, files: Sequence[Path]) -> list[Path]:
