@@ -218,3 +218,11 @@ def test_a_crowded_encoder_group_is_refused(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(hdf5, "MAX_GROUP_ARRAYS", 2)
     with pytest.raises(SceneError, match="group of at most 2 arrays"):
         read_scene(tmp_path / "a.h5")
+
+
+def test_pictures_from_0_to_1_are_refused_not_stored_as_black(tmp_path: Path) -> None:
+    scene = full_scene()
+    path = tmp_path / "attic.h5"
+    with pytest.raises(SceneError, match=r"attic\.h5, dataset 'observation': would hold float64, expected uint8"):
+        write_scene(replace(scene, observations=scene.observations / 255), path)
+    assert not path.exists()

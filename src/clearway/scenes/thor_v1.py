@@ -99,7 +99,7 @@ def write_scene(scene: Scene, path: str | Path) -> None:
     check_scene(scene, path)
     try:
         with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
-            _write_all(file, scene)
+            _write_all(file, scene, path)
     except OSError as fault:
         problem = f"cannot be written ({fault})"
         raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
@@ -189,7 +189,7 @@ def _distance_quirks(file: h5py.File, path: Path, scene: Scene) -> list[str]:
     return [f"shortest_path_distance is wrong for {len(wrong)} pairs (first: {example}); it is not used"]
 
 
-def _write_all(file: h5py.File, scene: Scene) -> None:
+def _write_all(file: h5py.File, scene: Scene, path: Path) -> None:
     file.attrs["format_version"] = FORMAT_VERSION
     hdf5.write_text(file, "clearway_version", __version__)
     file.attrs["cell_size_m"] = scene.cell_size_m
@@ -206,11 +206,15 @@ def _write_all(file: h5py.File, scene: Scene) -> None:
     if scene.top_view is not None:
         write_top_view(file, scene.top_view)
     if scene.observations is not None:
-        _write_pictures(file, scene.observations)
+        _write_pictures(file, scene.observations, path)
 
 
-def _write_pictures(file: h5py.File, pictures: Observations) -> None:
-    """Store pictures one a chunk, so that a look at one unpacks one; a block of them is in memory at a time."""
+def _write_pictures(file: h5py.File, pictures: Observations, path: Path) -> None:
+    """Store pictures one a chunk, so that a look at one unpacks one; a block of them is in memory at a time.
+
+    Raises:
+        SceneError: they are not uint8, to which HDF5 would round them.
+    """
     dataset = file.create_dataset(
         "observation",
         shape=pictures.shape,
@@ -221,4 +225,7 @@ def _write_pictures(file: h5py.File, pictures: Observations) -> None:
         fletcher32=True,
     )
     for start in range(0, pictures.shape[0], BLOCK_PICTURES):
-        dataset[start : start + BLOCK_PICTURES] = pictures[start : start + BLOCK_PICTURES]
+        block = pictures[start : start + BLOCK_PICTURES]
+        if block.dtype != np.uint8:
+            raise SceneError(path, f"would hold {block.dtype}, expected uint8", "Give RGB from 0 to 255", "observation")
+        dataset[start : start + BLOCK_PICTURES] = block

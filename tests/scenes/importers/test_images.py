@@ -151,3 +151,11 @@ def test_a_step_is_a_length(step_m: float, tmp_path: Path) -> None:
     table, _ = photographed(tmp_path)
     with pytest.raises(SceneError, match="Give a length above 0"):
         read_images(table, step_m=step_m)
+
+
+@pytest.mark.parametrize(("mode", "value"), [("I;16", 30_000), ("I", 30_000), ("F", 0.5)])
+def test_deep_pictures_are_refused_not_made_white(tmp_path: Path, mode: str, value: float) -> None:
+    path = tmp_path / "deep.tiff"
+    Image.new(mode, (40, 30), value).save(path)
+    with pytest.raises(SceneError, match=r"deep\.tiff: has more than 8 bits a channel \(mode .*Save it with 8 bits"):
+        photographs.photographs([path])

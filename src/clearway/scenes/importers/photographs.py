@@ -19,6 +19,7 @@ from clearway.scenes.pictures import file_stamp
 MAX_PICTURE_PIXELS = 80_000_000  # a photograph that unpacks to more is refused before it is unpacked
 PIXEL_BYTES = 4  # in memory
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
+DEEP_MODES = ("I", "F")  # what Pillow calls the modes of 16 and 32 bits begins so
 HEIGHT_PX = 300
 _FAULTS = (  # what the readers of the formats raise
     OSError,
@@ -54,7 +55,7 @@ class Photographs:
         """The pictures asked for.
 
         Raises:
-            SceneError: a file is gone, has changed, or is no picture.
+            SceneError: a file is gone, has changed, is no picture, or has more than 8 bits a channel.
         """
         wanted = np.arange(self.shape[0])[index]
         pictures = np.empty((wanted.size, *self.shape[1:]), np.uint8)
@@ -85,7 +86,7 @@ def photographs(paths: Sequence[Path], height_px: int = HEIGHT_PX, width_px: int
         width_px: of the pictures; None: as the sides of the first file say. Others are cut to fit.
 
     Raises:
-        SceneError: the first file is no picture.
+        SceneError: the first file is no picture, or has more than 8 bits a channel.
     """
     if width_px is None:
         width, height = _opened(paths[0]).size
@@ -101,6 +102,9 @@ def _opened(path: Path) -> Image.Image:
             if math.prod(picture.size) > most:
                 problem = f"has {picture.size[0]} x {picture.size[1]} pixels, more than {most:,} for a file of its size"
                 raise SceneError(path, problem, "Scale it down")
+            if picture.mode.startswith(DEEP_MODES):  # which `convert` would cut off at white
+                problem = f"has more than 8 bits a channel (mode {picture.mode})"
+                raise SceneError(path, problem, "Save it with 8 bits")
             upright = ImageOps.exif_transpose(picture)
             return upright if upright.mode == "RGB" else upright.convert("RGB")
     except SceneError:
