@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,18 @@ def test_distances_obey_every_edge(seed: int) -> None:
 def test_cells_are_numbered_by_first_appearance() -> None:
     scene = grid_scene(1)
     assert np.array_equal(scene.cells, np.repeat(np.arange(scene.cell_count), 4))
+
+
+def test_cells_are_circles_of_turns_wherever_states_are_said_to_lie() -> None:
+    scene = grid_scene(1)
+    rng = np.random.default_rng(0)
+    order = rng.permutation(scene.state_count)
+    place = np.argsort(order)
+    shuffled = np.where(scene.graph[order] == BLOCKED, BLOCKED, place[scene.graph[order]])
+    jitter = rng.uniform(-3e-4, 3e-4, scene.locations_m.shape)
+    moved = replace(scene, graph=shuffled.astype(np.int32), locations_m=(scene.locations_m + jitter)[order])
+    number: dict[int, int] = {}
+    assert moved.cells.tolist() == [number.setdefault(state // 4, len(number)) for state in order.tolist()]
+    assert moved.cells.dtype == np.int64
+    one_point = replace(scene, locations_m=np.zeros_like(scene.locations_m))
+    assert one_point.cells.tolist() == [state // 4 for state in range(scene.state_count)]

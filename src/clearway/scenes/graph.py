@@ -42,11 +42,23 @@ def distances_to(graph: np.ndarray, targets: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(steps), steps, UNREACHABLE).astype(np.int32)
 
 
-def turn_counts(graph: np.ndarray) -> np.ndarray:
-    """Right turns that lead each state back to itself, (S,) int; right turns must be a permutation of the states."""
+def turn_circles(graph: np.ndarray) -> np.ndarray:
+    """The circle of right turns that each state lies on, (S,) int64, numbered by first appearance.
+
+    Right turns must be a permutation of the states.
+    """
     count = len(graph)
     turned = csr_array((np.ones(count), (np.arange(count), graph[:, Action.TURN_RIGHT])), shape=(count, count))
-    _, circle = connected_components(turned, directed=False)
+    _, label = connected_components(turned, directed=False)
+    _, first, circle = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[circle]
+
+
+def turn_counts(graph: np.ndarray) -> np.ndarray:
+    """Right turns that lead each state back to itself, (S,) int; right turns must be a permutation of the states."""
+    circle = turn_circles(graph)
     return np.bincount(circle)[circle]
 
 

@@ -128,12 +128,8 @@ class Scene:
 
     @cached_property
     def cells(self) -> np.ndarray:
-        """Cell of each state, (S,) int64: states at one location share a cell; numbered by first appearance."""
-        keys = np.round(self.locations_m / self.cell_size_m * 1000).astype(np.int64)
-        _, first, cell = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        rank = np.empty(len(first), np.int64)
-        rank[np.argsort(first, kind="stable")] = np.arange(len(first))
-        return rank[cell.reshape(-1)]
+        """Cell of each state, (S,) int64: states that turns lead to share a cell; numbered by first appearance."""
+        return graphs.turn_circles(self.graph)
 
     @cached_property
     def heading_count(self) -> int:
@@ -147,7 +143,7 @@ class Scene:
 
     @property
     def cell_count(self) -> int:
-        """Number of distinct locations."""
+        """Number of cells."""
         return int(self.cells.max()) + 1
 
     @cached_property
