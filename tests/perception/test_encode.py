@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +13,7 @@ from clearway.errors import EncoderError, SceneError
 from clearway.perception import EncoderWarning, encode, encode_scenes, encoder_from_record, random_resnet
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from made import corridor_scene, grid_scene
 
@@ -81,6 +83,7 @@ def test_the_order_of_scenes_does_not_matter(own_cache: Path, monkeypatch: pytes
 def test_what_is_cached_needs_no_network(monkeypatch: pytest.MonkeyPatch, folder_model: str) -> None:
     asked = ("random-resnet50", folder_model)
     first = [encode_scenes(rooms(), encoder) for encoder in asked]
+    assert not np.array_equal(first[0][0].features, first[1][0].features)
 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("a network was loaded")
@@ -131,6 +134,46 @@ def test_what_cannot_be_encoded_is_one_clear_error() -> None:
         encode_scenes([], "random-resnet50")
     with pytest.raises(EncoderError, match="does not say how"):
         encoder_from_record(corridor_scene(3).encoder)
+
+
+def test_the_calibration_takes_one_thread_whatever_torch_has(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fit, used = random_resnet.fit_record, []
+
+    def fit_record(*arguments: object, **settings: object) -> EncoderRecord:
+        used.append(torch.get_num_threads())
+        return fit(*arguments, **settings)
+
+    monkeypatch.setattr(random_resnet, "fit_record", fit_record)
+    identities = set()
+    for threads in (1, 3):
+        monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / str(threads)))
+        identities.add(encode_scenes(rooms(), "random-resnet50", threads=threads)[0].encoder.identity)
+    assert used == [1, 1]
+    assert len(identities) == 1
+
+
+UNGUARDED = """
+import sys
+from clearway.perception import encode_scenes
+from clearway.perception.random_resnet import ResNetShape, fit_record
+from clearway.scenes.thor_v1 import read_scene
+
+scene = read_scene(sys.argv[1])
+record = fit_record([scene.observations], shape=ResNetShape(8, (16, 32), (1, 1)))
+encode_scenes([scene], record, workers=1)
+"""
+
+
+@pytest.mark.slow
+def test_a_script_without_a_guard_ends_with_a_word(tmp_path: Path) -> None:
+    write_scene(rooms()[0], tmp_path / "a.h5")
+    (tmp_path / "script.py").write_text(UNGUARDED)
+    words = [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "a.h5")]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    assert "encoding with workers runs the script again in each of them" in done.stderr
+    assert "an encoding process died. Try fewer --workers" in done.stderr
+    assert 'needs the guard if __name__ == "__main__":' in done.stderr
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -109,10 +110,13 @@ def encode_scenes(
         ray: address of a Ray cluster that encodes instead, see `ray_cluster.connected`.
 
     Raises:
-        EncoderError: see `find_record`; or a scene has no pictures, or a process died.
+        EncoderError: see `find_record`; or a scene has no pictures, or a process died, or processes are asked for by a
+            script without the guard `if __name__ == "__main__":`.
         SceneError: the pictures of a scene's file are damaged.
         RunError: Ray is asked for and cannot be had.
     """
+    if workers is not None:
+        _check_guarded()
     with (
         _threads(threads),
         picture_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
@@ -129,6 +133,13 @@ def encode_scenes(
             show_done(done)
             encoded.append(scene.with_features(features, record))
     return encoded
+
+
+def _check_guarded() -> None:
+    """Check that this is no new process that runs its parent's script once more, where both would wait for ever."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        problem = "encoding with workers runs the script again in each of them"
+        raise EncoderError(f'{problem}. Put what the script does under if __name__ == "__main__":')
 
 
 @contextmanager
@@ -189,7 +200,8 @@ def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessin
     ordered = [by_key[key] for key in sorted(by_key)]
 
     def make() -> Entry:
-        record = random_resnet.fit_record(ordered, seed=seed, shape=shape, preprocessing=preprocessing, name=RANDOM)
+        with _threads(1):  # so that statistics, and with them features, are the same bits however many encode
+            record = random_resnet.fit_record(ordered, seed=seed, shape=shape, preprocessing=preprocessing, name=RANDOM)
         return Entry(record.arrays, {"identity": record.identity, "settings": dict(record.settings)})
 
     request = joint_key(random_resnet.VERSION, seed, shape.to_json(), preprocessing.to_json(), sorted(by_key))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from torch import nn
 
 KIND = "random-resnet"
-VERSION = 1  # of what `fit_record` does; raise it when that changes, so that cached records are fitted again
+VERSION = 2  # of what `fit_record` does; raise it when that changes, so that cached records are fitted again
 PREPROCESSING = Preprocessing(128, 128)
 SAMPLE_PICTURES = 64
 MAX_WIDTH = 4_096  # of a layer; a record that asks for more is refused

@@ -62,7 +62,8 @@ def processes(workers: int) -> Iterator[Encode]:
             for job in jobs:
                 yield job.result()
         except BrokenProcessPool as error:
-            raise EncoderError("an encoding process died. Try fewer --workers, which need less memory") from error
+            remedy = 'Try fewer --workers, which need less memory; a script needs the guard if __name__ == "__main__":'
+            raise EncoderError(f"an encoding process died. {remedy}") from error
 
     try:
         yield encode
