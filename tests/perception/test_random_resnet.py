@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from clearway.errors import EncoderError
+from clearway.perception import random_resnet
 from clearway.perception.preprocess import Preprocessing, to_pixels
 from clearway.perception.random_resnet import ResNetShape, fit_record, from_record
 from clearway.scenes.scene import EncoderRecord
@@ -87,3 +88,52 @@ def test_an_altered_record_is_refused() -> None:
 def test_notes_in_the_settings_do_not_matter() -> None:
     record = tiny_record()
     assert from_record(replace(record, settings={**record.settings, "stands_in_for": "x"})).feature_count == 32
+
+
+def forged(record: EncoderRecord, architecture: dict[str, object], arrays: dict[str, np.ndarray]) -> EncoderRecord:
+    """A record with other parts, under the identity that is theirs."""
+    settings = {**record.settings, "architecture": {**record.settings["architecture"], **architecture}}
+    return replace(record, settings=settings, arrays=arrays, identity=random_resnet._identity(settings, arrays))
+
+
+@pytest.mark.parametrize("name", ["batch_norm_mean", "batch_norm_var", "feature_mean", "feature_std"])
+@pytest.mark.parametrize("kind", ["missing", "scalar", "short", "double", "big-endian"])
+def test_statistics_that_do_not_fit_are_refused(name: str, kind: str) -> None:
+    record = tiny_record()
+    values = record.arrays[name]
+    change = {
+        "scalar": np.float32(1).reshape(()),
+        "short": values[:-1],
+        "double": values.astype(np.float64),
+        "big-endian": values.astype(">f4"),
+    }
+    arrays = {key: kept for key, kept in record.arrays.items() if key != name}
+    if kind in change:
+        arrays[name] = change[kind]
+    with pytest.raises(EncoderError, match=rf"the statistics '{name}' do not fit .*Encode the scene again"):
+        from_record(forged(record, {}, arrays))
+
+
+@pytest.mark.parametrize(
+    ("architecture", "problem"),
+    [
+        ({"hidden_sizes": [3, 5]}, "unknown architecture"),
+        ({"hidden_sizes": [16, 30]}, "unknown architecture"),
+        ({"depths": [1, 200]}, "unknown architecture"),
+        ({"depths": [4096] * 4, "hidden_sizes": [16] * 4}, "unknown architecture"),
+        ({"depths": [1] * 6, "hidden_sizes": [16] * 6}, "unknown architecture"),
+        ({"depths": [], "hidden_sizes": []}, "unknown architecture"),
+        ({"depths": [100, 100], "hidden_sizes": [4096, 4096], "layer_type": "basic"}, "more than 100,000,000"),
+    ],
+)
+def test_architectures_that_would_take_minutes_or_fail_are_refused(
+    architecture: dict[str, object], problem: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = tiny_record()
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a network was built")
+
+    monkeypatch.setattr(random_resnet, "_random_network", refuse)
+    with pytest.raises(EncoderError, match=f"{problem}.*Encode the scene again"):
+        from_record(forged(record, architecture, dict(record.arrays)))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,7 +31,9 @@ KIND = "random-resnet"
 VERSION = 2  # of what `fit_record` does; raise it when that changes, so that cached records are fitted again
 PREPROCESSING = Preprocessing(128, 128)
 SAMPLE_PICTURES = 64
-MAX_WIDTH = 4_096  # of a layer; a record that asks for more is refused
+MAX_WIDTH, MAX_LAYERS, MAX_STAGES = 4_096, 200, 5  # of an architecture; a record that asks for more is refused
+MAX_PARAMETERS = 100_000_000  # four times ResNet-50's
+REDUCTION = 4  # of a bottleneck's inner width
 LEAST_STD = 1e-6  # a feature that varies less over the sample is only centred
 
 
@@ -103,7 +105,9 @@ def from_record(record: EncoderRecord) -> NetworkEncoder:
     settings |= {key: record.settings.get(key) for key in ("preprocessing", "weights")}
     if _identity(settings, record.arrays) != record.identity:
         raise EncoderError(f"encoder {record.name} ({record.identity}): its record was altered. {remedy}")
-    network = _random_network(_shape_of(record), _seed_of(record))
+    shape, seed = _shape_of(record), _seed_of(record)
+    _check_statistics(record, shape)
+    network = _random_network(shape, seed)
     if _weights_hash(network) != settings["weights"]:
         problem = "its seed gives other weights with the numpy or transformers installed here"
         raise EncoderError(f"encoder {record.name} ({record.identity}): {problem}. {remedy}")
@@ -126,8 +130,10 @@ def _shape_of(record: EncoderRecord) -> ResNetShape:
     kept = _object(record.settings.get("architecture"))
     embedding, layer = kept.get("embedding_size"), kept.get("layer_type")
     hidden, depths = _sizes(kept.get("hidden_sizes")), _sizes(kept.get("depths"))
-    whole = _sizes([embedding]) and hidden and len(hidden) == len(depths)
-    if not whole or layer not in ("basic", "bottleneck"):
+    sane = _sizes([embedding]) and 1 <= len(hidden) == len(depths) <= MAX_STAGES and sum(depths) <= MAX_LAYERS
+    if layer == "bottleneck":
+        sane = sane and all(width % REDUCTION == 0 for width in hidden)
+    if not sane or layer not in ("basic", "bottleneck"):
         raise EncoderError(f"encoder {record.name}: unknown architecture {dict(kept)}. Encode the scene again")
     return ResNetShape(_sizes([embedding])[0], hidden, depths, str(layer))
 
@@ -145,10 +151,42 @@ def _seed_of(record: EncoderRecord) -> int:
     return seed
 
 
+def _check_statistics(record: EncoderRecord, shape: ResNetShape) -> None:
+    """Check the size of the network and of what is set in it, before it takes memory. Raises EncoderError."""
+    network = _network(shape, "meta")
+    count = sum(values.numel() for values in network.parameters())
+    if count > MAX_PARAMETERS:
+        problem = f"its network has {count:,} parameters, more than {MAX_PARAMETERS:,}"
+        raise EncoderError(f"encoder {record.name}: {problem}. Encode the scene again")
+    norms = (sum(norm.num_features for norm in _batch_norms(network)),)
+    wanted = dict.fromkeys(("batch_norm_mean", "batch_norm_var"), norms)
+    wanted |= dict.fromkeys(("feature_mean", "feature_std"), (shape.hidden_sizes[-1],))
+    for name, size in wanted.items():
+        values = record.arrays.get(name)
+        if values is None or values.shape != size or values.dtype != np.float32:
+            problem = f"the statistics '{name}' do not fit the network, which needs {size} float32"
+            raise EncoderError(f"encoder {record.name}: {problem}. Encode the scene again")
+
+
 def _random_network(shape: ResNetShape, seed: int) -> nn.Module:
     """A ResNet whose convolutions are He-normal by numpy's generator, the same on every machine."""
     import torch
     from torch import nn
+
+    network: Any = _network(shape, "cpu")  # torch tells checkers nothing of memory formats
+    rng = np.random.default_rng(seed)
+    with torch.no_grad():
+        for module in network.modules():
+            if isinstance(module, nn.Conv2d):
+                fan_out = module.out_channels * module.kernel_size[0] * module.kernel_size[1]
+                weights = rng.standard_normal(tuple(module.weight.shape), np.float32)
+                module.weight.copy_(torch.from_numpy(weights * np.float32(np.sqrt(2 / fan_out))))
+    return network.eval().requires_grad_(False).to(memory_format=torch.channels_last)
+
+
+def _network(shape: ResNetShape, device: str) -> nn.Module:
+    """A ResNet of a shape; on the device "meta" it takes no memory."""
+    import torch
     from transformers.models.resnet.configuration_resnet import ResNetConfig
     from transformers.models.resnet.modeling_resnet import ResNetModel
 
@@ -158,16 +196,8 @@ def _random_network(shape: ResNetShape, seed: int) -> nn.Module:
         depths=list(shape.depths),
         layer_type=shape.layer_type,
     )
-    with torch.random.fork_rng(devices=[]):
-        network = ResNetModel(config)
-    rng = np.random.default_rng(seed)
-    with torch.no_grad():
-        for module in network.modules():
-            if isinstance(module, nn.Conv2d):
-                fan_out = module.out_channels * module.kernel_size[0] * module.kernel_size[1]
-                weights = rng.standard_normal(tuple(module.weight.shape), np.float32)
-                module.weight.copy_(torch.from_numpy(weights * np.float32(np.sqrt(2 / fan_out))))
-    return network.eval().requires_grad_(False).to(memory_format=torch.channels_last)
+    with torch.random.fork_rng(devices=[]), torch.device(device):
+        return ResNetModel(config)
 
 
 def _sample(scenes: Sequence[Observations], count: int, seed: int) -> list[np.ndarray]:
@@ -212,11 +242,7 @@ def _set_statistics(network: nn.Module, record: EncoderRecord) -> None:
     norms = _batch_norms(network)
     ends = np.cumsum([norm.num_features for norm in norms])
     for array, which in {"batch_norm_mean": "running_mean", "batch_norm_var": "running_var"}.items():
-        values = record.arrays.get(array)
-        if values is None or values.shape != (ends[-1],):
-            problem = f"the statistics '{array}' do not fit the network"
-            raise EncoderError(f"encoder {record.name}: {problem}. Encode the scene again")
-        for norm, part in zip(norms, np.split(values, ends[:-1]), strict=True):
+        for norm, part in zip(norms, np.split(record.arrays[array], ends[:-1]), strict=True):
             getattr(norm, which).copy_(torch.from_numpy(part.copy()))
 
 
