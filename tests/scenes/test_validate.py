@@ -127,3 +127,9 @@ def test_quirks_of_poses_are_told() -> None:
     assert any("a right turn keeps the location" in quirk for quirk in pose_quirks(torn))
     mirrored = replace(scene, headings_deg=-scene.headings_deg % 360)
     assert any("a right turn changes the heading by 90" in quirk for quirk in pose_quirks(mirrored))
+
+
+@pytest.mark.parametrize("cell_size_m", [0.0, -1.0, 0.0005, 10_001.0, np.nan, np.inf])
+def test_cell_sizes_that_the_reader_refuses_are_not_written(cell_size_m: float) -> None:
+    with pytest.raises(SceneError, match=r"a cell size of .* m\. Give a length from 0\.001 to 10,000 m"):
+        check_scene(replace(corridor_scene(5), cell_size_m=cell_size_m))

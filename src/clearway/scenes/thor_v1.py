@@ -33,6 +33,7 @@ from clearway.scenes.scene import Features, Observations, Scene
 from clearway.scenes.validate import (
     MAX_COORDINATE_M,
     MAX_STATES,
+    MIN_CELL_SIZE_M,
     SceneWarning,
     check_graph,
     check_poses,
@@ -80,7 +81,7 @@ def read_scene(path: str | Path, *, name: str | None = None, features_in_file: b
             graph=graph,
             made_by=read_provenance(file, path),
             encoder=None if features is None else read_encoder(file, path, features.shape[1]),
-            cell_size_m=hdf5.read_number(file, "cell_size_m", path, 1e-3, MAX_COORDINATE_M)
+            cell_size_m=hdf5.read_number(file, "cell_size_m", path, MIN_CELL_SIZE_M, MAX_COORDINATE_M)
             or step_length_m(locations_m, graph),
             top_view=read_top_view(file, path),
         )

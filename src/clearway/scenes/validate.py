@@ -21,6 +21,7 @@ MAX_FEATURES = 65_536
 MIN_HEADINGS, MAX_HEADINGS = 3, 360
 MAX_PICTURE_SIDE = 2_048  # pixels
 MAX_COORDINATE_M = 10_000.0
+MIN_CELL_SIZE_M = 1e-3
 TURNS = (Action.TURN_RIGHT, Action.TURN_LEFT)
 MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
 CHECK_THE_MAKER = "Make the scene again, or check the program that made it"
@@ -43,8 +44,9 @@ def check_scene(scene: Scene, source: str | Path | None = None) -> None:
             raise SceneError(source, "has features but no record of their encoder", "Encode the scene again")
     if scene.observations is not None:
         check_observations(scene.observations, scene.state_count, source)
-    if not np.isfinite(scene.cell_size_m) or scene.cell_size_m <= 0:
-        raise SceneError(source, f"has a cell size of {scene.cell_size_m} m", "Give a length above 0")
+    if not MIN_CELL_SIZE_M <= scene.cell_size_m <= MAX_COORDINATE_M:  # NaN fails the comparison
+        problem = f"has a cell size of {scene.cell_size_m} m"
+        raise SceneError(source, problem, f"Give a length from {MIN_CELL_SIZE_M} to {MAX_COORDINATE_M:,.0f} m")
 
 
 def check_graph(graph: np.ndarray, source: str | Path) -> None:

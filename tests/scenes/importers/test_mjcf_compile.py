@@ -13,6 +13,8 @@ from clearway.scenes.importers import mjcf_compile
 from clearway.scenes.importers.mjcf_compile import compiled
 from clearway.scenes.rooms.obstacles import AgentShape, body_geoms
 
+URDF = """<robot name="hut"><link name="base">
+<collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>"""
 AGENT = AgentShape(radius_m=0.3, height_m=1.0, step_m=0.4)
 
 
@@ -100,3 +102,11 @@ def test_a_process_that_dies_is_one_line(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(mjcf_compile, "COMMAND", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)  # {path}")
     with pytest.raises(SceneError, match=r"MuJoCo ended with signal SIGSEGV .*8 GiB"):
         compiled(written(tmp_path, ""), AGENT)
+
+
+def test_the_body_stays_where_a_model_discards_what_is_only_seen(tmp_path: Path) -> None:
+    world = '<compiler discardvisual="true"/><worldbody><geom type="plane" size="2 2 .1"/></worldbody>'
+    model = compiled(written(tmp_path, world), AGENT)
+    assert len(body_geoms(model)) == 3
+    (tmp_path / "hut.urdf").write_text(URDF)
+    assert len(body_geoms(compiled(tmp_path / "hut.urdf", AGENT))) == 3

@@ -85,6 +85,7 @@ def main() -> None:
 
         try:
             spec = mujoco.MjSpec.from_file(job["path"])
+            spec.compiler.discardvisual = False  # the agent's body collides with nothing, and must stay
             add_body(spec, AgentShape(**job["agent"]))
             model = spec.compile()
             mujoco.mj_forward(model, mujoco.MjData(model))  # its data must fit as well
