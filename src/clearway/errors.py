@@ -5,15 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 
+def printable(text: str) -> str:
+    """A text with what is no printable character shown by its code; else a file's names could speak to the terminal."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
 class ClearwayError(Exception):
     """Bad input or a missing requirement. The message says what, where and the remedy, in one line.
 
-    Names out of a file may stand in it: what is no printable character is shown by its code, so that a file can neither
-    break the line nor speak to the terminal.
+    Names out of a file may stand in it, which are made printable.
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__("".join(c if c.isprintable() else repr(c)[1:-1] for c in message))
+        super().__init__(printable(message))
 
 
 class SceneError(ClearwayError):

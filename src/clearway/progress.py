@@ -16,7 +16,12 @@ def picture_progress(label: str, total: int, wanted: bool) -> Iterator[Callable[
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("pictures,"))
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("pictures,"),
+    )
     shown = wanted and console.is_terminal
     with Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, disable=not shown) as bar:
         task = bar.add_task(label, total=total)

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from PIL import Image
 
 from clearway.errors import ClearwayError
 from clearway.evaluate import single
+from clearway.scenes.scene import encoder_names
 from clearway.scenes.targets import ZHU_TARGETS
-from clearway.scenes.thor_v1 import read_scene
+from clearway.scenes.thor_v1 import read_scene, write_scene
 
 TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl", "shortest_path_steps"}
 
@@ -32,6 +34,26 @@ def test_a_dump_is_imported_as_it_is(clearway, dump, tmp_path, feature_axis, unr
     assert np.array_equal(original.graph, imported.graph)
     assert np.array_equal(original.features, imported.features)
     assert np.array_equal(original.observations[:], imported.observations[:])
+
+
+def shown(text: str) -> str:
+    return text.replace("\x1b", r"\x1b").replace("\x07", r"\x07")
+
+
+@pytest.mark.parametrize("name", ["[/x]", "[red]kept[/red]", "\x1b[31mred\x1b]0;owned\x07"])
+def test_names_in_files_and_folders_are_shown_as_they_are(clearway, dump, tmp_path, name):
+    scene = read_scene(dump(tmp_path / "kitchen_02.h5"))
+    write_scene(replace(scene, encoder=replace(scene.encoder, name=name)), tmp_path / "named.h5")
+    answer = clearway("scenes", "inspect", tmp_path / "named.h5")
+    assert answer.code == 0, answer
+    assert shown(name) in answer.out
+    assert "\x1b" not in answer.out and "\x07" not in answer.out
+    assert encoder_names([read_scene(tmp_path / "named.h5")]) == shown(name)
+    folder = tmp_path / f"sc{name.replace('/', '')}"
+    answer = clearway("scenes", "import", "thor-v1", tmp_path / "kitchen_02.h5", "--out", folder)
+    assert answer.err == f"{shown(str(folder / 'kitchen_02.h5'))}: 76 states, 19 cells\n"
+    answer = clearway("oracle", (tmp_path / "named.h5").rename(tmp_path / "n[b].h5"), "--targets", 1)
+    assert "n[b]" in answer.out
 
 
 def test_an_archive_of_dumps_is_imported_and_a_scene_exported_again(clearway, dump, tmp_path):

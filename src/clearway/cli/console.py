@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from clearway.errors import printable
 from clearway.files import json_text
 
 if TYPE_CHECKING:
@@ -18,11 +19,23 @@ def print_json(content: object) -> None:
     print(json_text(content), end="")
 
 
-def stderr_console() -> Console:
-    """A console for all that is not the result itself."""
+def stdout_console() -> Console:
+    """A console for tables, which takes brackets in names as they are."""
     from rich.console import Console
 
-    return Console(stderr=True)
+    return Console(markup=False)
+
+
+def stderr_console() -> Console:
+    """A console for all that is not the result itself, which takes brackets in names as they are."""
+    from rich.console import Console
+
+    return Console(stderr=True, markup=False, highlight=False)
+
+
+def say(text: str) -> None:
+    """Print a line on standard error as it is, however long, but for characters that are not printable."""
+    stderr_console().print(printable(text), soft_wrap=True)
 
 
 @contextmanager
@@ -33,7 +46,8 @@ def showing_warnings() -> Iterator[None]:
         from rich.panel import Panel
         from rich.text import Text
 
-        frame = Panel(Text(str(message)), title="warning", border_style="yellow", title_align="left")
+        text = "\n".join(printable(line) for line in str(message).split("\n"))
+        frame = Panel(Text(text), title="warning", border_style="yellow", title_align="left")
         stderr_console().print(frame)
 
     with warnings.catch_warnings():

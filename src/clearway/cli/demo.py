@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from clearway.cli.arguments import check_seeds
-from clearway.cli.console import print_json, stderr_console
+from clearway.cli.console import print_json, say, stdout_console
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,10 @@ class Demo:
         if self.json:
             print_json([evaluation.to_json() for evaluation in result.evaluations])
             return
-        from rich.console import Console
-
         from clearway.evaluate.tables import rich_table
 
-        Console().print(rich_table(result.evaluations, "scenes"))
-        stderr_console().print(f"open {page}", highlight=False)
+        stdout_console().print(rich_table(result.evaluations, "scenes"))
+        say(f"open {page}")
 
     def _command(self) -> str:
         words = ["clearway", "demo", "--out", str(self.out), "--seed", str(self.seed)]

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from clearway.cli.arguments import check_at_least, check_seeds, scene_files
-from clearway.cli.console import print_json, stderr_console
+from clearway.cli.console import print_json, say, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
 from clearway.cli.live import STEP_CAP as LIVE_STEP_CAP
 from clearway.cli.live import Live, evaluate_live
@@ -82,15 +82,13 @@ class Evaluate:
             from clearway.viz.run_pictures import draw_run_pictures
 
             draw_run_pictures(self.folder, agent, scenes, self.pictures, seed=self.seed)
-            stderr_console().print(f"pictures: {self.pictures}", highlight=False)
+            say(f"pictures: {self.pictures}")
         if self.json:
             print_json(content)
             return
-        from rich.console import Console
-
         from clearway.evaluate.tables import rich_table
 
-        console = Console()
+        console = stdout_console()
         if self.targets:
             console.print(rich_table(evaluations, "targets"))
         console.print(rich_table(evaluations, "scenes"))

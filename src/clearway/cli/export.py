@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from clearway.cli.arguments import check_ending, scene_files
-from clearway.cli.console import stderr_console
+from clearway.cli.console import say
 from clearway.errors import EncoderError
 
 
@@ -52,4 +52,4 @@ class ExportAgent:
         said = f"{what}: {self.out}, {self.out.stat().st_size / 1e6:.1f} MB, for scene {chosen.scene.name}"
         if others:
             said += f" (--scene chooses another: {', '.join(others)})"
-        stderr_console().print(said, highlight=False, soft_wrap=True)
+        say(said)

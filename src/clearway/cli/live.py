@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
-from clearway.cli.console import print_json, stderr_console
+from clearway.cli.console import print_json, say, stderr_console, stdout_console
 from clearway.errors import ClearwayError
 from clearway.live.settings import Perturbations
 
@@ -102,9 +102,7 @@ def evaluate_live(
     if json:
         print_json(live_json(results, protocol, encoder))
         return
-    from rich.console import Console
-
-    console = Console()
+    console = stdout_console()
     for table in rich_tables(results, protocol, encoder):
         console.print(table)
 
@@ -113,7 +111,7 @@ def _draw(folder: Path, places: list[Stage], outcomes: list[LiveOutcome]) -> Non
     from clearway.viz.live import draw_live_pictures
 
     made = draw_live_pictures(folder, places, outcomes)
-    stderr_console().print(f"pictures: {', '.join(str(path) for path in made)}", highlight=False)
+    say(f"pictures: {', '.join(str(path) for path in made)}")
 
 
 def _named(paths: list[Path], agents: list[Agent]) -> dict[str, Agent]:

@@ -10,7 +10,7 @@ import tyro
 
 from clearway.choices import RewardName, ZoneLevel
 from clearway.cli.arguments import check_finite, check_seeds, chosen_reward, chosen_targets, scene_files
-from clearway.cli.console import print_json
+from clearway.cli.console import print_json, stdout_console
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
@@ -81,7 +81,6 @@ CAPTION = (
 
 def _print_table(found: list[TargetYardstick]) -> None:
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(box=SIMPLE_HEAD, caption=CAPTION, caption_justify="left", padding=(0, 1, 0, 0))
@@ -93,4 +92,4 @@ def _print_table(found: list[TargetYardstick]) -> None:
         figures = (optimal.steps, optimal.collision_visits, soft.steps, soft.collisions, soft.collision_visits)
         steps = f"{one.yardstick.shortest_path_steps:.2f}"
         table.add_row(one.scene, str(one.target), steps, *(f"{figure:.3f}" for figure in figures))
-    Console().print(table)
+    stdout_console().print(table)

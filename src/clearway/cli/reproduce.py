@@ -12,7 +12,7 @@ import tyro
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
 from clearway.cli.arguments import check_at_least, scene_files
-from clearway.cli.console import print_json, stderr_console
+from clearway.cli.console import print_json, say
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
@@ -128,4 +128,4 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning, setting.scenes)
     if as_json:
         print_json(json.loads((out / JSON).read_text(encoding="utf-8")))
-    stderr_console().print(f"report: {page} and {out / MARKDOWN}", highlight=False)
+    say(f"report: {page} and {out / MARKDOWN}")

@@ -10,8 +10,8 @@ import tyro
 
 from clearway.choices import RoomName
 from clearway.cli.arguments import check_at_least, check_ending, check_seeds, scene_files
-from clearway.cli.console import print_json, stderr_console
-from clearway.errors import ClearwayError
+from clearway.cli.console import print_json, say, stdout_console
+from clearway.errors import ClearwayError, printable
 from clearway.ray_cluster import kept_connected
 
 
@@ -59,7 +59,7 @@ class Build:
         for scene in encoded:
             path = self.out if self.out.suffix else self.out / f"{scene.name}.h5"
             write_scene(scene, path)
-            stderr_console().print(f"{path}: {scene.state_count} states, {scene.cell_count} cells", highlight=False)
+            say(f"{path}: {scene.state_count} states, {scene.cell_count} cells")
 
 
 @dataclass(frozen=True)
@@ -123,15 +123,15 @@ class Export:
         if self.out.resolve() == self.file.resolve():
             raise ClearwayError(f"{self.out}: would be written over the scene itself. Give another file with --out")
         export_thor_v1(read_scene(self.file), self.out)
-        stderr_console().print(f"{self.out}: in the layout {self.format}", highlight=False)
+        say(f"{self.out}: in the layout {self.format}")
 
 
 def _print_table(content: dict[str, object]) -> None:
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for key, value in content.items():
         text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else str(value)
-        table.add_row(key.replace("_", " "), text)
-    Console().print(table)
+        table.add_row(key.replace("_", " "), Text(printable(text)))
+    stdout_console().print(table)

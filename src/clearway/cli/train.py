@@ -10,7 +10,7 @@ import tyro
 
 from clearway.choices import FeatureStore, RewardName, ZoneLevel
 from clearway.cli.arguments import check_at_least, check_seeds, chosen_reward, chosen_targets, scene_files
-from clearway.cli.console import stderr_console
+from clearway.cli.console import say
 from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
 from clearway.learn.settings import with_settings
 
@@ -83,7 +83,7 @@ class Train:
             feature_store=self.feature_store,
         )
         train(request, self.out, resume=self.resume, show_progress=True)
-        stderr_console().print(f"{self.out}: trained. Next: clearway evaluate {self.out}", highlight=False)
+        say(f"{self.out}: trained. Next: clearway evaluate {self.out}")
 
     def _learner(self) -> Learner:
         learner = PRESETS[self.preset]

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from clearway.cli.arguments import check_at_least, check_seeds, scene_files
-from clearway.cli.console import stderr_console
+from clearway.cli.console import say
 
 
 @dataclass(frozen=True)
@@ -53,4 +53,4 @@ class Video:
         )
         shown = walked(world, agent.policy(world), index, trajectory, agent.record.learner.history_length)
         write_video(self.out, frames(scenes, shown), self.frames_per_s)
-        stderr_console().print(f"film: {self.out}, {len(trajectory.actions)} steps", highlight=False)
+        say(f"film: {self.out}, {len(trajectory.actions)} steps")

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from clearway.errors import printable
 from clearway.scenes import graph as graphs
 
 
@@ -171,5 +172,5 @@ class Scene:
 
 
 def encoder_names(scenes: Iterable[Scene]) -> str:
-    """Names of what made the scenes' features, each once."""
-    return ", ".join(sorted({scene.encoder_name for scene in scenes}))
+    """Names of what made the scenes' features, each once, printable."""
+    return printable(", ".join(sorted({scene.encoder_name for scene in scenes})))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clearway.cli.arguments import check_at_least, check_seeds
-from clearway.cli.console import stderr_console
+from clearway.cli.console import say
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def write_scenes(scenes: Sequence[Scene], out: Path, files: Sequence[Path] = ())
         replaces = ", replaces the scene that was there" if path.exists() else ""
         write_scene(scene, path)
         said = f"{path}: {scene.state_count} states, {scene.cell_count} cells{replaces}"
-        stderr_console().print(said, highlight=False)
+        say(said)
 
 
 def place_name(file: Path) -> str:
