@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from clearway import files
+from clearway.errors import ClearwayError
 from clearway.files import json_text, written_whole
 
 WRITER = """
@@ -88,3 +89,18 @@ def test_json_holds_no_number_that_json_does_not_know() -> None:
         "rows": [[1, None], {"deep": None}],
         "fine": 0.5,
     }
+
+
+def test_a_folder_in_the_way_is_named_and_nothing_is_left(tmp_path: Path) -> None:
+    (tmp_path / "a.h5").mkdir()
+    with pytest.raises(IsADirectoryError) as caught:
+        with written_whole(tmp_path / "a.h5") as part:
+            part.touch()
+    assert caught.value.filename == str(tmp_path / "a.h5")
+    assert names(tmp_path) == ["a.h5"]
+
+
+def test_a_cache_in_the_home_of_nobody_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", "~nobody-of-this-name/cache")
+    with pytest.raises(ClearwayError, match="CLEARWAY_CACHE=~nobody-of-this-name/cache: there is no such home folder"):
+        files.cache_dir()

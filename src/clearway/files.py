@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -14,6 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from clearway.errors import ClearwayError
+
 CACHE_VARIABLE = "CLEARWAY_CACHE"
 PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
 MAX_JSON_BYTES = 64 * 1024**2
@@ -25,7 +28,12 @@ def written_whole(path: Path) -> Iterator[Path]:
 
     The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one. What
     processes that were killed left unfinished in the folder is removed.
+
+    Raises:
+        OSError: the file cannot be written; IsADirectoryError where `path` is a folder.
     """
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     _remove_leftovers(path.parent)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=path.parent)
@@ -92,11 +100,20 @@ def parse_json(text: str) -> Any:
 
 
 def cache_dir() -> Path:
-    """The folder for what can be made again: `$CLEARWAY_CACHE`, else the user's cache folder."""
+    """The folder for what can be made again: `$CLEARWAY_CACHE`, else the user's cache folder.
+
+    Raises:
+        ClearwayError: the variable names the home folder of nobody.
+    """
     from platformdirs import user_cache_path
 
     chosen = os.environ.get(CACHE_VARIABLE)
-    return Path(chosen).expanduser() if chosen else user_cache_path("clearway", appauthor=False)
+    if not chosen:
+        return user_cache_path("clearway", appauthor=False)
+    try:
+        return Path(chosen).expanduser()
+    except RuntimeError as fault:
+        raise ClearwayError(f"{CACHE_VARIABLE}={chosen}: there is no such home folder. Set it to a folder") from fault
 
 
 @contextmanager

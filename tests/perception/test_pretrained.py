@@ -226,3 +226,8 @@ def test_a_hub_that_cannot_be_reached_fails_quickly(monkeypatch: pytest.MonkeyPa
     with pytest.raises(EncoderError, match="cannot be reached"):
         find_record("microsoft/resnet-50")
     assert time.monotonic() - start < 5
+
+
+def test_a_folder_in_the_home_of_nobody_is_one_clear_error() -> None:
+    with pytest.raises(EncoderError, match="encoder '~nobody-of-this-name/model': there is no such home folder"):
+        find_record("~nobody-of-this-name/model")

@@ -22,7 +22,10 @@ def find_model(model: str) -> Path:
     Raises:
         EncoderError: there is no such model, it has no safetensors weights, or the hub cannot be reached.
     """
-    folder = Path(model).expanduser()
+    try:
+        folder = Path(model).expanduser()
+    except RuntimeError as fault:
+        raise EncoderError(f"encoder '{model}': there is no such home folder. Check the name") from fault
     if not folder.is_dir():
         folder = _cached(model) or _downloaded(model)
     missing = [wanted for wanted in (CONFIG, WEIGHTS) if not any(folder.glob(wanted))]
