@@ -12,7 +12,7 @@ from PIL import Image
 from clearway.errors import ClearwayError
 from clearway.evaluate import single
 from clearway.scenes.scene import encoder_names
-from clearway.scenes.targets import ZHU_TARGETS
+from clearway.scenes.targets import default_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
 TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl", "shortest_path_steps"}
@@ -97,17 +97,17 @@ def test_the_run_keeps_what_the_command_line_asked_for(trained):
     learner = record["learner"]
     assert (learner["envs"], learner["width"], learner["clip_rewards"], learner["frames"]) == (20, 16, True, 640)
     (scene,) = record["scenes"]
-    assert tuple(scene["targets"]) == ZHU_TARGETS["bathroom_02"]  # nobody named any
+    assert tuple(scene["targets"]) == default_targets(read_scene(trained.scene))  # nobody named any
     assert Path(scene["path"]) == trained.scene.resolve()
 
 
-def test_evaluate_prints_the_agreed_json(evaluated):
+def test_evaluate_prints_the_agreed_json(evaluated, trained):
     answer, run = evaluated
     content = answer.json
     assert (answer.code, answer.err) == (0, "")
     assert {"targets", "scenes", "average"} <= content.keys()
     assert [(row["scene"], row["target"]) for row in content["targets"]] == [
-        ("bathroom_02", target) for target in ZHU_TARGETS["bathroom_02"]
+        ("bathroom_02", target) for target in default_targets(read_scene(trained.scene))
     ]
     for row in content["targets"]:
         assert row.keys() >= TARGET_KEYS

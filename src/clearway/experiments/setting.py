@@ -17,7 +17,7 @@ from clearway.perception import encode_scenes
 from clearway.reward import Reward
 from clearway.scenes.library import cached_room_scene
 from clearway.scenes.scene import Scene, encoder_names
-from clearway.scenes.targets import ZHU_TARGETS, default_targets
+from clearway.scenes.targets import default_targets, is_published
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
 SCENES = "scenes"
@@ -53,7 +53,7 @@ class Setting:
     @property
     def original(self) -> bool:
         """The scenes are the ones that the paper used."""
-        return all(scene.name in ZHU_TARGETS for scene in self.scenes)
+        return all(map(is_published, self.scenes))
 
     @property
     def encoder(self) -> str:

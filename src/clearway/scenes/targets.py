@@ -15,6 +15,9 @@ ZHU_TARGETS: dict[str, tuple[int, ...]] = {
 }
 """State ids of the five targets a scene of the published dumps of those names (the paper's, too)."""
 
+ZHU_STATES = {"bathroom_02": 180, "bedroom_04": 408, "kitchen_02": 676, "living_room_08": 468}
+"""States of those dumps."""
+
 TARGETS_PER_SCENE = 5
 
 
@@ -50,8 +53,16 @@ def target_order(scene: Scene, seed: int = 0) -> tuple[int, ...]:
 
 
 def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
-    """Zhu's targets for a scene of one of the four published names and sizes, else five seeded ones."""
-    published = ZHU_TARGETS.get(scene.name)
-    if published and max(published) < scene.state_count:
-        return published
-    return seeded_targets(scene, min(TARGETS_PER_SCENE, scene.state_count - 1), seed)
+    """Zhu's targets for a scene of one of the four published names and sizes, else five seeded ones.
+
+    Fewer than five where the scene's largest component has no more states.
+    """
+    if is_published(scene):
+        return ZHU_TARGETS[scene.name]
+    most = int((scene.components == 0).sum()) - 1
+    return seeded_targets(scene, min(TARGETS_PER_SCENE, most), seed)
+
+
+def is_published(scene: Scene) -> bool:
+    """Whether a scene has the name and the size of one of the four published dumps."""
+    return ZHU_STATES.get(scene.name) == scene.state_count
