@@ -122,12 +122,13 @@ def pose_quirks(scene: Scene) -> list[str]:
     """What is odd about where the states lie and look, one sentence each; empty for a regular scene."""
     found = []
     turn_deg = scene.turn_deg
-    if np.any(scene.headings_deg % turn_deg):
+    rounded_deg = 0.0 if turn_deg.is_integer() else 0.5  # headings are whole degrees
+    if np.any(np.abs((scene.headings_deg + turn_deg / 2) % turn_deg - turn_deg / 2) > rounded_deg):
         found.append(f"some headings are no multiples of {turn_deg:g} degrees")
     turned = {turn: scene.graph[:, turn] for turn in TURNS}
     for turn, right_deg in zip(TURNS, (turn_deg, -turn_deg), strict=True):
-        change_deg = (scene.headings_deg[turned[turn]] - scene.headings_deg) % 360
-        found += _quirk(change_deg != right_deg % 360, f"a {_words(turn)} changes the heading by {right_deg:g}")
+        off_deg = (scene.headings_deg[turned[turn]] - scene.headings_deg - right_deg + 180) % 360 - 180
+        found += _quirk(np.abs(off_deg) > 2 * rounded_deg, f"a {_words(turn)} changes the heading by {right_deg:g}")
         far_m = np.abs(scene.locations_m[turned[turn]] - scene.locations_m).max(axis=1)
         found += _quirk(far_m > 0.1 * scene.cell_size_m, f"a {_words(turn)} keeps the location")
     for move, sign in zip(MOVES, (1, -1), strict=True):

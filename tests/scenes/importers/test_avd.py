@@ -139,3 +139,11 @@ def test_pictures_outside_the_folder_are_refused(tmp_path: Path) -> None:
     assert (folder / "jpg_rgb" / "../elsewhere" / picture_name(0, 0)).exists()
     with pytest.raises(SceneError, match="which is no file in jpg_rgb"):
         read_avd(folder)
+
+
+def test_a_stray_picture_does_not_drop_the_circle_that_it_turns_into(tmp_path: Path) -> None:
+    stray = {**annotations()[picture_name(0, 3)], "forward": "", "backward": ""}
+    folder = made_folder(tmp_path / "home", {"stray.jpg": stray, **annotations()})
+    with pytest.warns(SceneWarning, match="1 of 37 pictures are left out"):
+        scene = read_avd(folder, height_px=18)
+    assert (scene.state_count, scene.cell_count) == (36, 3)

@@ -1,5 +1,6 @@
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -159,3 +160,27 @@ def test_deep_pictures_are_refused_not_made_white(tmp_path: Path, mode: str, val
     Image.new(mode, (40, 30), value).save(path)
     with pytest.raises(SceneError, match=r"deep\.tiff: has more than 8 bits a channel \(mode .*Save it with 8 bits"):
         photographs.photographs([path])
+
+
+def test_blank_lines_count_where_a_line_is_named(tmp_path: Path) -> None:
+    table, _ = photographed(tmp_path)
+    lines = table.read_text().splitlines()
+    table.write_text("\n".join([lines[0], "", "", *lines[1:5], "", "photos/gone.png,0,0,0"]))
+    with pytest.raises(SceneError, match=r"line 9 names 'photos/gone\.png'"):
+        read_images(table, step_m=0.5)
+    table.write_text("\n".join([lines[0], "", "photos/0-0.png,0,0"]))
+    with pytest.raises(SceneError, match="line 3 has fewer values"):
+        read_images(table, step_m=0.5)
+
+
+@pytest.mark.parametrize("count", [7, 16])
+def test_headings_that_are_no_whole_degrees_are_no_quirk(tmp_path: Path, count: int) -> None:
+    rows: list[Row] = [["file", "x", "z", "heading"]]
+    Image.new("RGB", (4, 3)).save(tmp_path / "a.png")
+    rows += [["a.png", 0, z, 360 * n / count] for z in (0, 0.5) for n in range(count)]
+    scene = read_images(write_csv(tmp_path / "poses.csv", rows), step_m=0.5)
+    assert pose_quirks(scene) == []
+    turned = replace(scene, headings_deg=np.roll(scene.headings_deg, 1))
+    assert len(pose_quirks(turned)) > 0
+    off = replace(scene, headings_deg=(scene.headings_deg + 2) % 360)
+    assert any("no multiples" in quirk for quirk in pose_quirks(off))

@@ -105,11 +105,14 @@ def _circles(links: Mapping[str, Mapping[Action, str]], path: Path) -> list[list
             seen.add(picture)
             circle.append(picture)
             picture = links[picture][Action.TURN_RIGHT]
+        turned_to = circle.index(picture) if picture in circle else len(circle)
+        left_out += turned_to  # a picture whose right turn leads into a circle is not part of it
+        circle = circle[turned_to:]
         back = all(
             links[right].get(Action.TURN_LEFT) == left
             for left, right in zip(circle, circle[1:] + circle[:1], strict=True)
         )
-        if picture == first and back and len(circle) >= MIN_HEADINGS:
+        if back and len(circle) >= MIN_HEADINGS:
             circles.append(circle)
         else:
             left_out += len(circle)

@@ -50,12 +50,12 @@ def read_images(
     if not 0 < step_m < math.inf:
         raise SceneError(table, f"a step of {step_m} m", "Give a length above 0")
     rows = _rows(table, POSE_COLUMNS)
-    paths = tuple(_picture_path(table, number, row[0]) for number, row in enumerate(rows, 2))
-    numbers = np.array([_numbers(table, number, row[1:]) for number, row in enumerate(rows, 2)])
+    paths = tuple(_picture_path(table, number, row[0]) for number, row in rows)
+    numbers = np.array([_numbers(table, number, row[1:]) for number, row in rows])
     locations_m, headings_deg = numbers[:, :2], numbers[:, 2] % 360
     edges = None
     if blocked is not None:
-        lines = enumerate(_rows(blocked, EDGE_COLUMNS), 2)
+        lines = _rows(blocked, EDGE_COLUMNS)
         edges = np.array([_numbers(blocked, number, row) for number, row in lines]).reshape(-1, 2, 2)
     graph = recorded_pose_graph(locations_m, headings_deg, step_m, blocked_edges=edges, source=blocked or table)
     scene = Scene(
@@ -72,26 +72,27 @@ def read_images(
     return scene
 
 
-def _rows(path: Path, columns: tuple[str, ...]) -> list[list[str]]:
-    """The columns of a CSV file, in this order, without its first line."""
+def _rows(path: Path, columns: tuple[str, ...]) -> list[tuple[int, list[str]]]:
+    """The columns of a CSV file, in this order, without its first line; with the number of each line."""
     if not path.is_file():
         raise SceneError(path, "there is no such file", "Check the path")
     if path.stat().st_size > MAX_TABLE_BYTES:
         raise SceneError(path, f"is larger than {MAX_TABLE_BYTES >> 20} MiB", "Give a table of poses")
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            lines = [line for line in csv.reader(file) if line]
+            reader = csv.reader(file)
+            lines = [(reader.line_num, line) for line in reader if line]
     except (UnicodeDecodeError, csv.Error) as fault:
         raise SceneError(path, f"is no CSV file ({fault})", "Save it as comma-separated text in UTF-8") from fault
-    head = [word.strip().lower() for word in lines[0]] if lines else []
+    head = [word.strip().lower() for word in lines[0][1]] if lines else []
     lacking = [column for column in columns if column not in head]
     if lacking:
         raise SceneError(path, f"lacks the column {lacking[0]}", f"Head it with {','.join(columns)}")
     places = [head.index(column) for column in columns]
-    short = next((number for number, line in enumerate(lines[1:], 2) if len(line) < len(head)), None)
+    short = next((number for number, line in lines[1:] if len(line) < len(head)), None)
     if short is not None:
         raise SceneError(path, f"line {short} has fewer values than columns", f"Give all of {', '.join(columns)}")
-    rows = [[line[place].strip() for place in places] for line in lines[1:]]
+    rows = [(number, [line[place].strip() for place in places]) for number, line in lines[1:]]
     if not 1 <= len(rows) <= MAX_STATES:
         raise SceneError(path, f"has {len(rows)} rows, expected 1 to {MAX_STATES}", "Give one row a pose or edge")
     return rows
