@@ -26,6 +26,7 @@ class StandIn:
         self.refuse: Callable[[dict], bool] = lambda words: False
         self.move: Callable[[dict], None] = lambda agent: None
         self.stopped = False
+        self.screen = (16, 12)
 
     def step(self, action: str, **words: Any) -> object:
         if action == "GetReachablePositions":
@@ -51,8 +52,8 @@ class StandIn:
                 "lastAction": action,
                 "lastActionSuccess": success,
                 "errorMessage": "",
-                "screenWidth": 16,
-                "screenHeight": 12,
+                "screenWidth": self.screen[0],
+                "screenHeight": self.screen[1],
                 "colors": [],
                 "objects": [],
                 **more,
@@ -114,6 +115,23 @@ def test_no_positions_or_no_teleport_is_said() -> None:
     simulator = StandIn()
     simulator.refuse = lambda words: True
     with pytest.raises(SceneError, match="no teleport to any of 4 positions succeeded"):
+        photographed(simulator, "FloorPlan1", step_m=STEP_M)
+
+
+@pytest.mark.parametrize(
+    ("screen", "cells", "problem"),
+    [
+        ((400, 3_000), CELLS, "pictures of 400 x 3000 pixels, expected sides of 1 to 2048"),
+        ((2_048, 2_048), [(0, z) for z in range(100)], "400 pictures of 2048 x 2048 pixels take 4800 MiB"),
+    ],
+)
+def test_pictures_that_are_too_large_are_refused_before_any_teleport(
+    screen: tuple[int, int], cells: list[tuple[int, int]], problem: str
+) -> None:
+    simulator = StandIn(cells)
+    simulator.screen = screen
+    simulator.refuse = lambda words: pytest.fail("teleported")
+    with pytest.raises(SceneError, match=problem):
         photographed(simulator, "FloorPlan1", step_m=STEP_M)
 
 

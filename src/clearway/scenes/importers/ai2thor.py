@@ -17,6 +17,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.progress import picture_progress
+from clearway.scenes.importers.limits import check_picture_count, check_picture_size
 from clearway.scenes.importers.pose_graph import recorded_pose_graph
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import MAX_STATES, SceneWarning, check_scene
@@ -72,7 +73,8 @@ def photographed(controller: Controller, name: str, *, step_m: float, progress: 
         progress: show a progress bar, if standard error is a terminal.
 
     Raises:
-        SceneError: the simulator names no positions or too many, or no location can be photographed.
+        SceneError: the simulator names no positions or too many, its pictures are too large, or no location can be
+            photographed.
 
     Warns:
         SceneWarning: locations are left out because a teleport to them failed.
@@ -118,6 +120,9 @@ def _reachable(controller: Controller, name: str) -> list[dict[str, float]]:
     if not positions or len(positions) > most:
         problem = f"the simulator names {len(positions or ())} reachable positions, expected 1 to {most}"
         raise SceneError(name, problem, "Give another step")
+    height_px, width_px = event.metadata["screenHeight"], event.metadata["screenWidth"]
+    check_picture_size(name, height_px, width_px)
+    check_picture_count(name, len(positions) * len(HEADINGS_DEG), height_px, width_px, "Give a larger step")
     return sorted(positions, key=lambda position: (position["x"], position["z"]))
 
 
