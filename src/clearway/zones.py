@@ -19,11 +19,9 @@ import numpy as np
 
 from clearway.choices import ZoneLevel
 from clearway.errors import ClearwayError
-from clearway.scenes.actions import BLOCKED, Action
+from clearway.scenes.actions import BLOCKED, MOVES
 from clearway.scenes.graph import next_states
 from clearway.scenes.scene import Scene
-
-MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
 
 
 class Zone(IntEnum):

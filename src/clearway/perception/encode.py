@@ -64,11 +64,6 @@ def find_record(
     return _standing_in(_fitted(scenes, seed, shape, preprocessing))
 
 
-def get_encoder(name: str, scenes: Sequence[Scene], *, seed: int = 0) -> Encoder:
-    """The encoder that a user asks for by name, loaded; see `find_record` for arguments, errors and warnings."""
-    return encoder_from_record(find_record(name, scenes, seed=seed))
-
-
 def encoder_from_record(record: EncoderRecord) -> Encoder:
     """Make the encoder again that made a scene's features.
 

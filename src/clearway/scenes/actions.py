@@ -17,3 +17,5 @@ class Action(IntEnum):
 ACTION_COUNT = len(Action)
 ACTION_NAMES = ("move forward", "turn right", "turn left", "move backward")
 BLOCKED = -1  # in a graph: the move is blocked and the agent stays where it is
+MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
+TURNS = (Action.TURN_RIGHT, Action.TURN_LEFT)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
+from clearway.scenes.actions import ACTION_COUNT, BLOCKED, MOVES, TURNS, Action
 from clearway.scenes.graph import turn_counts
 from clearway.scenes.scene import Observations, Scene
 
@@ -22,8 +22,6 @@ MIN_HEADINGS, MAX_HEADINGS = 3, 360
 MAX_PICTURE_SIDE = 2_048  # pixels
 MAX_COORDINATE_M = 10_000.0
 MIN_CELL_SIZE_M = 1e-3
-TURNS = (Action.TURN_RIGHT, Action.TURN_LEFT)
-MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
 CHECK_THE_MAKER = "Make the scene again, or check the program that made it"
 
 
