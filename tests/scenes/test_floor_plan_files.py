@@ -1,5 +1,6 @@
 """The same plans read from every kind of file, and files that are none."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -142,3 +143,22 @@ def test_a_damaged_archive_is_one_clear_error_or_the_same_plan(tmp_path: Path) -
         except SceneError:
             refused += 1
     assert refused > 100
+
+
+def test_an_archive_is_opened_twice_however_many_plans_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "many.npz"
+    np.savez(path, **{f"plan{number}": np.ones((2, 2 + number), bool) for number in range(9)})
+    opened = []
+
+    class Counted(zipfile.ZipFile):
+        def __init__(self, *words: object) -> None:
+            opened.append(words)
+            super().__init__(*words)
+
+    monkeypatch.setattr(floor_plan_files.zipfile, "ZipFile", Counted)
+    plans = floor_plan_files.read_floor_plans(path)
+    assert [(plan.name, len(plan.cells)) for plan in plans] == [(f"plan{n}", 2 * (2 + n)) for n in range(9)]
+    assert len(opened) == 2
+    assert [plan.name for plan in floor_plan_files.read_floor_plans(path, ("plan7", "plan1"))] == ["plan7", "plan1"]

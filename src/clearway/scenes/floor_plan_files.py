@@ -16,8 +16,8 @@ import re
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -65,14 +65,36 @@ def read_floor_plan(path: Path, name: str | None = None, *, cell_size_m: float =
     names = floor_plan_names(path)
     if name is None and len(names) > 1:
         raise SceneError(path, f"holds {len(names)} plans", f"Name one of {_listed(names)}")
-    chosen = names[0] if name is None else name
+    (plan,) = read_floor_plans(path, names[:1] if name is None else (name,), cell_size_m=cell_size_m)
+    return plan
+
+
+def read_floor_plans(path: Path, names: Sequence[str] = (), *, cell_size_m: float = CELL_SIZE_M) -> list[FloorPlan]:
+    """Several plans from a file, which is opened once; all of them where no names are given.
+
+    Raises:
+        SceneError: see `read_floor_plan`.
+    """
+    held = floor_plan_names(path)
+    with ExitStack() as stack:
+        archive = None
+        if path.suffix == ".npz":
+            with _faults_named(path):
+                archive = stack.enter_context(zipfile.ZipFile(path))
+        return [_read_plan(path, archive, name, held, cell_size_m) for name in names or held]
+
+
+def _read_plan(
+    path: Path, archive: zipfile.ZipFile | None, chosen: str, names: tuple[str, ...], cell_size_m: float
+) -> FloorPlan:
+    """A plan from a text file, or from an archive of arrays."""
     if chosen not in names:
         raise SceneError(path, f"holds no plan named {chosen}", f"Name one of {_listed(names)}")
     if not PLAIN_NAME.fullmatch(chosen):
         remedy = "Use letters, digits, spaces, points and dashes alone"
         raise SceneError(path, f"the plan's name {chosen[:100]!r} is no name for a file", remedy)
-    if path.suffix == ".npz":
-        values, dataset = _read_array(path, chosen), chosen
+    if archive is not None:
+        values, dataset = _read_array(path, archive, chosen), chosen
     else:
         text, dataset = _read_text(path), ""
         values = _csv_values(path, text) if path.suffix == ".csv" else _character_map(path, text)
@@ -106,9 +128,9 @@ def _faults_named(path: Path, dataset: str = "") -> Iterator[None]:
         raise SceneError(path, f"cannot be read ({reason})", remedy, dataset) from fault
 
 
-def _read_array(path: Path, name: str) -> np.ndarray:
+def _read_array(path: Path, archive: zipfile.ZipFile, name: str) -> np.ndarray:
     """An array of a .npz file; pickled objects are refused."""
-    with _faults_named(path, name), zipfile.ZipFile(path) as archive:
+    with _faults_named(path, name):
         member = archive.getinfo(name + NPY)
         if member.file_size > MAX_BYTES:
             raise ValueError(f"it would unpack to more than {MAX_BYTES >> 20} MiB")

@@ -42,11 +42,10 @@ class ImportFloorPlan:
 
     def run(self) -> None:
         """Make and write."""
-        from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
+        from clearway.scenes.floor_plan_files import read_floor_plans
         from clearway.scenes.floor_plans import floor_plan_scene
 
-        names = self.name or floor_plan_names(self.file)
-        plans = [read_floor_plan(self.file, name, cell_size_m=self.cell_size) for name in names]
+        plans = read_floor_plans(self.file, self.name, cell_size_m=self.cell_size)
         if self.features is None:
             self._render(plans)
             return
