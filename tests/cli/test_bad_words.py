@@ -150,8 +150,10 @@ def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
 
 def test_a_scene_is_not_written_over_by_a_map_or_an_exported_agent(clearway, trained):
     before = trained.scene.read_bytes()
-    clearway("scenes", "inspect", trained.scene, "--map", trained.scene).refusal(".h5", "ends in .png", "--map")
-    clearway("export", trained.run, "--no-encoder", "--out", trained.scene).refusal(".h5", "ends in .onnx", "--out")
+    assert clearway("scenes", "inspect", trained.scene, "--map", trained.scene).refusal(".h5", "ends in .png", "--map")
+    assert clearway("export", trained.run, "--no-encoder", "--out", trained.scene).refusal(
+        ".h5", "ends in .onnx", "--out"
+    )
     assert trained.scene.read_bytes() == before
 
 
@@ -171,18 +173,20 @@ def test_flags_of_encoding_need_something_to_encode(clearway, dump, tmp_path, wo
 
 
 def test_flags_of_the_live_evaluation_that_say_nothing(clearway, trained):
-    clearway("evaluate", trained.run, "--live", "--strengths", "0.25").refusal("--strengths", "Add --sweep")
-    clearway("evaluate", trained.run, "--live", "--targets").refusal("--targets", "Leave it out with --live")
-    clearway("evaluate", trained.run, "--selection", "argmax").refusal("--selection", "need --live")
+    assert clearway("evaluate", trained.run, "--live", "--strengths", "0.25").refusal("--strengths", "Add --sweep")
+    assert clearway("evaluate", trained.run, "--live", "--targets").refusal("--targets", "Leave it out with --live")
+    assert clearway("evaluate", trained.run, "--selection", "argmax").refusal("--selection", "need --live")
 
 
 @pytest.mark.parametrize(
     ("kind", "what"), [("savn", "folder"), ("avd", "folder"), ("ai2thor", "room"), ("miniworld", "environment")]
 )
 def test_imports_of_nothing(clearway, tmp_path, kind, what):
-    clearway("scenes", "import", kind, "--out", tmp_path / "out").refusal(f"no {what} given. Name at least one")
+    assert clearway("scenes", "import", kind, "--out", tmp_path / "out").refusal(f"no {what} given. Name at least one")
 
 
 def test_a_scene_is_no_run_and_a_folder_no_scene(clearway, trained, tmp_path):
-    clearway("evaluate", trained.scene).refusal(str(trained.scene), "no run here")
-    clearway("scenes", "export", trained.scene.parent, "--out", tmp_path / "x.h5").refusal("a folder. Name one scene")
+    assert clearway("evaluate", trained.scene).refusal(str(trained.scene), "no run here")
+    assert clearway("scenes", "export", trained.scene.parent, "--out", tmp_path / "x.h5").refusal(
+        "a folder. Name one scene"
+    )
