@@ -1,5 +1,6 @@
 """What holds for every command: help, start-up, exit codes, warnings."""
 
+import errno
 import os
 import re
 import resource
@@ -194,3 +195,11 @@ def test_what_cannot_be_printed_is_told_in_one_line_or_let_be(trained, into, cod
     done = subprocess.run(["bash", "-c", line], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
     assert done.returncode == code, done.stderr
     assert told in done.stderr and len(done.stderr.splitlines()) == bool(told)
+
+
+def test_a_pipe_broken_elsewhere_is_no_success(clearway, trained, monkeypatch):
+    def broken(*_, **__):
+        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+
+    monkeypatch.setattr(Inspect, "run", broken)
+    assert clearway("scenes", "inspect", trained.scene).refusal("Broken pipe")

@@ -6,6 +6,7 @@ Exit codes: 0 success; 2 bad input, with one line that says what, where and the 
 from __future__ import annotations
 
 import os
+import select
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -95,10 +96,11 @@ def _exit_code(words: Sequence[str]) -> int:
         sys.stdout.flush()  # here, where it can still be told that nothing could be written
     except ClearwayError as error:
         return _refused(str(error))
-    except BrokenPipeError:  # whoever reads has had enough
-        _print_no_more()
     except OSError as error:
-        _print_no_more()
+        left = isinstance(error, BrokenPipeError) and _reader_has_left()
+        _drop_unprinted()
+        if left:
+            return 0
         where = f"{error.filename}: " if error.filename else ""
         return _refused(f"{where}{error.strerror or error}. Check the path, its permissions and the space left")
     except KeyboardInterrupt:
@@ -107,8 +109,18 @@ def _exit_code(words: Sequence[str]) -> int:
     return 0
 
 
-def _print_no_more() -> None:
-    """Drop what standard output still holds, which could not be written, if it could not."""
+def _reader_has_left() -> bool:
+    """Standard output is a pipe that nobody reads any more."""
+    try:
+        watched = select.poll()
+        watched.register(sys.stdout.fileno(), 0)
+        return any(event & select.POLLERR for _, event in watched.poll(0))
+    except (AttributeError, OSError):  # no such call, or no file behind it
+        return False
+
+
+def _drop_unprinted() -> None:
+    """Drop what standard output holds and cannot be written."""
     try:
         sys.stdout.flush()
     except OSError:
