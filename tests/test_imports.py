@@ -8,7 +8,7 @@ import pytest
 import clearway
 
 ORDER = (
-    {"version", "errors", "choices", "files", "colours", "progress", "children", "ray_cluster"},
+    {"version", "errors", "choices", "files", "markdown", "colours", "progress", "children", "ray_cluster"},
     {"scenes"},
     {"perception"},
     {"zones"},

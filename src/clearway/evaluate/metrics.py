@@ -8,8 +8,9 @@ Axis letters: N episodes, J metrics, M targets, C scenes, R resamples.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -18,7 +19,17 @@ from clearway.zones import Zone
 
 SC_STEPS = 500
 SC_DETOUR = 4
-Column = Callable[[EpisodeTable], np.ndarray]
+
+
+class Episodes(Protocol):
+    """A table of N episodes, on the grid or off it."""
+
+    def __len__(self) -> int:
+        """N."""
+
+
+Table = TypeVar("Table", bound=Episodes)
+Column = Callable[[Table], np.ndarray]
 
 
 def steps(table: EpisodeTable) -> np.ndarray:
@@ -71,7 +82,7 @@ def looped(table: EpisodeTable) -> np.ndarray:
     return table.looped.astype(np.float64)
 
 
-def _steps_in(zone: Zone) -> Column:
+def _steps_in(zone: Zone) -> Column[EpisodeTable]:
     return lambda table: table.zone_steps[:, zone]
 
 
@@ -79,19 +90,19 @@ def _hundred_collisions(table: EpisodeTable) -> np.ndarray:
     return 100.0 * table.collisions
 
 
-def _one(table: EpisodeTable) -> np.ndarray:
+def _one(table: Episodes) -> np.ndarray:
     return np.ones(len(table))
 
 
 @dataclass(frozen=True)
-class Metric:
+class Metric(Generic[Table]):
     """A target's value is sum(numerator) / sum(denominator) over its episodes; over 1 each it is a mean."""
 
-    numerator: Column
-    denominator: Column = _one
+    numerator: Column[Table]
+    denominator: Column[Table] = _one
 
 
-METRICS: dict[str, Metric] = {
+METRICS: dict[str, Metric[EpisodeTable]] = {
     "steps": Metric(steps),
     "shortest_path_steps": Metric(shortest_path_steps),
     "path_ratio": Metric(steps, shortest_path_steps),
@@ -113,17 +124,21 @@ METRICS: dict[str, Metric] = {
 METRIC_NAMES = tuple(METRICS)
 
 
-def columns(table: EpisodeTable) -> tuple[np.ndarray, np.ndarray]:
-    """Numerators and denominators of all metrics, two (N, J) float64 arrays in the order of METRIC_NAMES."""
-    numerator = np.stack([metric.numerator(table) for metric in METRICS.values()], axis=1)
-    denominator = np.stack([metric.denominator(table) for metric in METRICS.values()], axis=1)
+def columns(table: Table, metrics: Mapping[str, Metric[Table]]) -> tuple[np.ndarray, np.ndarray]:
+    """Numerators and denominators of the metrics, two (N, J) float64 arrays."""
+    numerator = np.stack([metric.numerator(table) for metric in metrics.values()], axis=1)
+    denominator = np.stack([metric.denominator(table) for metric in metrics.values()], axis=1)
     return numerator.astype(np.float64), denominator.astype(np.float64)
 
 
 def by_target(table: EpisodeTable, target_count: int) -> np.ndarray:
-    """Value of every metric for each target, (M, J) float64."""
-    numerator, denominator = columns(table)
-    return _sums(numerator, table.target, target_count) / _sums(denominator, table.target, target_count)
+    """Value of every metric of METRICS for each target, (M, J) float64."""
+    return quotients(*columns(table, METRICS), table.target, target_count)
+
+
+def quotients(numerator: np.ndarray, denominator: np.ndarray, target: np.ndarray, target_count: int) -> np.ndarray:
+    """Sums of the numerators (N, J) by those of the denominators (N, J) over the episodes of each target, (M, J)."""
+    return _sums(numerator, target, target_count) / _sums(denominator, target, target_count)
 
 
 def by_scene(target_values: np.ndarray, target_scene: np.ndarray) -> np.ndarray:

@@ -148,7 +148,7 @@ def summarise(world: World, table: EpisodeTable, agent: str, encoder: str, proto
     target_scene = world.target_scene.cpu().numpy()
     per_target = metrics.by_target(table, world.target_count)
     per_scene = metrics.by_scene(per_target, target_scene)
-    drawn = bootstrap.resampled_by_target(*metrics.columns(table), table.target, seed=protocol.seed)
+    drawn = bootstrap.resampled_by_target(*metrics.columns(table, metrics.METRICS), table.target, seed=protocol.seed)
     drawn_by_scene = metrics.by_scene(drawn, target_scene)
 
     names = world.scene_names

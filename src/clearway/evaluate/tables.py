@@ -6,12 +6,13 @@ A target that was not reached in every episode is marked, and so is every row of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT
 from clearway.evaluate.report import Evaluation, Result
+from clearway.markdown import table_lines
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -114,8 +115,7 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, w
 def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all") -> str:
     """The table in Markdown, its notes under it."""
     table = table_text(evaluations, level, width=width)
-    lines = [_pipes(table.headings), _pipes("---" for _ in table.headings)]
-    lines += [_pipes(_one_line(cell) for cell in row) for row in table.rows]
+    lines = table_lines(table.headings, [[_one_line(cell) for cell in row] for row in table.rows])
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"
 
 
@@ -192,7 +192,3 @@ def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
 def _one_line(cell: Cell) -> str:
     text = f"**{cell.text}**" if cell.failed else cell.text
     return f"{text} ({cell.below})" if cell.below else text
-
-
-def _pipes(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(cells) + " |"

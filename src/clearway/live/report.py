@@ -9,13 +9,13 @@ Axis letters: N episodes, J metrics, M targets, R resamples.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from clearway.evaluate import bootstrap
-from clearway.evaluate.metrics import average, by_scene
+from clearway.evaluate.metrics import Metric, average, by_scene, columns, quotients
 from clearway.live.episodes import STEP_S, LiveTable
 from clearway.live.settings import Perturbations
 
@@ -27,26 +27,22 @@ def _seconds(table: LiveTable) -> np.ndarray:
     return table.steps * STEP_S
 
 
-def _ones(table: LiveTable) -> np.ndarray:
-    return np.ones(len(table))
-
-
-METRICS: dict[str, tuple[Callable[[LiveTable], np.ndarray], Callable[[LiveTable], np.ndarray]]] = {
-    "success": (lambda table: table.reached, _ones),
-    "steps": (lambda table: table.steps, _ones),
-    "shortest_path_steps": (lambda table: table.shortest_path_steps, _ones),
-    "contacts": (lambda table: table.contacts, _ones),
-    "contacts_per_100_steps": (lambda table: 100 * table.contacts, lambda table: table.steps),
-    "contact_free": (lambda table: table.contacts == 0, _ones),
-    "min_clearance_m": (lambda table: table.least_gap_m, _ones),
-    "mean_clearance_m": (lambda table: table.mean_gap_m * _seconds(table), _seconds),
-    "within_10cm_s": (lambda table: table.close_s, _ones),
-    "within_30cm_s": (lambda table: table.near_s, _ones),
-    "share_within_10cm": (lambda table: table.close_s, _seconds),
-    "share_within_30cm": (lambda table: table.near_s, _seconds),
-    "rearranged": (lambda table: table.changed, _ones),
+METRICS: dict[str, Metric[LiveTable]] = {
+    "success": Metric(lambda table: table.reached),
+    "steps": Metric(lambda table: table.steps),
+    "shortest_path_steps": Metric(lambda table: table.shortest_path_steps),
+    "contacts": Metric(lambda table: table.contacts),
+    "contacts_per_100_steps": Metric(lambda table: 100 * table.contacts, lambda table: table.steps),
+    "contact_free": Metric(lambda table: table.contacts == 0),
+    "min_clearance_m": Metric(lambda table: table.least_gap_m),
+    "mean_clearance_m": Metric(lambda table: table.mean_gap_m * _seconds(table), _seconds),
+    "within_10cm_s": Metric(lambda table: table.close_s),
+    "within_30cm_s": Metric(lambda table: table.near_s),
+    "share_within_10cm": Metric(lambda table: table.close_s, _seconds),
+    "share_within_30cm": Metric(lambda table: table.near_s, _seconds),
+    "rearranged": Metric(lambda table: table.changed),
 }
-"""A target's value is the sum of the first over its episodes by that of the second; docs/metrics.md explains each."""
+"""docs/metrics.md explains each."""
 
 COMPARED = ("success", "contacts", "min_clearance_m", "mean_clearance_m", "share_within_10cm", "share_within_30cm")
 
@@ -136,12 +132,8 @@ def summarise(
 
 def _agent_columns(tables: Sequence[LiveTable]) -> tuple[np.ndarray, np.ndarray]:
     """Numerators and denominators of all metrics, two (N, J) arrays."""
-    columns = [np.concatenate([_columns(table, part) for table in tables]) for part in (0, 1)]
-    return columns[0], columns[1]
-
-
-def _columns(table: LiveTable, part: int) -> np.ndarray:
-    return np.stack([metric[part](table) for metric in METRICS.values()], axis=1).astype(np.float64)
+    numerators, denominators = zip(*(columns(table, METRICS) for table in tables), strict=True)
+    return np.concatenate(numerators), np.concatenate(denominators)
 
 
 def _places(tables: Sequence[LiveTable]) -> tuple[np.ndarray, np.ndarray]:
@@ -161,10 +153,7 @@ def _figures(
 ) -> Figures:
     """Averages over scenes of columns (N, J) by name, with their intervals."""
     target, scene_of_target = places
-    total = [np.zeros((len(scene_of_target), numerator.shape[1])) for _ in range(2)]
-    for sums, column in zip(total, (numerator, denominator), strict=True):
-        np.add.at(sums, target, column)
-    value = average(by_scene(total[0] / total[1], scene_of_target))
+    value = average(by_scene(quotients(numerator, denominator, target, len(scene_of_target)), scene_of_target))
     drawn = bootstrap.resampled_by_target(numerator, denominator, target, seed=seed)
     low, high = bootstrap.intervals(average(by_scene(drawn, scene_of_target)))
     ends = zip(low.tolist(), high.tolist(), strict=True)
@@ -176,8 +165,8 @@ def _compared(
 ) -> Comparison:
     """Paired by episode; for the metrics that are quotients, of the quotients of an episode."""
     chosen = [list(METRICS).index(name) for name in COMPARED]
-    columns = [_agent_columns(tables) for tables in (first_tables, second_tables)]
-    values = [(numerator / denominator)[:, chosen] for numerator, denominator in columns]
+    both = [_agent_columns(tables) for tables in (first_tables, second_tables)]
+    values = [(numerator / denominator)[:, chosen] for numerator, denominator in both]
     places = _places(first_tables)
     difference = values[1] - values[0]
     differences = _figures(COMPARED, difference, np.ones_like(difference), places, seed)

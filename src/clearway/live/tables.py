@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from clearway.live.episodes import SUCCESS_DEG, SUCCESS_M, LiveProtocol
 from clearway.live.report import Figures, LiveResult
+from clearway.markdown import table_lines
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -95,14 +96,9 @@ def markdown_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encod
 
 
 def _markdown(headings: Sequence[str], rows: Rows) -> list[str]:
-    lines = [_pipes(headings), _pipes(["---"] * len(headings))]
-    return lines + [
-        _pipes([label, name, *(f"{value} ({ends})" for value, ends in cells)]) for label, name, cells in rows
-    ]
-
-
-def _pipes(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
+    return table_lines(
+        headings, [[label, name, *(f"{value} ({ends})" for value, ends in cells)] for label, name, cells in rows]
+    )
 
 
 LABEL_WIDTH = 16

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.files import json_text, read_json, written_whole
+from clearway.markdown import table_lines
 from clearway.scenes.scene import Scene
 from clearway.viz.page_style import CSS
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
@@ -147,12 +148,9 @@ def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str],
 
 
 def _markdown_table(table: ReportTable) -> list[str]:
-    def pipes(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
-
-    rows = [pipes([value_text(value) for value in row]) for row in table.rows[:SHOWN_ROWS]]
-    notes = [note for note in (_folded(table), *table.notes) if note]
-    return [pipes(table.headings), pipes(["---"] * len(table.headings)), *rows, "", *(f"{n}  " for n in notes), ""]
+    rows = [[value_text(value) for value in row] for row in table.rows[:SHOWN_ROWS]]
+    notes = [f"{note}  " for note in (_folded(table), *table.notes) if note]
+    return [*table_lines(table.headings, rows), "", *notes, ""]
 
 
 # ---------------------------------------------------------------------------------------------------------------- HTML
