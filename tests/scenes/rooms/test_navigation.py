@@ -6,8 +6,7 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import Action
-from clearway.scenes.grid import pose_graph
-from clearway.scenes.rooms.navigation import find_grid, mean_degree, mean_shortest_path
+from clearway.scenes.rooms.navigation import find_grid
 from clearway.scenes.rooms.obstacles import AgentShape
 from small_rooms import SmallRoom
 
@@ -29,7 +28,7 @@ def test_empty_room_is_a_full_grid():
         [0.75, 0.25],
     ]
     assert grid.smallest_margin_m == pytest.approx(0.04)  # 0.25 - 0.2 radius - 0.01 clearance
-    assert mean_degree(grid.graph) == 3.0  # 24 edges, 16 cells
+    assert (len(grid.edges), len(grid.cells)) == (24, 16)
 
 
 def test_the_grid_starts_at_its_origin_whatever_multiple_of_the_step_is_given():
@@ -146,11 +145,6 @@ def test_four_right_turns_and_back_and_forth_return():
     went = moved >= 0
     np.testing.assert_array_equal(graph[moved[went], Action.MOVE_BACKWARD], states[went])
     np.testing.assert_array_equal(states[went] % 4, moved[went] % 4)
-
-
-def test_mean_shortest_path_of_one_cell():
-    graph = pose_graph(np.array([[0, 0]]), np.zeros((0, 2), np.int64))
-    assert mean_shortest_path(graph) == pytest.approx((1 + 2 + 1) / 3)
 
 
 def test_headings_turn_clockwise_seen_from_above():

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.graph import distances
 from clearway.scenes.grid import HEADING_COUNT, connected_parts, edges_among, neighbour_pairs, pose_graph
 from clearway.scenes.rooms.obstacles import MARGIN_REACH_M, AgentShape, CollisionRoom, Obstacles, collision_model
 
@@ -127,18 +125,6 @@ def grid_on_floor(
         component_sizes=sizes,
         smallest_margin_m=float(min(margins_m.min(), MARGIN_REACH_M)),
     )
-
-
-def mean_degree(graph: np.ndarray) -> float:
-    """Mean number of open neighbours of a cell, from a (4 C, A) graph of poses."""
-    return float(np.mean(graph[:, Action.MOVE_FORWARD] != BLOCKED) * HEADING_COUNT)
-
-
-def mean_shortest_path(graph: np.ndarray) -> float:
-    """Mean steps of the shortest path over all ordered pairs of distinct states of a connected graph."""
-    steps = distances(graph)
-    assert (steps >= 0).all(), "the graph is not connected"
-    return float(steps.sum() / (len(graph) * (len(graph) - 1)))
 
 
 def _grid_lines(floor: Floor, step_m: float) -> tuple[np.ndarray, np.ndarray]:
