@@ -1,12 +1,15 @@
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from clearway.evaluate.episode_files import read_episodes, write_episodes
 from clearway.experiments import convergence
 from clearway.experiments.convergence import mark_steps, settled_row, settling
 from clearway.experiments.fig4 import jobs
 from clearway.experiments.groups import PAIR, compared
-from clearway.experiments.job import do, run_folder
+from clearway.experiments.job import do, run_folder, trial_path
 from clearway.experiments.setting import Setting
 from small_setting import small_setting
 
@@ -59,11 +62,21 @@ def test_the_mark_is_twice_the_shortest_paths(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Setting:
-    """The small setting, figure 4's jobs done."""
+    """The small setting, figure 4's jobs done; as if every episode had reached its target."""
     setting = small_setting(tmp_path_factory.mktemp("reproduction"))
     for job in jobs(setting):
         do(setting.out, job, threads=1)
+        for trial in job.trials:
+            tell_reached(trial_path(setting.out, job.run, trial), True)
     return setting
+
+
+def tell_reached(path: Path, last: bool) -> None:
+    """Write a trial anew: every episode reached its target, the last one if `last`."""
+    table, about = read_episodes(path)
+    reached = np.ones(len(table), bool)
+    reached[-1] = last
+    write_episodes(path, replace(table, reached=reached), about)
 
 
 @pytest.mark.parametrize(("detour", "settled"), [(1e6, 2), (1e-6, 0)])
@@ -80,3 +93,13 @@ def test_runs_that_never_settle_count_with_all_frames(
         assert named["frames"] == pytest.approx(sum(first if settled else whole) / 2)
     assert [claim.text.split(":")[0] for claim in claims] == ["published", "default"]
     assert settled or {claim.verdict for claim in claims} == {"undecided"}  # a tie decides nothing
+
+
+def test_a_run_that_misses_a_target_in_the_end_has_not_settled(done: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(convergence, "DETOUR", 1e6)
+    groups = compared(done, PAIR)
+    missed = trial_path(done.out, groups[0].runs[1], groups[0].trial)
+    tell_reached(missed, False)
+    table, _ = settling("fig4", done, groups)
+    tell_reached(missed, True)
+    assert [row[table.headings.index("settled")] for row in table.rows] == [1, 2, 2, 2]

@@ -2,7 +2,8 @@
 
 A curve says it better than a figure, but curves have no interval. The mark is twice the mean shortest path of the
 targets from all starts, so it depends on scenes and targets alone. A run that has not settled by its end counts with
-all its frames.
+all its frames; so does one whose agent then misses a target, since training's means are over episodes that ended, of
+which a lost target has few: A3C, whose workers keep theirs, looks settled with one of five lost.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from clearway.evaluate.across_seeds import mean_estimate
 from clearway.experiments.groups import Group
-from clearway.experiments.job import run_folder
+from clearway.experiments.job import episodes_of, run_folder
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import Claim, ReportTable, Value
 from clearway.experiments.setting import Setting
@@ -68,15 +69,19 @@ def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = 
     headings = ("learner", "agent", "seeds", "settled", "frames", "95 %")
     note = (
         f"Frames from which on training episodes take at most {mark:.3g} steps on average, {DETOUR:g} times the "
-        "shortest paths'. A run that never gets there counts with all its frames."
+        "shortest paths'. A run that never gets there, or fails a target in the end, counts with all its frames."
     )
     return ReportTable(f"{name}_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
 
 
 def _frames(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
     """Frames until each complete run of a group had settled (R, 1), and how many have."""
-    missing = group.missing(out)
-    runs = [run for run in group.runs if run.name not in missing]
-    rows = [settled_row(run_folder(out, run).metrics(), mark) for run in runs]
-    frames = [run.learner.frames if row is None else row["frames"] for run, row in zip(runs, rows, strict=True)]
-    return np.array(frames, dtype=np.float64).reshape(-1, 1), sum(row is not None for row in rows)
+    frames, settled = [], 0
+    for run in group.runs:
+        table = episodes_of(out, run, group.trial)
+        if table is None:
+            continue
+        row = settled_row(run_folder(out, run).metrics(), mark) if table.reached.all() else None
+        settled += row is not None
+        frames.append(run.learner.frames if row is None else row["frames"])
+    return np.array(frames, dtype=np.float64).reshape(-1, 1), settled
