@@ -154,6 +154,18 @@ def test_a_run_goes_on_only_when_asked_to(clearway, trained, small):
     assert clearway(*words, "--resume", "--seed", 7).refusal("another experiment")
 
 
+@pytest.mark.parametrize(("solved", "rows"), [(0, " --targets"), (5, "")])
+def test_training_ends_with_the_number_of_solved_targets(clearway, trained, small, tmp_path, solved, rows):
+    run = tmp_path / "run"
+    words = ("train", trained.scene, "--out", run, "--resume", *small)
+    assert clearway(*words).code == 0
+    metrics = run / "metrics.jsonl"
+    metrics.write_text(metrics.read_text().replace('"solved_targets": 0', f'"solved_targets": {solved}'))
+    assert clearway(*words).err.endswith(
+        f"{run}: trained, {solved} of 5 targets solved. Next: clearway evaluate {run}{rows}\n"
+    )
+
+
 def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):
     for name in ("one", "two"):
         dump(tmp_path / "scenes" / f"{name}.h5")

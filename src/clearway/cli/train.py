@@ -82,8 +82,10 @@ class Train:
             device=self.device,
             feature_store=self.feature_store,
         )
-        train(request, self.out, resume=self.resume, show_progress=True)
-        say(f"{self.out}: trained. Next: clearway evaluate {self.out}")
+        folder = train(request, self.out, resume=self.resume, show_progress=True)
+        solved, count = int(folder.metrics()[-1]["solved_targets"]), sum(map(len, request.targets.values()))
+        rows = "" if solved == count else " --targets"
+        say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{rows}")
 
     def _learner(self) -> Learner:
         learner = PRESETS[self.preset]
