@@ -164,6 +164,8 @@ def test_training_ends_with_the_number_of_solved_targets(clearway, trained, smal
     assert clearway(*words).err.endswith(
         f"{run}: trained, {solved} of 5 targets solved. Next: clearway evaluate {run}{rows}\n"
     )
+    metrics.unlink()
+    assert clearway(*words).err.endswith(f"{run}: trained. Next: clearway evaluate {run}\n")
 
 
 def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):

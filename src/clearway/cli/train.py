@@ -83,9 +83,13 @@ class Train:
             feature_store=self.feature_store,
         )
         folder = train(request, self.out, resume=self.resume, show_progress=True)
-        solved, count = int(folder.metrics()[-1]["solved_targets"]), sum(map(len, request.targets.values()))
-        rows = "" if solved == count else " --targets"
-        say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{rows}")
+        rows, count = folder.metrics(), sum(map(len, request.targets.values()))
+        if not rows:  # a finished run whose metrics.jsonl was removed
+            say(f"{self.out}: trained. Next: clearway evaluate {self.out}")
+            return
+        solved = int(rows[-1]["solved_targets"])
+        each = "" if solved == count else " --targets"
+        say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{each}")
 
     def _learner(self) -> Learner:
         learner = PRESETS[self.preset]
