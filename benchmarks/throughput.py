@@ -29,7 +29,8 @@ out where the device has no instructions for it.
 
 The share of the peak. The machine's speed may change from minute to minute, so each timing of a case stands between two
 of a matrix product of factors of its own dtype, of the size that was fastest at the start, and is divided by the faster
-of them; the share is the median of these.
+of them; the share is the median of these. Training makes one update after the other, so the update before the one that
+is timed is of the same case: it finds its weights in the caches as it would there, not another case's.
 
 The naive version is the same network in `nn.Linear` layers with autograd: every row's four feature vectors are copied
 side by side (8192 numbers), and the target's branch is computed for every row, as published code does. Its update
@@ -345,8 +346,9 @@ def matrix_peak(
 
 
 def measure(case: Case, device: str, size: int, peak_repeats: int) -> None:
-    """Time one update of a case between two measurements of the peak."""
+    """Time the second of two updates of a case between two measurements of the peak."""
     before = matrix_peak(device, (size,), peak_repeats, case.factors)[size]
+    case.update()
     case.seconds.append(timed(case.update, device))
     if case.gflop:
         after = matrix_peak(device, (size,), peak_repeats, case.factors)[size]

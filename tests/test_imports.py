@@ -8,7 +8,18 @@ import pytest
 import clearway
 
 ORDER = (
-    {"version", "errors", "choices", "files", "markdown", "colours", "progress", "children", "ray_cluster"},
+    {
+        "version",
+        "errors",
+        "choices",
+        "files",
+        "markdown",
+        "colours",
+        "progress",
+        "children",
+        "ray_cluster",
+        "torch_threads",
+    },
     {"scenes"},
     {"perception"},
     {"zones"},

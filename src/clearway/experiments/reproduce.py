@@ -19,6 +19,7 @@ from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting, prepare
 from clearway.files import read_json, written_whole
+from clearway.torch_threads import torch_threads
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,8 @@ def _question(request: ReproduceRequest) -> str:
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
-    sections = [EXPERIMENTS[name].section(setting) for name in request.names]
+    with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
+        sections = [EXPERIMENTS[name].section(setting) for name in request.names]
     return Reproduction(tuple(request.commands), setting, planned(setting, request.names), sections)
 
 

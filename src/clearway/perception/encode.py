@@ -19,6 +19,7 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
 from clearway.progress import picture_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
+from clearway.torch_threads import torch_threads
 
 AUTO, TRAINED, RANDOM = "auto", "resnet50", "random-resnet50"
 BATCH_PICTURES = 32
@@ -113,7 +114,7 @@ def encode_scenes(
     if workers is not None:
         _check_guarded()
     with (
-        _threads(threads),
+        torch_threads(threads),
         picture_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
         _encoding(workers, ray) as encode,
     ):
@@ -195,7 +196,7 @@ def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessin
     ordered = [by_key[key] for key in sorted(by_key)]
 
     def make() -> Entry:
-        with _threads(1):  # so that statistics, and with them features, are the same bits however many encode
+        with torch_threads(1):  # so that statistics, and with them features, are the same bits however many encode
             record = random_resnet.fit_record(ordered, seed=seed, shape=shape, preprocessing=preprocessing, name=RANDOM)
         return Entry(record.arrays, {"identity": record.identity, "settings": dict(record.settings)})
 
@@ -208,19 +209,3 @@ def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessin
 
 def _standing_in(record: EncoderRecord) -> EncoderRecord:
     return replace(record, settings={**record.settings, "stands_in_for": TRAINED})
-
-
-@contextmanager
-def _threads(count: int | None) -> Iterator[None]:
-    """Let torch use `count` threads meanwhile; None leaves it as it is, with one a core."""
-    if count is None:
-        yield
-        return
-    import torch
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
