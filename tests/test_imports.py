@@ -18,6 +18,7 @@ ORDER = (
         "progress",
         "children",
         "ray_cluster",
+        "terminal",
         "torch_threads",
     },
     {"scenes"},

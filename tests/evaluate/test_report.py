@@ -13,7 +13,7 @@ from clearway.evaluate.metrics import METRIC_NAMES
 from clearway.evaluate.policies import argmax, random_policy
 from clearway.evaluate.protocol import evaluate_agents
 from clearway.evaluate.report import Evaluation, Protocol, summarise
-from clearway.evaluate.tables import MARK, markdown_table, rich_table, table_text
+from clearway.evaluate.tables import MARK, markdown_table, rich_tables, table_text
 from made import corridor_scene, grid_scene
 
 TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl", "shortest_path_steps"}
@@ -101,7 +101,7 @@ def test_tables_show_every_row_and_the_encoder(evaluations, level, rows):
     assert text.count("\n| ") == rows + 1  # the line of dashes and the rows follow the headings
     assert "Encoder: made-up." in text
     console = Console(width=100, record=True, file=io.StringIO())
-    console.print(rich_table(evaluations, level))
+    console.print(rich_tables(evaluations, [level]))
     shown = console.export_text()
     assert "Encoder: made-up." in shown and "shortest path" in shown and "…" not in shown
 
@@ -115,10 +115,18 @@ def test_wherever_success_stands_on_a_page_the_stricter_scores_stand_beside_it(e
 
 def test_the_terminal_s_table_fits_80_columns(evaluations):
     console = Console(width=200, file=io.StringIO())
-    console.print(rich_table(evaluations))
+    console.print(rich_tables(evaluations, ["average"]))
     rows = [line.rstrip() for line in console.file.getvalue().splitlines() if "–" in line or "steps" in line]
     assert len(rows) > 5
     assert max(map(len, rows[:-2])) <= 80
+
+
+def test_several_tables_share_their_notes(evaluations):
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(rich_tables(evaluations, ["targets", "scenes", "average"]))
+    shown = console.export_text()
+    assert shown.count("SPL %") == 3 and shown.count("Encoder: made-up.") == 1
+    assert shown.index("Encoder: made-up.") > shown.rindex("SPL %")
 
 
 def test_every_column_shows_its_own_figure(evaluations):

@@ -40,9 +40,9 @@ class Demo:
         if self.json:
             print_json([evaluation.to_json() for evaluation in result.evaluations])
             return
-        from clearway.evaluate.tables import rich_table
+        from clearway.evaluate.tables import rich_tables
 
-        stdout_console().print(rich_table(result.evaluations, "scenes"))
+        stdout_console().print(rich_tables(result.evaluations, ["scenes"]))
         say(f"open {page}")
 
     def _command(self) -> str:

@@ -86,14 +86,11 @@ class Evaluate:
         if self.json:
             print_json(content)
             return
-        from clearway.evaluate.tables import rich_table
+        from clearway.evaluate.tables import Level, rich_tables
 
-        console = stdout_console()
-        if self.targets:
-            console.print(rich_table(evaluations, "targets"))
-        console.print(rich_table(evaluations, "scenes"))
-        if len(scenes) > 1:
-            console.print(rich_table(evaluations, "average"))
+        levels: list[Level] = ["targets"] if self.targets else []
+        levels += ["scenes", "average"] if len(scenes) > 1 else ["average"]
+        stdout_console().print(rich_tables(evaluations, levels))
 
 
 def _or(given: int | None, default: int) -> int:

@@ -102,9 +102,7 @@ def evaluate_live(
     if json:
         print_json(live_json(results, protocol, encoder))
         return
-    console = stdout_console()
-    for table in rich_tables(results, protocol, encoder):
-        console.print(table)
+    stdout_console().print(rich_tables(results, protocol, encoder))
 
 
 def _draw(folder: Path, places: list[Stage], outcomes: list[LiveOutcome]) -> None:

@@ -12,6 +12,7 @@ from clearway.choices import RewardName, ZoneLevel
 from clearway.cli.arguments import check_finite, check_seeds, chosen_reward, chosen_targets, scene_files
 from clearway.cli.console import print_json, stdout_console
 from clearway.errors import ClearwayError
+from clearway.terminal import noted
 
 if TYPE_CHECKING:
     from clearway.evaluate.optimum import TargetYardstick
@@ -73,7 +74,7 @@ class Oracle:
             _print_table(found)
 
 
-CAPTION = (
+NOTE = (
     "Means over all starts. Steps: shortest path, optimal and soft policy; in zone: arrivals in the collision zone, of "
     "the policy to the left."
 )
@@ -83,7 +84,7 @@ def _print_table(found: list[TargetYardstick]) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, caption=CAPTION, caption_justify="left", padding=(0, 1, 0, 0))
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("scene", overflow="fold")
     for heading in ("target", "shortest", "optimal", "in zone", "soft", "collisions", "in zone"):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -92,4 +93,4 @@ def _print_table(found: list[TargetYardstick]) -> None:
         figures = (optimal.steps, optimal.collision_visits, soft.steps, soft.collisions, soft.collision_visits)
         steps = f"{one.yardstick.shortest_path_steps:.2f}"
         table.add_row(one.scene, str(one.target), steps, *(f"{figure:.3f}" for figure in figures))
-    stdout_console().print(table)
+    stdout_console().print(noted(table, [NOTE]))

@@ -15,6 +15,7 @@ from clearway.learn.load import Agent, run_world
 from clearway.model.policy import Policy
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene, encoder_names
+from clearway.torch_threads import torch_threads
 
 
 def evaluate_run(
@@ -48,6 +49,8 @@ def evaluate_runs(
 ) -> list[Evaluation]:
     """Agents of several runs on the same scenes and targets, beside exact optima, random and shortest-path agent.
 
+    Torch uses one thread meanwhile: steps are too small for more, which only wait for each other beside a training.
+
     Raises:
         RunError: the runs have other targets, or networks of another history length.
     """
@@ -57,16 +60,17 @@ def evaluate_runs(
         if (record.targets, record.learner.history_length) != (first.targets, first.learner.history_length):
             raise RunError("the runs differ in their targets or history length. Evaluate them one by one")
     world = run_world(first, scenes)
-    evaluations = evaluate_agents(
-        world,
-        {name: agent.policy(world) for name, agent in agents.items()},
-        references=_optima(world, [record.paid for record in records]),
-        encoder=encoder_names(scenes),
-        episodes_per_target=episodes_per_target,
-        step_cap=step_cap,
-        seed=seed,
-        history_length=first.learner.history_length,
-    )
+    with torch_threads(1):
+        evaluations = evaluate_agents(
+            world,
+            {name: agent.policy(world) for name, agent in agents.items()},
+            references=_optima(world, [record.paid for record in records]),
+            encoder=encoder_names(scenes),
+            episodes_per_target=episodes_per_target,
+            step_cap=step_cap,
+            seed=seed,
+            history_length=first.learner.history_length,
+        )
     trained = {name: _trained(agent) for name, agent in agents.items()}
     return [replace(evaluation, trained=trained.get(evaluation.agent)) for evaluation in evaluations]
 

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Literal, get_args
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT
 from clearway.evaluate.report import Evaluation, Result
 from clearway.markdown import table_lines
+from clearway.terminal import noted
 
 if TYPE_CHECKING:
+    from rich.console import Group
     from rich.table import Table
 
 Level = Literal["average", "scenes", "targets"]
@@ -119,14 +121,21 @@ def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", 
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"
 
 
-def rich_table(evaluations: Sequence[Evaluation], level: Level = "average") -> Table:
-    """The main figures for the terminal: intervals dim below them, failures in red, notes as the caption."""
+def rich_tables(evaluations: Sequence[Evaluation], levels: Sequence[Level]) -> Group:
+    """The main figures for the terminal, a table a level: intervals dim, failures in red, notes at the end."""
+    from rich.console import Group
+
+    contents = [table_text(evaluations, level, width="terminal") for level in levels]
+    *tables, last = map(_rich, contents)
+    return Group(*tables, noted(last, contents[-1].notes))
+
+
+def _rich(content: TableText) -> Table:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
 
-    content = table_text(evaluations, level, width="terminal")
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), caption="\n".join(content.notes), caption_justify="left")
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     first_figure = content.headings.index("solved")
     for index, heading in enumerate(content.headings):
         if index < first_figure:
@@ -139,7 +148,7 @@ def rich_table(evaluations: Sequence[Evaluation], level: Level = "average") -> T
         for cell in row:
             text = Text(cell.text, style="bold red" if cell.failed else "")
             if cell.below:
-                text.append(f"\n{cell.below}", style="dim")
+                text.append(f"\n{cell.below.replace('-', ' ')}", style="dim")  # folded between words, not within
             texts.append(text)
         table.add_row(*texts)
     return table

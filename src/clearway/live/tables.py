@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from clearway.live.episodes import SUCCESS_DEG, SUCCESS_M, LiveProtocol
 from clearway.live.report import Figures, LiveResult
 from clearway.markdown import table_lines
+from clearway.terminal import noted
 
 if TYPE_CHECKING:
+    from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
@@ -108,8 +110,10 @@ TERMINAL_NOTE = (
 )
 
 
-def rich_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> list[Table]:
-    """Both tables for a terminal of 80 columns, intervals dim below the figures, notes as the last one's caption."""
+def rich_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> Group:
+    """Both tables for a terminal of 80 columns, intervals dim below the figures, notes below the last."""
+    from rich.console import Group
+
     of_agents = _rich("", COLUMNS)
     rows = agent_rows(results)
     for number, (label, name, cells) in enumerate(rows):
@@ -121,16 +125,13 @@ def rich_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: 
         tables.append(_rich(f"\n{compared[0][1]}, shares in points", (*COMPARED, LARGER)))
         for label, _, cells in compared:
             tables[-1].add_row(label, *_with_intervals(cells))
-    tables[-1].caption = "\n" + "\n".join([TERMINAL_NOTE, *notes(protocol, encoder)])
-    return tables
+    return Group(*tables[:-1], noted(tables[-1], ["", TERMINAL_NOTE, *notes(protocol, encoder)]))
 
 
 def _rich(title: str, columns: Sequence[_Column]) -> Table:
     from rich.table import Table
 
-    table = Table(
-        title=title, box=None, padding=(0, 1, 0, 0), pad_edge=False, title_justify="left", caption_justify="left"
-    )
+    table = Table(title=title, box=None, padding=(0, 1, 0, 0), pad_edge=False, title_justify="left")
     table.add_column("", width=LABEL_WIDTH)
     for column in columns:
         table.add_column(column.short or column.heading, justify="right")
