@@ -14,10 +14,10 @@ from clearway.experiments.setting import Setting
 from small_setting import small_setting
 
 
-def rows(*steps: float | None) -> list[dict[str, float]]:
+def rows(*steps: float | None, success: float = 1.0) -> list[dict[str, float]]:
     """Metrics every 10 frames with such means of steps; None: no episode ended."""
     return [
-        {"frames": 10.0 * number, "episodes": float(own is not None), "steps": own or 0.0}
+        {"frames": 10.0 * number, "episodes": float(own is not None), "steps": own or 0.0, "success": success}
         for number, own in enumerate(steps, start=1)
     ]
 
@@ -39,6 +39,12 @@ def test_training_has_settled_after_its_last_row_above_the_mark(
 ) -> None:
     row = settled_row(rows(*steps), 10)
     assert (None if row is None else row["frames"]) == frames
+
+
+def test_training_whose_episodes_are_cut_has_not_settled_however_few_steps_they_take() -> None:
+    cut, arriving = rows(9, 9, success=0.94), rows(9, 9, 9, success=0.95)
+    assert settled_row(cut, 10) is None
+    assert settled_row([*cut, *arriving[2:]], 10) == arriving[2]
 
 
 def steps_one_by_one(graph: list[list[int]], target: int) -> list[int]:
@@ -84,6 +90,7 @@ def test_runs_that_never_settle_count_with_all_frames(
     done: Setting, detour: float, settled: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(convergence, "DETOUR", detour)
+    monkeypatch.setattr(convergence, "ARRIVING", 0.0)
     table, claims = settling("fig4", done, compared(done, PAIR))
     for row, group in zip(table.rows, compared(done, PAIR), strict=True):
         named = dict(zip(table.headings, row, strict=True))
@@ -97,6 +104,7 @@ def test_runs_that_never_settle_count_with_all_frames(
 
 def test_a_run_that_misses_a_target_in_the_end_has_not_settled(done: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "DETOUR", 1e6)
+    monkeypatch.setattr(convergence, "ARRIVING", 0.0)
     groups = compared(done, PAIR)
     missed = trial_path(done.out, groups[0].runs[1], groups[0].trial)
     tell_reached(missed, False)
