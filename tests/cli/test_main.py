@@ -61,8 +61,8 @@ def kinds(commands: object) -> Iterator[type]:
 
 KINDS = tuple(kinds(Command))
 HEAVY = ("torch", "mujoco", "transformers", "matplotlib", "scipy", "h5py", "numpy")
-MOST_SECONDS = 0.5
-TRIES = 6  # others may be using the machine; 3 are enough on an idle one
+MOST_TIMES = 3  # what reading tyro alone takes, some 0.16 seconds: help answers within 0.5
+TRIES = 6  # others may be using the machine; one is enough on an idle one
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(package.__file__).parents[1])}
 
 
@@ -72,16 +72,19 @@ def python(*words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def seconds_of_help() -> float:
-    """Processor time, which hardly changes with what else the machine does."""
+def processor_seconds(*words: str) -> float:
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert "clearway demo" in python("-m", "clearway", "--help").stdout
+    python(*words)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def test_help_answers_at_once():
-    assert any(seconds_of_help() < MOST_SECONDS for _ in range(TRIES))
+    """Against a reference in the same breath: how fast a shared machine is changes from hour to hour."""
+    assert any(
+        processor_seconds("-m", "clearway", "--help") < MOST_TIMES * processor_seconds("-c", "import tyro")
+        for _ in range(TRIES)
+    )
 
 
 def test_nothing_heavy_is_imported_before_a_command_runs():

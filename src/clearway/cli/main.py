@@ -85,7 +85,7 @@ def _exit_code(words: Sequence[str]) -> int:
     try:
         with refusals_in_one_line():
             command = tyro.cli(
-                Command,
+                Annotated[Command, tyro.conf.arg(help="what to do")],  # or tyro reads all of typing for one
                 args=words,
                 prog="clearway",
                 description=DESCRIPTION,
