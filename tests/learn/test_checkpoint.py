@@ -67,6 +67,27 @@ def test_writing_again_at_the_same_frame_replaces(tmp_path: Path) -> None:
     assert equal_bits(read_network(newest_checkpoint(tmp_path)), tensors(7))
 
 
+def test_damaged_newer_ones_do_not_push_out_what_is_written_now(tmp_path: Path) -> None:
+    damaged, others = [written(tmp_path, frames) for frames in (200, 300)], [written(tmp_path, 100)]
+    for path in damaged:
+        flip_a_byte(path / FILES[0])
+    others.append(written(tmp_path, 150))
+    with pytest.warns(UserWarning, match="SHA-256"):
+        assert newest_checkpoint(tmp_path) == others[1]
+    assert others[0].exists()
+    written(tmp_path, 250)
+    assert names(tmp_path) == [f"frames-{frames:012d}" for frames in (200, 250, 300)]
+
+
+def test_a_manifest_without_its_frames_is_damage(tmp_path: Path) -> None:
+    older, newer = written(tmp_path, 100), written(tmp_path, 200)
+    manifest = json.loads((newer / FILES[2]).read_text())
+    del manifest["frames"]
+    (newer / FILES[2]).write_text(json.dumps(manifest))
+    with pytest.warns(UserWarning, match="lacks a number"):
+        assert newest_checkpoint(tmp_path) == older
+
+
 def flip_a_byte(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0x80

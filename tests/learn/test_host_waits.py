@@ -14,7 +14,16 @@ from clearway.learn.trainer import Trainer
 from small_runs import small_learner, small_trainer
 
 SIZED_BY_VALUES = ("nonzero", "_unique2", "unique_consecutive", "unique_dim", "masked_select", "bincount")
-READ = (Tensor.tolist, Tensor.item, Tensor.numpy, Tensor.cpu, Tensor.__bool__, Tensor.__int__, Tensor.__float__)
+READ = (
+    torch.tensor,
+    Tensor.tolist,
+    Tensor.item,
+    Tensor.numpy,
+    Tensor.cpu,
+    Tensor.__bool__,
+    Tensor.__int__,
+    Tensor.__float__,
+)
 
 
 class Operations(TorchDispatchMode):
@@ -34,7 +43,7 @@ class Operations(TorchDispatchMode):
 
 
 class Reads(TorchFunctionMode):
-    """Notes tensors that Python reads the values of."""
+    """Notes tensors that Python reads the values of, or makes of values: copying those waits too."""
 
     def __init__(self, found: list[str]) -> None:
         super().__init__()
@@ -63,7 +72,14 @@ def trainer_after_a_while(learner: Learner, **changes: Any) -> Trainer:
 
 
 @pytest.mark.parametrize(
-    "work", [lambda t: t.nonzero(), lambda t: t[t > 0], lambda t: t.sum().item(), lambda t: t.tolist()]
+    "work",
+    [
+        lambda t: t.nonzero(),
+        lambda t: t[t > 0],
+        lambda t: t.sum().item(),
+        lambda t: t.tolist(),
+        lambda t: torch.tensor([1]),
+    ],
 )
 def test_what_waits_is_found(work: Callable[[Tensor], object]) -> None:
     assert len(waits(lambda: work(torch.ones(3)))) == 1

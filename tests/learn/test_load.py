@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from clearway.envs.world import make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_agent, run_scenes, run_world
@@ -122,6 +123,17 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
         load_agent(run.path, copied)
     with pytest.raises(RunError, match="no run here"):
         load_agent(tmp_path)
+
+
+def test_a_world_of_other_scenes_or_features_is_refused(tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=80))
+    agent = load_agent(train(request, tmp_path / "run").path)
+    fewer = [replace(scene, features=scene.features[:, :1]) for scene in request.scenes]
+    with pytest.raises(RunError, match="have 1 features, expected 12"):
+        agent.policy(run_world(agent.record, fewer))
+    turned = make_world(request.scenes[::-1], request.targets)
+    with pytest.raises(RunError, match=r"the scenes are \('grid', 'corridor'\), but the agent's"):
+        agent.critic(turned)
 
 
 def test_a_world_without_features_is_refused(tmp_path: Path) -> None:

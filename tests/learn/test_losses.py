@@ -5,6 +5,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from clearway.learn.config import DEFAULT, PAPER_A2C
 from clearway.learn.losses import Batch, LossSettings, actor_critic_loss, loss_gradient, merged
 
 LOG_4 = math.log(4)
@@ -52,6 +53,27 @@ def test_terms_worked_by_hand() -> None:
     assert terms.entropy.item() == pytest.approx(LOG_4)
     assert terms.clipped.item() == 0.0
     assert terms.total.item() == pytest.approx(-2.0 - 0.1 * LOG_4 + 0.5 * 2.0)
+
+
+@pytest.mark.parametrize(("frames", "entropy", "left"), [(0, 0.1, 1.0), (400, 0.01, 0.5), (800, 0.001, 0.0)])
+def test_weights_are_the_learner_s_at_that_many_frames(frames: int, entropy: float, left: float) -> None:
+    learner = replace(
+        DEFAULT,
+        frames=800,
+        entropy_start=0.1,
+        entropy_end=0.001,
+        log_barrier=0.3,
+        lookahead=0.05,
+        settle=0.0,
+        value_weight=0.7,
+        ratio_clip=0.25,
+    )
+    found = LossSettings.after(frames, learner)
+    assert (found.value_weight, found.ratio_clip, found.sum_loss) == (0.7, 0.25, False)
+    assert found.entropy_weight == pytest.approx(entropy)
+    assert found.barrier_weight == pytest.approx(0.3 * left)
+    assert found.lookahead_weight == pytest.approx(0.05 * left)
+    assert LossSettings.after(frames, PAPER_A2C).sum_loss
 
 
 def test_value_weight_a_half_is_zhu_s_quarter_of_the_squared_error() -> None:

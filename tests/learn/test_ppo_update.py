@@ -19,7 +19,7 @@ def gathered_epochs(trainer: Trainer) -> list[list[Minibatch]]:
     """What the trainer's first update will learn from; uses up the rollout."""
     learner = trainer.learner
     rollout = trainer.collector.collect(trainer.statistics)
-    batch, _ = trainer._batch(rollout)
+    batch, _ = trainer._batch(rollout, looks_ahead=True)
     if learner.hindsight:
         batch = trainer._with_hindsight(rollout, batch)
     epochs = dealt_epochs(

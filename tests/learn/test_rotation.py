@@ -105,9 +105,32 @@ def test_fewer_environments_than_scenes_suffice() -> None:
     Trainer(corridors(), learner, COLLISION_AWARE, 0).update()
 
 
-def test_a_set_for_which_there_would_be_too_few_is_refused_at_the_start() -> None:
-    cells = (80, *(2,) * 7)
+def uneven(*cells: int) -> World:
+    """Corridors of so many cells, two targets each."""
     scenes = [replace(corridor_scene(n, feature_count=FEATURES), name=f"{i}") for i, n in enumerate(cells)]
-    world = make_world(scenes, {scene.name: (0, scene.state_count - 4) for scene in scenes})
-    with pytest.raises(RunError, match="10 environments for 2 scenes"):
-        Trainer(world, SOME, COLLISION_AWARE, 0)
+    return make_world(scenes, {scene.name: (0, scene.state_count - 4) for scene in scenes})
+
+
+def test_every_set_has_environments_for_each_of_its_scenes() -> None:
+    """The share of the corridor of 3 cells is less than half an environment beside the two long ones."""
+    world, rotation = uneven(8, 47, 3, 58, 26), Rotation(5, 4, 1, 0)
+    learner = replace(SOME, envs=8, scenes_at_once=4)
+    for update in range(60):
+        scenes = rotation.scenes(update)
+        counts = divided_envs(world, learner, scenes)
+        assert sum(counts) == 8
+        assert [number for number, count in enumerate(counts) if count] == scenes.tolist()
+    assert divided_envs(world, learner, torch.arange(5)) == (1, 2, 1, 3, 1)
+
+
+def test_minibatches_are_refused_at_the_start_where_some_set_would_have_too_few_rows() -> None:
+    """The short corridor's share is two rows beside the long one, more beside others."""
+    world, learner = uneven(2, 12, 12, 100), replace(SOME, envs=100, rollout_steps=1, scenes_at_once=2, minibatches=2)
+    Trainer(world, replace(learner, minibatches=1), COLLISION_AWARE, 0)
+    with pytest.raises(RunError, match="2 minibatches of 1 rows"):
+        Trainer(world, learner, COLLISION_AWARE, 0)
+
+
+def test_a_set_for_which_there_would_be_too_few_is_refused_at_the_start() -> None:
+    with pytest.raises(RunError, match=r"1 environments for 2 scenes.*fewer scenes_at_once"):
+        Trainer(uneven(80, *(2,) * 7), replace(SOME, envs=1), COLLISION_AWARE, 0)

@@ -80,6 +80,23 @@ def changed(content: dict, name: str, value: object) -> str:
 UNFIT_FOR_FILES = ("", ".", "..", "../../attic", "/attic", "room/attic", "..\\attic", "attic\0")
 
 
+OF_ANOTHER_TYPE: tuple[tuple[str, object], ...] = (
+    ("seed", "1"),
+    ("seed", True),
+    ("zone_level", "room"),
+    ("versions", 5),
+    ("hardware", "a Xeon"),
+    ("hardware", [1]),
+    ("command", "clearway train"),
+)
+
+
+def located(content: dict, path: object) -> str:
+    """A run.json whose first scene lies there."""
+    first, *others = content["scenes"]
+    return changed(content, "scenes", [first | {"path": path}, *others])
+
+
 def renamed(content: dict, name: str) -> str:
     """A run.json whose first scene has this name: pictures and exported agents are files named by it."""
     first, *others = content["scenes"]
@@ -100,6 +117,10 @@ def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) 
         (changed(content, "scenes", [{"name": "x"}]), "missing or unknown"),
         (json.dumps({k: v for k, v in content.items() if k != "seed"}), "seed"),
         *((renamed(content, name), "cannot be part of a file's name") for name in UNFIT_FOR_FILES),
+        *((changed(content, name, value), f"{name} is") for name, value in OF_ANOTHER_TYPE),
+        *((located(content, path), "scene 'corridor'") for path in (0, False, [], {}, 1.5)),
+        (changed(content, "learner", content["learner"] | {"discount": 10**400}), "unknown.*too large"),
+        (changed(content, "learner", content["learner"] | {"discount": "0.9"}), "discount is '0.9'"),
     ]
     for text, message in cases:
         (tmp_path / "run.json").write_text(text)
@@ -115,7 +136,7 @@ def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) 
 def test_metrics_leave_out_a_line_cut_off_and_forget_what_comes_again(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
     assert folder.metrics() == []
-    rows = [{"frames": frames, "loss": frames / 7} for frames in (80, 160, 240)]
+    rows = [{"frames": frames, "seconds": 0.5, "loss": frames / 7} for frames in (80, 160, 240)]
     text = "".join(json.dumps(row) + "\n" for row in rows)
     folder.metrics_path.write_text(text + '{"frames": 320, "lo')
     assert folder.metrics() == rows
@@ -126,11 +147,34 @@ def test_metrics_leave_out_a_line_cut_off_and_forget_what_comes_again(tmp_path: 
     assert folder.metrics_path.read_text() == ""
 
 
-def test_metrics_that_are_no_json_lines_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (b"not a row", "not JSON"),
+        (b'{"frames": 160, "seconds": 2, "note": "\xff"}', "not JSON.*utf-8"),
+        (b"[160]", "no row of figures"),
+        (b'{"frames": 160}', "no row of figures with its frames and seconds"),
+        (b'{"frames": 160, "seconds": 2, "loss": "x"}', "loss is 'x'"),
+        (b'{"frames": 160, "seconds": 2, "loss": null}', "loss is None"),
+        (b'{"frames": 160, "seconds": NaN}', "seconds is nan"),
+    ],
+)
+def test_metrics_that_are_no_rows_of_figures_are_refused(line: bytes, message: str, tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
-    folder.metrics_path.write_text('{"frames": 80}\nnot a row\n')
-    with pytest.raises(RunError, match=r"metrics.jsonl, line 2"):
+    folder.metrics_path.write_bytes(b'{"frames": 80, "seconds": 1}\n' + line + b"\n")
+    with pytest.raises(RunError, match=rf"metrics.jsonl, line 2: {message}.*Remove the line"):
         folder.metrics()
+
+
+def test_settings_of_another_clearway_are_told_apart_from_damage(tmp_path: Path) -> None:
+    content = {"format_version": 1, **asdict(made_record())}
+    content["learner"] |= {"magic": 1}
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    with pytest.raises(RunError, match=r"magic.*Restore it"):
+        RunFolder(tmp_path).read_record()
+    (tmp_path / "run.json").write_text(changed(content, "versions", {"clearway": "99.1"}))
+    with pytest.raises(RunError, match=r"magic.*clearway 99\.1 wrote it, this is .*: use that one"):
+        RunFolder(tmp_path).read_record()
 
 
 HOLD = """

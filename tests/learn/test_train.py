@@ -154,9 +154,11 @@ def test_a_second_training_in_the_folder_is_refused_and_changes_nothing(tmp_path
 def test_resume_begins_where_there_is_no_run_or_no_checkpoint_yet(tmp_path: Path) -> None:
     request = small_request(learner=small_learner(frames=160))
     folder = RunFolder(tmp_path / "killed early")
-    folder.write_record(request.record())
-    folder.metrics_path.write_text('{"frames": 80, "loss": 1}\n')
+    record = request.record()
+    folder.write_record(replace(record, versions={"torch": "0.1"}, hardware={"threads": 7}, command=("elsewhere",)))
+    folder.metrics_path.write_text('{"frames": 80, "seconds": 1, "loss": 1}\n')
     train.train(request, folder.path, resume=True)
+    assert folder.read_record() == record  # all of it was made here
     new = train.train(request, tmp_path / "new", resume=True)
     assert without_seconds(folder) == without_seconds(new)
     assert len(new.metrics()) == 2
@@ -239,6 +241,23 @@ def test_numbers_that_are_not_finite_stop_the_run_and_the_checkpoint_before_stay
     assert all(tensor.isfinite().all() for tensor in read_network(kept).values())
 
 
+def test_parameters_that_are_not_finite_are_not_saved(tmp_path: Path) -> None:
+    trainer, folder = small_request().trainer(), RunFolder(tmp_path)
+    with torch.no_grad():
+        trainer.network.fusion_bias[0] = torch.inf
+    with pytest.raises(RunError, match=r"network\.fusion_bias holds NaN or Inf after 0 frames"):
+        train.save(trainer, folder, 1.0)
+    assert not folder.checkpoints.exists()
+
+
+def test_a_milestone_replaces_what_a_run_that_went_on_otherwise_left(tmp_path: Path) -> None:
+    """Asynchronous runs come by at other frames each time, and the newest is that with the most."""
+    folder = RunFolder(tmp_path)
+    checkpoint.write_checkpoint(folder.milestone(160), {}, {}, Progress(240, 3, 1.0))
+    train.train(small_request(), tmp_path, milestones=[160])
+    assert read_progress(newest_checkpoint(folder.milestone(160))).frames == 160
+
+
 RUN = """
 import sys
 from pathlib import Path
@@ -274,9 +293,15 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "began", "said"),
-    [("threads", 7, "threads 1 instead of 7"), ("feature_store", "float16", "feature_store memory instead of float16")],
+    [
+        ("threads", 7, "threads 1 instead of 7"),
+        ("feature_store", "float16", "feature_store memory instead of float16"),
+        ("device", "cuda", "device cpu instead of cuda"),
+        ("bfloat16", "maybe", "bfloat16 (True|False) instead of maybe"),
+        ("torch", "1.0", "torch .* instead of 1.0"),
+    ],
 )
-def test_going_on_with_other_threads_or_another_store_is_said(
+def test_going_on_in_another_way_is_said(
     name: str, began: int | str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     torch.set_num_threads(1)
@@ -287,7 +312,8 @@ def test_going_on_with_other_threads_or_another_store_is_said(
             train.train(request, tmp_path)
     folder = RunFolder(tmp_path)
     record = folder.read_record()
-    folder.write_record(replace(record, hardware={**record.hardware, name: began}))
+    kind = "versions" if name in record.versions else "hardware"
+    folder.write_record(replace(record, **{kind: {**getattr(record, kind), name: began}}))
     with pytest.warns(UserWarning, match=f"{said}; results will not be those of an uninterrupted run"):
         train.train(request, tmp_path, resume=True)
     train.train(request, tmp_path, resume=True)  # nothing is left to do, so nothing to warn of

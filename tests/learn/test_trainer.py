@@ -184,6 +184,47 @@ def test_hindsight_adds_rows_only_when_asked() -> None:
     assert small_trainer(small_learner(step_limit=200, hindsight=False)).update().hindsight_rows == 0
 
 
+def test_hindsight_and_look_ahead_get_the_learner_s_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    learner = small_learner(
+        step_limit=200, discount=0.9, reward_scale=0.3, gae_lambda=0.8, lookahead=0.1, lookahead_temperature=0.07
+    )
+    given: dict[str, dict] = {}
+
+    def noted(name: str) -> None:
+        whole = getattr(trainer_module, name)
+
+        def call(*arguments, **settings):
+            given[name] = settings
+            return whole(*arguments, **settings)
+
+        monkeypatch.setattr(trainer_module, name, call)
+
+    noted("hindsight_batch")
+    noted("better_policy")
+    small_trainer(learner).update()
+    assert given == {
+        "hindsight_batch": {"discount": 0.9, "reward_scale": 0.3, "trace_lambda": 0.8},
+        "better_policy": {"discount": 0.9, "reward_scale": 0.3, "temperature": 0.07},
+    }
+
+
+def test_look_ahead_is_computed_as_long_as_it_weighs(monkeypatch: pytest.MonkeyPatch) -> None:
+    trainer = small_trainer(small_learner(lookahead=0.1, settle=0.5))
+    looked, better = [], trainer._better
+    monkeypatch.setattr(trainer, "_better", lambda *rows: looked.append(trainer.updates) or better(*rows))
+    while not trainer.finished:
+        trainer.update()
+    assert looked == [0, 1, 2, 3, 4]
+
+
+def test_an_update_ends_with_weighing_the_targets_anew() -> None:
+    trainer = small_trainer(small_learner(balance=3.0))
+    before = trainer.navigation.choice.weights.clone()
+    trainer.statistics.window[:, :2] = torch.tensor([[9, 9], [9, 0], [9, 3], [9, 9], [9, 9]])
+    trainer.update()
+    assert not torch.equal(trainer.navigation.choice.weights, before)
+
+
 def test_targets_reached_less_often_are_drawn_more_often() -> None:
     trainer = small_trainer(small_learner(balance=3.0))
     trainer.statistics.recent_success = torch.tensor([1.0, 0.5, 0.0, 1.0, 1.0], dtype=torch.float64)

@@ -50,7 +50,7 @@ class Progress:
 def write_checkpoint(
     folder: Path, network: Mapping[str, Tensor], training: Mapping[str, Tensor], progress: Progress
 ) -> Path:
-    """Write a checkpoint into `folder` and remove all but the newest few; returns its path.
+    """Write a checkpoint into `folder` and remove those before it but the newest few; returns its path.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; earlier checkpoints stay as they are.
@@ -74,7 +74,8 @@ def write_checkpoint(
     except (OSError, SafetensorError) as error:
         shutil.rmtree(part, ignore_errors=True)
         raise RunError(f"{final}: cannot write the checkpoint ({error}). Free some space, then resume") from error
-    for old in _found(folder)[:-KEPT]:
+    upto_now = [path for path in _found(folder) if path.name <= final.name]  # later ones are damaged
+    for old in upto_now[:-KEPT]:
         shutil.rmtree(old)
     return final
 
@@ -90,7 +91,7 @@ def newest_checkpoint(folder: Path) -> Path:
     """
     for path in reversed(_found(folder)):
         try:
-            _checked_manifest(path)
+            read_progress(path)
             return path
         except _Damaged as error:
             warnings.warn(f"{error}; an earlier checkpoint is used", stacklevel=2)

@@ -48,6 +48,12 @@ class Agent:
     def _lookup(self, world: World) -> LookupNetwork:
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
+        names = tuple(scene.name for scene in self.record.scenes)
+        if world.scene_names != names and self.record.learner.heads == "scene":
+            raise RunError(f"the scenes are {world.scene_names}, but the agent's {names}. Give those, in this order")
+        count, expected = world.features.shape[1], self.feature_map.feature_count
+        if count != expected:
+            raise RunError(f"the scenes have {count} features, expected {expected}. Encode them as for training")
         return LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state)
 
 

@@ -9,6 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn import Parameter
 
+ALPHA, EPSILON = 0.99, 0.1  # of the published RMSProp
+
 
 class Optimiser(Protocol):
     """Changes parameters along their `.grad`."""
@@ -62,7 +64,7 @@ class SharedRMSProp:
     ms <- alpha ms + (1 - alpha) g^2;   parameter <- parameter - lr g / sqrt(ms + epsilon)
     """
 
-    def __init__(self, named: Mapping[str, Parameter], alpha: float = 0.99, epsilon: float = 0.1) -> None:
+    def __init__(self, named: Mapping[str, Parameter], alpha: float = ALPHA, epsilon: float = EPSILON) -> None:
         self.named = named
         self.alpha, self.epsilon = alpha, epsilon
         self.mean_square = {name: torch.ones_like(parameter) for name, parameter in self.named.items()}

@@ -47,24 +47,18 @@ class Rotation:
 
 
 def divided_envs(world: World, learner: Learner, scenes: Tensor) -> tuple[int, ...]:
-    """Environments of each scene, (C,); 0 of all but `scenes`, which share them.
+    """Environments of each scene, (C,); 0 of all but `scenes`, which share them and have one each at least.
 
     Raises:
         RunError: too few for the number of scenes or minibatches.
     """
-    states = torch.zeros(world.scene_count, dtype=torch.float64)
-    states[scenes] = torch.diff(world.scene_offset).cpu().double()[scenes]
-    share = states / states.sum() if learner.envs_by == "states" else (states > 0).double() / len(scenes)
-    upto = (share.cumsum(0) * learner.envs).round().long()
+    _check_envs(learner, len(scenes))
+    upto = (_shares(world, learner, scenes).cumsum(0) * learner.envs).round().long()
     counts = torch.diff(upto, prepend=upto.new_zeros(1))
-    fewest = int(counts[scenes].min())
-    if fewest < 1:
-        raise RunError(f"{learner.envs} environments for {len(scenes)} scenes. {_remedy(learner)}")
-    if fewest * learner.rollout_steps < learner.minibatches:
-        raise RunError(
-            f"{learner.minibatches} minibatches of {fewest * learner.rollout_steps} rows of a scene. "
-            "Give fewer minibatches, or more environments"
-        )
+    for scene in scenes[counts[scenes] == 0].tolist():  # rounded away
+        counts[counts.argmax()] -= 1
+        counts[scene] = 1
+    _check_rows(learner, int(counts[scenes].min()))
     return tuple(counts.tolist())
 
 
@@ -78,10 +72,28 @@ def check_division(world: World, learner: Learner, rotation: Rotation) -> None:
         return
     order = torch.diff(world.scene_offset).cpu().argsort(descending=True)
     most = -(-world.scene_count // rotation.sets)
-    divided_envs(world, learner, torch.cat([order[: most - 1], order[-1:]]).sort()[0])
+    _check_envs(learner, most)
+    least = float(_shares(world, learner, torch.cat([order[: most - 1], order[-1:]]))[order[-1]])
+    _check_rows(learner, max(1, int(least * learner.envs)))  # rounded up it is more
 
 
-def _remedy(learner: Learner) -> str:
-    if learner.scenes_at_once:
-        return "Give more environments (envs), or fewer scenes_at_once"
-    return "Give more environments (envs), or walk some scenes at a time (scenes_at_once)"
+def _shares(world: World, learner: Learner, scenes: Tensor) -> Tensor:
+    """Share of the environments that each scene is due, (C,) float64; 0 of all but `scenes`."""
+    states = torch.zeros(world.scene_count, dtype=torch.float64)
+    states[scenes] = torch.diff(world.scene_offset).cpu().double()[scenes]
+    return states / states.sum() if learner.envs_by == "states" else (states > 0).double() / len(scenes)
+
+
+def _check_envs(learner: Learner, scenes: int) -> None:
+    if learner.envs < scenes:
+        other = "fewer scenes_at_once" if learner.scenes_at_once else "walk some scenes at a time (scenes_at_once)"
+        raise RunError(f"{learner.envs} environments for {scenes} scenes. Give more environments (envs), or {other}")
+
+
+def _check_rows(learner: Learner, envs: int) -> None:
+    """Check that a scene with so many environments has rows for every minibatch."""
+    if envs * learner.rollout_steps < learner.minibatches:
+        raise RunError(
+            f"{learner.minibatches} minibatches of {envs * learner.rollout_steps} rows of a scene. "
+            "Give fewer minibatches, or more environments"
+        )

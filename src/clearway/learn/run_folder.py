@@ -28,6 +28,7 @@ from clearway.learn.config import ADDED_LATER, Learner
 from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
+from clearway.version import __version__
 
 FORMAT_VERSION = 1
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
@@ -199,29 +200,35 @@ class RunFolder:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
             return _record_from(content)
-        except (KeyError, TypeError, AttributeError, RunError) as error:
-            reason = str(error).rstrip(".")[:300]
-            raise RunError(f"{path}: a setting is missing or unknown ({reason}). Restore it or train again") from error
+        except (KeyError, TypeError, AttributeError, OverflowError, RunError) as error:
+            reason, remedy = str(error).rstrip(".")[:300], "Restore it or train again"
+            by = _maker(content)
+            if by != __version__:
+                remedy = f"clearway {by} wrote it, this is {__version__}: use that one, or train again"
+            raise RunError(f"{path}: a setting is missing or unknown ({reason}). {remedy}") from error
 
     def metrics(self) -> list[dict[str, float]]:
         """All rows of metrics.jsonl; a last line that was cut off is left out.
 
         Raises:
-            RunError: a line is not JSON.
+            RunError: a line is not JSON, or no row of figures.
         """
         if not self.metrics_path.exists():
             return []
-        lines = self.metrics_path.read_text().splitlines(keepends=True)
-        return [self._row(number, line) for number, line in enumerate(lines, 1) if line.endswith("\n")]
+        lines = self.metrics_path.read_bytes().splitlines(keepends=True)
+        return [self._row(number, line) for number, line in enumerate(lines, 1) if line.endswith(b"\n")]
 
-    def _row(self, number: int, line: str) -> dict[str, float]:
+    def _row(self, number: int, line: bytes) -> dict[str, float]:
         where = f"{self.metrics_path}, line {number}"
         try:
-            row = parse_json(line)
+            row = parse_json(line.decode("utf-8"))
         except ValueError as error:
             raise RunError(f"{where}: not JSON ({error}). Remove the line") from error
-        if not isinstance(row, dict) or not isinstance(row.get("frames"), int):
-            raise RunError(f"{where}: no row of figures with its frames. Remove the line")
+        if not isinstance(row, dict) or not isinstance(row.get("frames"), int) or "seconds" not in row:
+            raise RunError(f"{where}: no row of figures with its frames and seconds. Remove the line")
+        for name, value in row.items():
+            if not _fits(value, float):
+                raise RunError(f"{where}: {name} is {value!r:.40}, expected a finite number. Remove the line")
         return row
 
     def forget_metrics_after(self, frames: int) -> None:
@@ -234,8 +241,10 @@ class RunFolder:
 
 
 def _record_from(content: Mapping[str, Any]) -> RunRecord:
-    if not _fits(content["seed"], int) or not _fits(content["zone_level"], ZoneLevel):
-        raise TypeError(f"seed {content['seed']!r:.40}, zone_level {content['zone_level']!r:.40}")
+    wanted = {"seed": int, "zone_level": ZoneLevel, "versions": dict, "hardware": dict, "command": list}
+    for name, kind in wanted.items():
+        if not _fits(content[name], kind):
+            raise TypeError(f"{name} is {content[name]!r:.40}")
     return RunRecord(
         learner=_settings(Learner, {**ADDED_LATER, **content["learner"]}),
         reward=_settings(Reward, content["reward"]),
@@ -246,6 +255,12 @@ def _record_from(content: Mapping[str, Any]) -> RunRecord:
         hardware=content["hardware"],
         command=tuple(content["command"]),
     )
+
+
+def _maker(content: Mapping[str, Any]) -> str:
+    """The version of clearway that a run.json names; this one where it names none."""
+    versions = content.get("versions")
+    return str(versions.get("clearway", __version__))[:40] if isinstance(versions, dict) else __version__
 
 
 def _settings(kind: type[Settings], content: Mapping[str, Any]) -> Settings:
@@ -261,8 +276,8 @@ def _settings(kind: type[Settings], content: Mapping[str, Any]) -> Settings:
 
 def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
     scene = SceneRecord(**{**content, "targets": tuple(content["targets"])})
-    texts = (scene.name, scene.digest, scene.encoder, scene.path or "")
-    if not all(_fits(text, str) for text in texts) or not all(_fits(target, int) for target in scene.targets):
+    texts = all(_fits(text, str) for text in (scene.name, scene.digest, scene.encoder))
+    if not texts or not _fits(scene.path, str | None) or not all(_fits(target, int) for target in scene.targets):
         raise TypeError(f"scene {scene.name!r:.40}")
     if scene.name in ("", ".", "..") or any(letter in scene.name for letter in "/\\\0"):
         raise RunError(f"scene {scene.name!r:.40} cannot be part of a file's name")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import threading
 import time
@@ -40,7 +41,7 @@ from clearway.scenes.scene import Scene
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
-SHAPES_BITS = ("threads", "bfloat16", "device", "feature_store")  # in a run's hardware
+SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "feature_store")  # of a run's versions and hardware
 NETWORK = "network."  # tensors of the network among a trainer's
 
 
@@ -167,6 +168,7 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bo
             f"Give --frames {before.learner.frames}, or another --out"
         )
     if not any(folder.checkpoints.glob("frames-*")):
+        folder.write_record(record)  # nothing is left of what was done elsewhere
         folder.forget_metrics_after(-1)
         return 0.0
     checkpoint = newest_checkpoint(folder.checkpoints)
@@ -187,10 +189,11 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bo
 
 def _warn_of_other_bits(folder: RunFolder, before: RunRecord, now: RunRecord) -> None:
     """Say where a run goes on in another way than it began, so that an uninterrupted one would have other bits."""
+    then, here = ({**record.versions, **record.hardware} for record in (before, now))
     differ = [
-        f"{name} {now.hardware[name]} instead of {before.hardware[name]}"
+        f"{name} {here[name]} instead of {then[name]}"
         for name in SHAPES_BITS
-        if name in before.hardware and before.hardware[name] != now.hardware[name]
+        if name in then and then[name] != here[name]
     ]
     if differ:
         text = f"{folder.path}: goes on with {', '.join(differ)}; results will not be those of an uninterrupted run"
@@ -264,15 +267,27 @@ def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
 
 
 def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
-    """Write what is needed to act, not to train on."""
+    """Write what is needed to act, not to train on, in place of what a run that went on otherwise may have left."""
     tensors = trainer.tensors()
+    if folder.exists():
+        shutil.rmtree(folder)
     progress = Progress(trainer.frames, trainer.updates, seconds)
     write_checkpoint(folder, _agent(trainer, tensors), {}, progress)
 
 
 def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The parameters, and the map that prepares features."""
+    """The parameters, and the map that prepares features.
+
+    Raises:
+        RunError: a parameter is not finite.
+    """
     network = {key: value for key, value in tensors.items() if key.startswith(NETWORK)}
+    broken = [name for name, tensor in network.items() if not tensor.isfinite().all()]
+    if broken:
+        raise RunError(
+            f"{broken[0]} holds NaN or Inf after {trainer.frames} frames. Training stopped; "
+            "lower the learning rate or check the features"
+        )
     return network | joined({"features": trainer.feature_map.tensors()})
 
 

@@ -155,7 +155,7 @@ class Trainer:
         lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
         rollout = self.collector.collect(self.statistics)
-        batch, explained = self._batch(rollout)
+        batch, explained = self._batch(rollout, looks_ahead=settings.lookahead_weight > 0)
         rows = len(batch)
         if learner.hindsight:
             batch = self._with_hindsight(rollout, batch)
@@ -192,7 +192,7 @@ class Trainer:
         nav.elapsed = (nav.start_stream.uniform() * self.learner.step_limit).long()
 
     @torch.no_grad()
-    def _batch(self, rollout: Rollout) -> tuple[Batch, Tensor]:
+    def _batch(self, rollout: Rollout, looks_ahead: bool) -> tuple[Batch, Tensor]:
         """The rollout's rows with their advantages, and the explained variance of the values, a scalar."""
         learner = self.learner
         log_pi = torch.log_softmax(rollout.kept.scores, 1)
@@ -222,6 +222,7 @@ class Trainer:
         )
         if learner.lookahead:
             self.observed.add(batch.history[:, -1], action, as_rows(rollout.arrived))
+        if looks_ahead:
             batch = replace(batch, better=self._better(batch, log_pi, rollout.kept.value))
         return batch, explained
 

@@ -44,6 +44,9 @@ class Padding:
     @classmethod
     def to_multiples(cls, step: int, rows_per_scene: Sequence[int], device: torch.device) -> Padding:
         """Every scene's rows, up to a multiple of `step`; of none there stay none."""
+        if step == 1:  # as most are, and copying counts to a GPU would wait for it
+            rows = torch.arange(sum(rows_per_scene), device=device)
+            return cls(rows, rows, tuple(rows_per_scene))
         rounded = [rounded_up(count, step) for count in rows_per_scene]
         counts, places = torch.tensor([list(rows_per_scene), rounded], dtype=torch.int64, device=device)
         before, places_before = counts.cumsum(0) - counts, places.cumsum(0) - places

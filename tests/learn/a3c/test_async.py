@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import pytest
@@ -217,6 +218,25 @@ def test_a_loss_that_is_not_finite_stops_training() -> None:
     with closing(async_trainer(1000, processes=1)) as trainer:
         trainer.shared["parameters.output_bias"][0, 4] = torch.nan
         with pytest.raises(RunError, match="nan after"):
+            trainer.update()
+
+
+def test_a_loss_that_is_not_finite_is_not_saved_either() -> None:
+    """What workers report while they pause has not gone through an update."""
+    with closing(async_trainer(1000, processes=1)) as trainer:
+        trainer.update()
+        trainer.shared["parameters.output_bias"][0, 4] = torch.nan
+        with pytest.raises(RunError, match=r"nan after|NaN"):
+            train.save(trainer, RunFolder(Path("never made")), 1.0)
+
+
+def test_a_process_that_cannot_be_started_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(SpawnProcess, "start", full)
+    with closing(async_trainer(1000, processes=2)) as trainer:
+        with pytest.raises(RunError, match=r"worker process 1 of 2 cannot be started.*unavailable.*fewer --threads"):
             trainer.update()
 
 

@@ -7,10 +7,13 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn.a3c import rmsprop
+from clearway.learn.a3c.gradients import clip_scales, squared_norms
 from clearway.learn.a3c.group import WorkerGroup
-from clearway.learn.a3c.rmsprop import EPSILON
+from clearway.learn.a3c.local import Factors
 from clearway.learn.config import PAPER_A3C, Learner
+from clearway.learn.optimiser import EPSILON
 from clearway.reward import COLLISION_AWARE
+from clearway.scenes.actions import ACTION_COUNT
 from plain_a3c import PlainA3C
 from small_runs import small_learner, small_network, small_world
 
@@ -63,6 +66,27 @@ def test_rounds_of_several_workers_equal_the_plain_ones(learner: Learner) -> Non
     assert check_against_plain(
         [0, 5, 1, 2, 3, 4], learner, rounds=6
     )  # targets 0 0 1 2 in the corridor, 3 4 in the grid
+
+
+def test_biases_whose_rows_cancel_have_no_gradient_and_are_not_clipped() -> None:
+    """By inner products of the rows their squared norm came out at -1e-16, and its root is no number."""
+    rows = [float.fromhex(text) for text in ("0x1.36fd68p+0", "-0x1.a938b0p-10", "-0x1.36931ap+0")]
+    left = torch.tensor(rows)[None, :, None]
+    other = torch.zeros(1, 3, 1)
+    factors = Factors(
+        siamese=torch.zeros(1, 4, 1),
+        fusion=left,
+        seen=other,
+        term=torch.zeros(1, 1, 1),
+        wanted=torch.zeros(1, 1, 1),
+        fused=other,
+        scene=left,
+        special=other,
+        output=torch.zeros(1, 3, ACTION_COUNT + 1),
+    )
+    squares = squared_norms(factors, torch.zeros(1, 8, 2), history_length=4)
+    assert all(square >= 0 for square in squares.values())
+    assert all(scale == 1 for scale in clip_scales(squares, 40.0, each_tensor=True).values())
 
 
 def test_weights_larger_than_a_block_are_updated_whole(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,14 +39,14 @@ def squared_norms(factors: Factors, trail_features: Tensor, history_length: int)
     outputs = {"policy": factors.output[..., POLICY], "value": factors.output[..., VALUE]}
     return {
         "siamese_weight": _inner(siamese, torch.stack(slots).sum(0)),
-        "siamese_bias": siamese.sum((1, 2)),
+        "siamese_bias": _summed(factors.siamese),
         "fusion_weight": _inner(_gram(factors.fusion), _gram(factors.seen))
         + _inner(_gram(factors.term), _gram(factors.wanted)),
-        "fusion_bias": _gram(factors.fusion).sum((1, 2)),
+        "fusion_bias": _summed(factors.fusion),
         "scene_weight": _inner(_gram(factors.scene), fused),
-        "scene_bias": _gram(factors.scene).sum((1, 2)),
+        "scene_bias": _summed(factors.scene),
         **{f"{name}_weight": _inner(_gram(left), special) for name, left in outputs.items()},
-        **{f"{name}_bias": _gram(left).sum((1, 2)) for name, left in outputs.items()},
+        **{f"{name}_bias": _summed(left) for name, left in outputs.items()},
     }
 
 
@@ -97,6 +97,11 @@ def _gram(rows: Tensor) -> Tensor:
     """Inner products of each worker's rows, (R, J, J) float64 from (R, J, N)."""
     rows = rows.double()
     return rows @ rows.transpose(1, 2)
+
+
+def _summed(rows: Tensor) -> Tensor:
+    """Squared norms (R,) float64 of the sums of each worker's rows, (R, J, N)."""
+    return rows.double().sum(1).square().sum(1)
 
 
 def _inner(left: Tensor, right: Tensor) -> Tensor:

@@ -20,7 +20,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-ALPHA, EPSILON = 0.99, 0.1
+from clearway.learn.optimiser import ALPHA, EPSILON
+
 BLOCK_ELEMENTS = 32 * 1024  # four arrays of 128 kB are at work at a time: they fit a level-2 cache of 1 MB
 
 

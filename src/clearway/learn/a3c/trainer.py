@@ -22,10 +22,10 @@ from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.a3c.group import WorkerGroup
 from clearway.learn.a3c.process import Assignment, Message, Report, work, world_tensors
-from clearway.learn.a3c.rmsprop import EPSILON
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.config import Learner
 from clearway.learn.named_tensors import joined, part_of
+from clearway.learn.optimiser import EPSILON
 from clearway.learn.setup import check_seed, checked_features, fitted_features
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.trainer import Update, check_finite
@@ -119,14 +119,13 @@ class AsyncTrainer:
                 assert isinstance(message, Report)
                 self._add(message)
         result, self._figures = _mean(self._figures), []
-        check_finite(result, self.frames)
         return result
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on, besides `frames` and `updates`. Workers pause until the next update.
 
         Raises:
-            RunError: a process has died.
+            RunError: a process has died, or the loss or a gradient is not finite.
         """
         if self._processes and not self._paused:
             self._tell(Message.PAUSE)
@@ -184,8 +183,14 @@ class AsyncTrainer:
                 )
                 process = context.Process(target=work, args=(assignment, theirs), name=f"a3c-{number}", daemon=True)
                 self._connections.append(ours)
+                try:
+                    process.start()
+                except OSError as error:
+                    raise RunError(
+                        f"a3c's worker process {number + 1} of {len(parts)} cannot be started ({error}). "
+                        "Give fewer --threads, or free some memory"
+                    ) from error
                 self._processes.append(process)
-                process.start()
                 theirs.close()
 
     def _tell(self, message: Message) -> None:
@@ -217,6 +222,11 @@ class AsyncTrainer:
         )
 
     def _add(self, report: Report) -> None:
+        """Count a report in.
+
+        Raises:
+            RunError: its loss or gradient is not finite.
+        """
         self.frames += report.frames
         self.updates += report.updates
         totals = torch.from_numpy(report.totals)
@@ -224,6 +234,7 @@ class AsyncTrainer:
         self.statistics.window += totals[:, : self.statistics.window.shape[1]]
         self.statistics.refresh_success()
         self._figures.append(report.figures)
+        check_finite(report.figures, self.frames)
 
 
 def _by_target(workers: int, targets: int) -> Tensor:
