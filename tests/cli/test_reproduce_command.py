@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName
@@ -12,6 +13,7 @@ from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.reproduce import ReproduceRequest
 from clearway.learn.config import DEFAULT, PAPER_A2C, PAPER_A3C
+from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from small_runs import small_learner
 from small_setting import BUDGET, small_rooms
@@ -96,7 +98,32 @@ def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, dumps: Pat
     assert "(2 runs)" in facts["versions"] and "torch" in facts["versions"]
 
 
-@pytest.mark.parametrize("content", [None, "{", "[]", '{"names": ["fig5"]}', '{"dumps": [], "unknown": 1}'])
+FOREIGN = (
+    ("budget", "huge"),
+    ("budget", ["paper"]),
+    ("names", ["nosuch"]),
+    ("names", [["fig5"]]),
+    ("learners", ["mine"]),
+    ("rooms", ["attic"]),
+    ("seeds", "x"),
+    ("seeds", 0),
+    ("frames", 1.5),
+    ("encoder", 7),
+    ("commands", [3]),
+)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        None,
+        "{",
+        "[]",
+        '{"names": ["fig5"]}',
+        '{"dumps": [], "unknown": 1}',
+        *(json.dumps({"names": ["fig5"], "budget": "smoke", "dumps": [], name: value}) for name, value in FOREIGN),
+    ],
+)
 def test_a_folder_without_a_reproduction_is_refused(clearway, tmp_path: Path, content: str | None) -> None:
     if content is not None:
         (tmp_path / "reproduction.json").write_text(content)
@@ -140,6 +167,7 @@ def test_other_frames_and_rooms_show_on_top() -> None:
     assert (changed.frames, changed.default_frames, changed.rooms) == (2_000_000, 2_000_000, ("kitchen",))
     assert "2,000,000" in changed.warning and "10,000,000" in changed.warning
     assert BUDGETS["paper"].changed() == BUDGETS["paper"]
+    assert BUDGETS["paper"].changed(frames=20_000_000).warning == ""  # no less than the paper's
 
 
 def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
@@ -152,3 +180,57 @@ def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     assert (list(joined.names), joined.commands) == (["table1", "fig3"], ("one", "two"))
     other = replace(second, frames=9)
     assert reproduce._with_earlier(other) == other
+    spelt = replace(second, seeds=5)  # the budget's own number
+    assert list(reproduce._with_earlier(spelt).names) == ["table1", "fig3"]
+    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "published"]}))
+    turned = replace(second, learners=("published", "default"))
+    assert list(reproduce._with_earlier(turned).names) == ["table1", "fig3"]
+
+
+def test_the_command_that_ends_last_reports_what_others_asked_for_meanwhile(
+    dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = ReproduceRequest(
+        names=("fig3",), out=tmp_path / "out", budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1
+    )
+
+    def another_meanwhile(*_: object, **__: object) -> None:
+        monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
+        reproduce.reproduce(replace(request, names=("fig5",)))
+
+    monkeypatch.setattr(reproduce, "run_jobs", another_meanwhile)
+    found = reproduce.reproduce(request)
+    assert [section.name for section in found.sections] == ["fig3", "fig5"]
+
+
+def test_features_of_rooms_depend_on_what_is_asked_for_not_on_what_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A random encoder is calibrated on the rooms together; another encoder's files are not taken for its own."""
+    by_name = {scene.name: scene for scene in small_rooms()}
+    monkeypatch.setattr(setting, "cached_room_scene", lambda name, progress: by_name[name])
+
+    def encoded(scenes: list[Scene], encoder: str, progress: bool) -> list[Scene]:
+        level = np.float32(len(scenes) + len(encoder))
+        return [replace(scene, features=scene.features + level) for scene in scenes]
+
+    monkeypatch.setattr(setting, "encode_scenes", encoded)
+
+    def digests(encoder: str, *rooms: str) -> dict[str, str]:
+        budget = BUDGETS["paper"].changed(rooms)
+        found = setting.prepare(tmp_path, budget, encoder=encoder, learners=("default",))
+        return {file.name: file.digest for file in found.files}
+
+    alone = digests("auto", "bathroom")
+    both = digests("auto", "bathroom", "kitchen")
+    assert both["bathroom"] != alone["bathroom"]
+    assert digests("auto", "bathroom") == alone
+    assert digests("auto", "bathroom", "kitchen") == both
+    assert digests("some/where/else", "bathroom") != alone
+
+
+def test_options_that_would_do_nothing_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:
+    words = ("reproduce", "fig5", "--out", tmp_path / "out")
+    assert clearway(*words, "--scenes", dumps, "--encoder", "random-resnet50").refusal("--encoder", "--scenes")
+    assert clearway(*words, "--ray", "auto", "--workers", 2).refusal("--workers", "--ray auto")
+    assert not (tmp_path / "out").exists()

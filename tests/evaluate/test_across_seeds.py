@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from clearway.evaluate.across_seeds import _interval, difference, mean_estimate, probability_of_less
+from clearway.evaluate.across_seeds import Estimate, _interval, difference, mean_estimate, probability_of_less
 
 SCENE = np.array([0, 0, 0, 1])  # three targets in one scene, one in another
 
@@ -70,3 +70,16 @@ def test_an_interval_of_five_runs_is_expanded_as_student_s_t_asks() -> None:
     """t of 4 degrees of freedom is 2.776; times sqrt(5 / 4) it is 3.104, where the normal leaves 0.00095."""
     low, high = _interval(np.linspace(0, 1, 1_000_001), 5) or (0, 0)
     assert (low, 1 - high) == (pytest.approx(0.000954, rel=0.01), pytest.approx(0.000954, rel=0.01))
+
+
+@pytest.mark.parametrize(("value", "text"), [(999.4, "999"), (999.7, "1,000"), (-999.7, "-1,000"), (0.01234, "0.0123")])
+def test_numbers_are_never_written_with_an_exponent(value: float, text: str) -> None:
+    assert str(Estimate(value, None)).startswith(text)
+
+
+def test_the_probability_of_improvement_has_an_interval_where_runs_differ() -> None:
+    first, second = np.array([[1.0], [3.0], [5.0]]), np.array([[2.0], [4.0], [6.0]])
+    found = probability_of_less(first, second, np.array([0]))
+    assert found.value == pytest.approx(6 / 9)  # 1 below all three, 3 below two, 5 below one
+    low, high = found.interval
+    assert low < 0.4 and high > 0.9

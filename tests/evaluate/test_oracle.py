@@ -9,7 +9,7 @@ import torch
 
 from clearway.envs.world import make_world
 from clearway.errors import SceneError
-from clearway.evaluate.episodes import run_episodes
+from clearway.evaluate.episodes import episode_starts, run_episodes
 from clearway.evaluate.optimum import optimum_policies, world_yardsticks
 from clearway.evaluate.oracle import action_values, make_task, optimal_policy, soft_policy, yardstick
 from clearway.evaluate.run import _optima
@@ -110,6 +110,35 @@ def test_a_dear_collision_zone_lengthens_the_way():
     dear = yardstick(make_task(scene.graph, zones, target, COLLISION_AWARE.with_changes(beta=-2.0))).optimal
     assert dear.steps > cheap.steps
     assert dear.collision_visits < cheap.collision_visits
+
+
+def test_figures_from_given_starts_are_means_over_those() -> None:
+    scene = grid_scene(3)
+    target = int(np.flatnonzero(scene.components == 0)[5])
+    task = make_task(scene.graph, pose_zones(scene.graph), target, COLLISION_AWARE)
+    alone = [yardstick(task, starts=np.array([start])) for start in task.starts[[3, 8, 8]]]
+    found = yardstick(task, starts=task.starts[[3, 8, 8]])
+    assert found.shortest_path_steps == np.mean([each.shortest_path_steps for each in alone])
+    for kind in ("optimal", "soft"):
+        for name in ("steps", "collisions", "collision_visits", "precollision_visits"):
+            mean = np.mean([getattr(getattr(each, kind), name) for each in alone])
+            assert getattr(getattr(found, kind), name) == pytest.approx(mean)
+    every, given = yardstick(task), yardstick(task, starts=task.starts)
+    assert given.shortest_path_steps == every.shortest_path_steps
+    assert vars(given.soft) == pytest.approx(vars(every.soft))
+
+
+def test_the_world_s_starts_are_those_of_the_episodes() -> None:
+    scenes = [grid_scene(1, name="one"), corridor_scene(5, feature_count=32)]
+    world = make_world(scenes, {scene.name: (2, 9) for scene in scenes})
+    starts = episode_starts(world, 7, seed=5)
+    soft = world_yardsticks(world, COLLISION_AWARE)
+    policy = optimum_policies(world, soft)[1]
+    table = run_episodes(world, policy, episodes_per_target=7, seed=5)
+    assert starts.reshape(-1).tolist() == table.start.tolist()
+    found = world_yardsticks(world, COLLISION_AWARE, starts=starts)
+    walked = [table.shortest_path_steps[table.target == target].mean() for target in range(4)]
+    assert [each.yardstick.shortest_path_steps for each in found] == pytest.approx(walked)
 
 
 def test_expected_figures_agree_with_walked_episodes():

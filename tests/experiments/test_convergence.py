@@ -102,6 +102,19 @@ def test_runs_that_never_settle_count_with_all_frames(
     assert settled or {claim.verdict for claim in claims} == {"undecided"}  # a tie decides nothing
 
 
+def test_a_run_whose_metrics_were_removed_does_not_count(done: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(convergence, "DETOUR", 1e6)
+    monkeypatch.setattr(convergence, "ARRIVING", 0.0)
+    groups = compared(done, PAIR)
+    metrics = run_folder(done.out, groups[0].runs[1]).metrics_path
+    text = metrics.read_text()
+    metrics.unlink()
+    table, _ = settling("fig4", done, groups)
+    metrics.write_text(text)
+    columns = [table.headings.index(name) for name in ("seeds", "settled")]
+    assert [[row[number] for number in columns] for row in table.rows] == [[1, 1], [2, 2], [2, 2], [2, 2]]
+
+
 def test_a_run_that_misses_a_target_in_the_end_has_not_settled(done: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "DETOUR", 1e6)
     monkeypatch.setattr(convergence, "ARRIVING", 0.0)

@@ -34,6 +34,11 @@ def test_whatever_changes_the_agent_changes_the_name(change: dict) -> None:
     assert replace(RUN, **change).name != RUN.name
 
 
+@pytest.mark.parametrize(("frames", "half"), [(1, 1), (2, 1), (3, 1), (10, 5)])
+def test_every_training_comes_by_its_half(frames: int, half: int) -> None:
+    assert replace(RUN, learner=replace(RUN.learner, frames=frames)).halfway == half
+
+
 def test_a_trial_s_name_tells_it_from_others() -> None:
     trials = [
         Trial(((1,),)),

@@ -10,16 +10,21 @@ import pytest
 
 from clearway.choices import ExperimentName
 from clearway.evaluate.episode_files import read_episodes
-from clearway.evaluate.episodes import EpisodeTable
-from clearway.experiments import analysis, fig3, fig5, fig6, generalisation, hard, job, table1
+from clearway.evaluate.episodes import EpisodeTable, episode_starts
+from clearway.evaluate.optimum import world_yardsticks
+from clearway.experiments import analysis, fig3, fig5, fig6, generalisation, hard, job, navigation_tables, table1
 from clearway.experiments.analysis import pareto_front
 from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.groups import Scores, compared
 from clearway.experiments.job import do, episodes_of, is_done, trial_path
 from clearway.experiments.reproduce import planned
 from clearway.experiments.section import ReportTable, Section
 from clearway.experiments.setting import Setting
+from clearway.learn.config import DEFAULT
+from clearway.reward import COLLISION_AWARE
 from clearway.viz import report
 from clearway.viz.report import HTML, JSON, MARKDOWN, write_report
+from small_runs import small_learner
 from small_setting import small_setting
 
 
@@ -104,6 +109,74 @@ def test_table1_has_the_exact_references_and_the_paper_s_figures(sections: dict[
     (row,) = [row for row in table.rows if row[:3] == ("collisions", "the paper", "collision-aware")]
     assert (row[table.headings.index("bathroom")], row[table.headings.index("kitchen")]) == (0.03, 0.12)
     assert any("other scenes and features" in note for note in table.notes)
+
+
+def test_exact_references_begin_where_the_agents_did(
+    setting: Setting, sections: dict[str, Section], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With few starts, and with so many that they are nearly all of them."""
+    for name in ("table1", "table2"):
+        table, by_target = sections[name].tables[:2]
+        (row,) = [row for row in table.rows if row[0] == "steps" and row[2] == "shortest path"]
+        named = dict(zip(table.headings, row, strict=True))
+        paths = {
+            scene: np.mean([row[6] for row in by_target.rows if (row[0], *row[2:5]) == (scene, "default", "bump", 0)])
+            for scene in ("bathroom", "kitchen")
+        }
+        assert by_target.headings[6] == "shortest_path_steps"
+        assert {scene: named[scene] for scene in paths} == pytest.approx(paths)
+    world = setting.world()
+    many = navigation_tables._references(world, [(COLLISION_AWARE, True)], episode_starts(world, 2000, 0))
+    every = [each.yardstick for each in world_yardsticks(world, replace(COLLISION_AWARE, clip=True))]
+    assert many[0][2]["steps"] == pytest.approx([each.shortest_path_steps for each in every], rel=0.05)
+    assert many[2][2]["collisions"] == pytest.approx([each.soft.collisions for each in every], rel=0.2)
+
+
+def test_figures_halfway_and_in_the_end_are_those_of_their_trials(
+    setting: Setting, sections: dict[str, Section]
+) -> None:
+    table = sections["fig4"].tables[0]
+    for halfway in (True, False):
+        (group,) = [
+            group for group in compared(setting, (COLLISION_AWARE,), halfway=halfway) if group.learner == "default"
+        ]
+        steps = group.scores(setting.out, 5).of("steps")
+        frames = small_learner(DEFAULT).frames // (2 if halfway else 1)
+        (row,) = [row for row in table.rows if row[:3] == ("default", "collision-aware", frames)]
+        expected = (steps[:, :3].mean(1) + steps[:, 3:].mean(1)).mean() / 2
+        assert dict(zip(table.headings, row, strict=True))["steps"] == pytest.approx(expected)
+
+
+def test_bands_reach_from_the_smallest_to_the_largest_seed(setting: Setting, sections: dict[str, Section]) -> None:
+    for figure in sections["fig4"].figures:
+        for line in figure.series:
+            assert (np.array(line.low) <= np.array(line.y)).all() and (np.array(line.y) <= np.array(line.high)).all()
+            assert (np.array(line.low) < np.array(line.high)).any()
+
+
+def test_table3_s_agents_are_trained_twice_as_long(setting: Setting) -> None:
+    frames = [{each.run.learner.frames for each in planned(setting, [name])} for name in ("table2", "table3")]
+    assert frames == [{800}, {1600}]
+
+
+def test_figure_3_shows_the_best_and_the_worst_seed(setting: Setting, sections: dict[str, Section]) -> None:
+    for figure in sections["fig3"].figures:
+        ends = {line.label.split(" (")[0]: line.y[-1] for line in figure.series}
+        for agent in ("shortest", "collision-aware"):
+            assert ends[f"{agent}, best"] <= ends[f"{agent}, worst"]
+
+
+def test_sets_tried_together_are_those_of_the_seeds_that_all_have() -> None:
+    first, second = (
+        generalisation.Tried(
+            Scores(seeds, np.array(seeds, dtype=float)[:, None, None] + np.zeros((len(seeds), 2, 8))), np.array([0, 1])
+        )
+        for seeds in ((0, 1, 2), (2, 0))
+    )
+    both = generalisation.together([first, second])
+    assert both.scores.seeds == (0, 2)
+    assert both.scores.values[:, :, 0].tolist() == [[0] * 4, [2] * 4]
+    assert len(set(both.target_scene.tolist())) == 4
 
 
 def test_table1_repeats_the_clipping_learner_without_clipping(setting: Setting, sections: dict[str, Section]) -> None:
@@ -191,8 +264,10 @@ def test_the_analysis_is_solved_once(setting: Setting, monkeypatch: pytest.Monke
     assert analysis.section(setting).tables == before
 
 
-@pytest.mark.parametrize("damage", ["", "{", "[]", '{"scenes": {}}'])
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"scenes": {}}', "[" * 10**5, "found"])
 def test_a_damaged_file_of_kept_results_is_made_anew(setting: Setting, sections: dict, damage: str) -> None:
+    if damage == "found":
+        damage = json.dumps(json.loads((setting.out / hard.FILE).read_text()) | {"found": {}})
     (setting.out / hard.FILE).write_text(damage)
     assert EXPERIMENTS["table2"].section(setting) == sections["table2"]
     assert json.loads((setting.out / hard.FILE).read_text())["rule"] == hard.RULE
@@ -256,7 +331,7 @@ def test_a_failed_target_is_counted_named_and_listed_first(setting: Setting, fai
     told = [
         claim.evidence for claim in section.claims if claim.text.startswith("published: fewer collisions than with the")
     ]
-    assert told[0].endswith("Failed targets, over all seeds: 0 of 10, 1 of 10.")
+    assert "Failed targets, over all seeds: 0 of 10, 1 of 10; episodes that arrived: 100.00%, 9" in told[0]
 
 
 def test_per_target_figures_of_unseen_targets_name_them(setting: Setting, sections: dict[str, Section]) -> None:

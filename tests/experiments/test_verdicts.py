@@ -58,8 +58,34 @@ def test_failed_targets_are_told_beside_the_means() -> None:
     success = np.ones((4, 2))
     success[2, 1] = 0.99
     told = with_failures(claim, np.ones((4, 2)), success)
-    assert told.evidence.endswith("Failed targets, over all seeds: 0 of 8, 1 of 8.")
+    assert told.evidence.endswith(
+        "Failed targets, over all seeds: 0 of 8, 1 of 8; episodes that arrived: 100.00%, 99.88%."
+    )
+    assert told.verdict == "holds"
+    same = with_failures(claim, np.ones((4, 2)), np.ones((4, 2)))
+    assert same.evidence.endswith("Failed targets, over all seeds: 0 of 8, 0 of 8.")
     assert with_failures(claim, np.empty((0, 2)), success) == claim
+
+
+def test_who_arrives_less_often_is_not_told_better() -> None:
+    """An agent that spins on the spot has no collisions."""
+    spinning, walking = np.zeros((4, 2)), np.ones((4, 2))
+    fewer = judged_less("fewer", "collisions", scores(0, 0, 0, 0), scores(1, 2, 1, 2), SCENE)
+    assert fewer.verdict == "holds"
+    assert with_failures(fewer, spinning, walking).verdict == "undecided"
+    assert with_failures(fewer, walking, spinning).verdict == "holds"
+    assert with_failures(fewer, walking - 0.009, walking).verdict == "holds"
+    assert with_failures(fewer, walking - 0.011, walking).verdict == "undecided"
+    other = judged_less("fewer", "collisions", scores(1, 2, 1, 2), scores(0, 0, 0, 0), SCENE)
+    assert other.verdict == "does not hold"
+    assert with_failures(other, walking, spinning).verdict == "undecided"
+    assert with_failures(other, spinning, walking).verdict == "does not hold"
+
+
+@pytest.mark.parametrize(("more", "verdict"), [(1.015, "holds"), (1.025, "does not hold")])
+def test_two_per_cent_more_are_no_more(more: float, verdict: str) -> None:
+    claim = judged_no_more("no more", "steps", scores(*[10 * more] * 4), scores(10, 10, 10, 10), SCENE)
+    assert claim.verdict == verdict
 
 
 def test_thousands_are_written_out() -> None:

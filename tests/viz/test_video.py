@@ -76,6 +76,20 @@ def test_a_film_can_be_read_again(agent: Agent, tmp_path: Path, name: str) -> No
     assert np.abs(found[0].astype(float) - pictures[0]).mean() < 4
 
 
+@pytest.mark.parametrize(("frames_per_s", "duration_ms"), [(3, 330), (15, 70), (50, 20)])
+def test_a_gif_is_as_fast_as_asked_for(frames_per_s: int, duration_ms: int, tmp_path: Path) -> None:
+    pictures = [np.full((4, 4, 3), level, np.uint8) for level in (0, 100, 200)]
+    write_video(tmp_path / "film.gif", iter(pictures), frames_per_s=frames_per_s)
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.info["duration"] == duration_ms
+
+
+def test_a_gif_faster_than_viewers_show_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ClearwayError, match=r"film\.gif: 51 frames/s in a GIF.*MP4"):
+        write_video(tmp_path / "film.gif", iter([np.zeros((4, 4, 3), np.uint8)]), frames_per_s=51)
+    assert not list(tmp_path.iterdir())
+
+
 def test_another_ending_is_refused_and_leaves_nothing(agent: Agent, tmp_path: Path) -> None:
     world, index, trajectory = episode(agent, step_cap=2)
     pictures = frames(small_scenes(), walked(world, agent.policy(world), index, trajectory, 4))

@@ -47,7 +47,7 @@ class Reproduce:
     learners: tuple[LearnerName, ...] = ("published", "default")
     """published: the paper's settings, synchronous; published-a3c: asynchronous, far slower; default: the recipe."""
     workers: int | None = None
-    """Runs side by side; by default one a core, as far as memory allows."""
+    """Runs side by side; by default one a core, as far as memory allows. A Ray cluster has its own count."""
     threads: int = 1
     """Threads of each run. Results repeat bit for bit at one number of threads."""
     ray: str | None = None
@@ -65,6 +65,10 @@ class Reproduce:
             raise ClearwayError(f"no experiment named. Name some of {', '.join(EXPERIMENTS)}, or all")
         if self.rooms and self.scenes:
             raise ClearwayError("--rooms are default rooms, and --scenes stand in their place. Give one of the two")
+        if self.encoder != "auto" and self.scenes:
+            raise ClearwayError("--encoder is for default rooms, and --scenes have their features. Give one of the two")
+        if self.workers is not None and self.ray not in (None, "local"):
+            raise ClearwayError(f"--workers are this machine's, and --ray {self.ray} says how many fit. Leave one out")
         named = [name for name in EXPERIMENTS if name in self.names]
         request = ReproduceRequest(
             names=list(EXPERIMENTS) if "all" in self.names else named,

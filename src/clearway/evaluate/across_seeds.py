@@ -96,7 +96,7 @@ def failed_targets(success: np.ndarray) -> str:
 
 def _text(value: float) -> str:
     """To three significant digits, never with an exponent that hides thousands."""
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    return f"{value:,.0f}" if abs(value) >= 999.5 else f"{value:.3g}"
 
 
 def _redrawn(runs: int, resamples: int, seed: int) -> np.ndarray:

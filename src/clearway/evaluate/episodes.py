@@ -118,6 +118,13 @@ def episode_seeds(world: World, episodes_per_target: int, seed: int) -> Tensor:
     return (first[:, None] + torch.arange(episodes_per_target)).reshape(-1).to(world.device)
 
 
+def episode_starts(world: World, episodes_per_target: int, seed: int) -> np.ndarray:
+    """Where the episodes of `run_episodes` begin, (M, episodes_per_target) int64 in the world's numbering."""
+    env = Navigation(world, COLLISION_AWARE, episode_seeds(world, episodes_per_target, seed))
+    env.reset(target=torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target))
+    return env.state.view(world.target_count, episodes_per_target).cpu().numpy()
+
+
 class _Walk:
     """A batch of episodes on the way. Episodes that end are written down and dropped from the batch."""
 

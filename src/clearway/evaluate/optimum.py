@@ -40,9 +40,21 @@ class TargetYardstick:
 
 
 def world_yardsticks(
-    world: World, reward: Reward, *, discount: float = DISCOUNT, entropy_weight: float = ENTROPY_WEIGHT
+    world: World,
+    reward: Reward,
+    *,
+    discount: float = DISCOUNT,
+    entropy_weight: float = ENTROPY_WEIGHT,
+    starts: np.ndarray | None = None,
 ) -> list[TargetYardstick]:
-    """Yardsticks of all targets of a world, in its order."""
+    """Yardsticks of all targets of a world, in its order.
+
+    Args:
+        world: see there.
+        reward: is earned.
+        discount, entropy_weight: see `oracle`.
+        starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
+    """
     graph = torch.where(world.blocked, BLOCKED, world.next_state).cpu().numpy()
     zone = world.zone.cpu().numpy()
     found = []
@@ -50,7 +62,7 @@ def world_yardsticks(
         first, last = world.scene_offset[scene : scene + 2].tolist()
         local = np.where(graph[first:last] == BLOCKED, BLOCKED, graph[first:last] - first)
         task = make_task(local, zone[first:last], world.scene_state(target), reward)
-        exact = yardstick(task, discount, entropy_weight)
+        exact = yardstick(task, discount, entropy_weight, None if starts is None else starts[target] - first)
         found.append(TargetYardstick(world.scene_names[scene], task.target, exact))
     return found
 

@@ -7,8 +7,9 @@ For one scene, target and reward:
 - soft: the fixed point pi = softmax(Q^pi / entropy weight), where the loss of A3C comes to rest if the network can
   represent anything (its entropy bonus counts for the step at hand, not for later ones).
 
-Expected steps, collisions and zone visits of a policy come from one sparse linear solve, averaged over all starts. A
-visit is an arrival; the target belongs to no zone, and the first pose of an episode is not an arrival.
+Expected steps, collisions and zone visits of a policy come from one sparse linear solve, averaged over all starts or
+over given ones, such as those of the agents that are compared with it. A visit is an arrival; the target belongs to no
+zone, and the first pose of an episode is not an arrival.
 
 Axis letters: S states, A actions.
 """
@@ -60,7 +61,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Expected:
-    """Means over all starts, per episode."""
+    """Means over starts, per episode."""
 
     steps: float
     collisions: float
@@ -76,7 +77,7 @@ class Yardstick:
     """What can be reached with one target.
 
     Attributes:
-        shortest_path_steps: mean over all starts.
+        shortest_path_steps: mean over starts.
         optimal, soft: figures of the two policies.
         optimal_policy, soft_policy: (S, A) action probabilities.
     """
@@ -105,14 +106,25 @@ def make_task(graph: np.ndarray, zone: np.ndarray, target: int, reward: Reward) 
     return Task(target, after, blocked, earned, zone, starts, steps)
 
 
-def yardstick(task: Task, discount: float = DISCOUNT, entropy_weight: float = ENTROPY_WEIGHT) -> Yardstick:
-    """Shortest path, optimal and soft policy of a task, exactly."""
+def yardstick(
+    task: Task,
+    discount: float = DISCOUNT,
+    entropy_weight: float = ENTROPY_WEIGHT,
+    starts: np.ndarray | None = None,
+) -> Yardstick:
+    """Shortest path, optimal and soft policy of a task, exactly.
+
+    Args:
+        task: see there.
+        discount, entropy_weight: of the policies.
+        starts: (E,) int64 states among the task's to average over, one as often as it occurs; None: all of the task's.
+    """
     best = optimal_policy(task, discount)
     soft = soft_policy(task, discount, entropy_weight)
     return Yardstick(
-        shortest_path_steps=float(task.steps_to_go[task.starts].mean()),
-        optimal=expected(task, best),
-        soft=expected(task, soft),
+        shortest_path_steps=float(task.steps_to_go[task.starts if starts is None else starts].mean()),
+        optimal=expected(task, best, starts),
+        soft=expected(task, soft, starts),
         optimal_policy=best,
         soft_policy=soft,
     )
@@ -171,8 +183,8 @@ def soft_policy(task: Task, discount: float = DISCOUNT, entropy_weight: float = 
     )
 
 
-def expected(task: Task, policy: np.ndarray) -> Expected:
-    """Expected figures of an episode under a policy (S, A), averaged over all starts.
+def expected(task: Task, policy: np.ndarray, starts: np.ndarray | None = None) -> Expected:
+    """Expected figures of an episode under a policy (S, A), averaged over starts as in `yardstick`.
 
     Inf where an episode may never end, or so rarely that float64 cannot tell.
     """
@@ -205,7 +217,8 @@ def expected(task: Task, policy: np.ndarray) -> Expected:
     lengths = per_episode[:, 0]
     if not ((lengths >= 1) & (lengths < 1 / np.finfo(np.float64).eps)).all():
         return NEVER
-    steps, collisions, collision_visits, precollision_visits = per_episode.mean(0).tolist()
+    chosen = slice(None) if starts is None else np.searchsorted(walking, starts)
+    steps, collisions, collision_visits, precollision_visits = per_episode[chosen].mean(0).tolist()
     return Expected(steps, collisions, collision_visits, precollision_visits)
 
 

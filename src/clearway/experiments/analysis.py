@@ -13,6 +13,7 @@ import numpy as np
 
 from clearway.choices import ZoneLevel
 from clearway.envs.world import World
+from clearway.evaluate.episodes import episode_starts
 from clearway.evaluate.metrics import METRIC_NAMES, average, by_scene
 from clearway.evaluate.optimum import world_yardsticks
 from clearway.evaluate.oracle import ENTROPY_WEIGHT, Expected
@@ -93,11 +94,11 @@ def section(setting: Setting) -> Section:
         name="analysis",
         title="What the reward does, exactly",
         text=(
-            "Expected figures an episode, mean over scenes of the means over targets and all starts. Optimal: the best "
-            "policy, ties taken alike. Soft: where the loss comes to rest with that entropy weight; the paper's: beta "
-            f"{PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, pose level. "
-            "Visits are counted in zones of the setting's own level, so those of the two levels do not compare. The "
-            "figures show the pose level at the paper's entropy weight."
+            "Expected figures an episode, mean over scenes of the means over targets and the agents' starts. Optimal: "
+            "the best policy, ties taken alike. Soft: where the loss comes to rest with that entropy weight; the "
+            f"paper's: beta {PAPERS_POINT.beta:g}, gamma {PAPERS_POINT.gamma:g}, entropy {ENTROPY_WEIGHT:g}, clipped, "
+            "pose level. Visits are counted in zones of the setting's own level, so those of the two levels do not "
+            "compare. The figures show the pose level at the paper's entropy weight."
         ),
         tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows), folded=True),),
         figures=tuple(_pareto(setting, found, metric) for metric in SHOWN),
@@ -111,21 +112,27 @@ Solved = list[tuple[Point, dict[str, dict[str, float]]]]
 def _solved(setting: Setting, points: Sequence[Point]) -> Solved:
     """Figures of every point; those solved before are read from the analysis's file."""
     path = setting.out / FILE
-    of = {"scenes": {f.name: [f.digest, list(own)] for f, own in zip(setting.files, setting.targets, strict=True)}}
+    trial = setting.trial()
+    of = {
+        "scenes": {f.name: [f.digest, list(own)] for f, own in zip(setting.files, setting.targets, strict=True)},
+        "starts": [trial.episodes_per_target, trial.seed],
+    }
     known: dict[str, dict] = kept(path, of, "points") or {}
     worlds = {level: setting.world(zone_level=level) for level in LEVELS}
+    starts = episode_starts(worlds["pose"], trial.episodes_per_target, trial.seed)
     for point in points:
         key = json.dumps(asdict(point))
         if key not in known:
-            known[key] = _figures(worlds, point)
+            known[key] = _figures(worlds, point, starts)
             keep(path, of, {"points": known})
     return [(point, known[json.dumps(asdict(point))]) for point in points]
 
 
-def _figures(worlds: dict[ZoneLevel, World], point: Point) -> dict[str, dict[str, float]]:
-    """Of the optimal and the soft policy. Visits are counted in the zones of the point's own level."""
+def _figures(worlds: dict[ZoneLevel, World], point: Point, starts: np.ndarray) -> dict[str, dict[str, float]]:
+    """Of the optimal and the soft policy, from starts (M, E). Visits are those of zones of the point's own level."""
     world = worlds[point.level]
-    exact = [each.yardstick for each in world_yardsticks(world, point.reward, entropy_weight=point.entropy)]
+    solved = world_yardsticks(world, point.reward, entropy_weight=point.entropy, starts=starts)
+    exact = [each.yardstick for each in solved]
 
     def means(policies: Sequence[Expected]) -> dict[str, float]:
         values = np.array([[getattr(policy, name) for name in FIGURES] for policy in policies])

@@ -54,7 +54,7 @@ class Budget:
         found = []
         if set(self.rooms) < set(PAPER.rooms):
             found.append(f"{len(self.rooms)} of {len(PAPER.rooms)} rooms")
-        if self.frames != PAPER.frames:
+        if self.frames < PAPER.frames:
             found.append(f"{self.frames:,} frames in the main experiment instead of the paper's {PAPER.frames:,}")
         return f"Less than the paper's budget: {'; '.join(found)}." if found else ""
 

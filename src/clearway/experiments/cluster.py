@@ -6,15 +6,16 @@ All nodes must see `out` under the same path, since a job that begins again goes
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from clearway.errors import ClearwayError, RunError
+from clearway.errors import RunError
 from clearway.experiments.job import do, run_folder
 from clearway.experiments.local import ATTEMPTS, JOB_BYTES, POLL_S
 from clearway.experiments.plan import Job
 from clearway.learn.run_folder import METRICS_FILE
-from clearway.ray_cluster import connected
+from clearway.ray_cluster import connected, result
 
 GRACE_S = 60.0  # for jobs under way to save a checkpoint when the user interrupts
 
@@ -55,7 +56,8 @@ def run_jobs_on_ray(
             while waiting:
                 done, _ = ray.wait(list(waiting), timeout=POLL_S)
                 for reference in done:
-                    _collected(ray, reference, waiting.pop(reference))
+                    job = waiting.pop(reference)
+                    result(ray, reference, partial(_death, job))
                 show([job for job in waiting.values() if _last_sign(out, job) != before[job.run.name]])
         finally:
             for reference in waiting:
@@ -85,20 +87,7 @@ def _last_sign(out: Path, job: Job) -> int | None:
     return path.stat().st_mtime_ns if path.exists() else None
 
 
-def _collected(ray: Any, reference: object, job: Job) -> None:
-    """See how a job ended.
-
-    Raises:
-        ClearwayError: badly.
-    """
-    try:
-        ray.get(reference)
-    except ray.exceptions.RayTaskError as error:
-        if isinstance(error.cause, ClearwayError):
-            raise RunError(str(error.cause)) from error
-        raise
-    except ray.exceptions.RayError as error:
-        reason = str(error).strip().splitlines()[0]
-        raise RunError(
-            f"run {job.run.name}: its worker or node died {ATTEMPTS} times ({reason}). Run the command again to go on"
-        ) from error
+def _death(job: Job, reason: str) -> RunError:
+    return RunError(
+        f"run {job.run.name}: its worker or node died {ATTEMPTS} times ({reason}). Run the command again to go on"
+    )

@@ -76,19 +76,19 @@ def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = 
     note = (
         f"Frames from which on {ARRIVING:.0%} of training episodes reach their target, and all take at most {mark:.3g} "
         f"steps on average, {DETOUR:g} times the shortest paths'. A run that never gets there, or fails a target in "
-        "the end, counts with all its frames."
+        "the end, counts with all its frames; one whose metrics.jsonl was removed does not count."
     )
     return ReportTable(f"{name}_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
 
 
 def _frames(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
-    """Frames until each complete run of a group had settled (R, 1), and how many have."""
+    """Frames until each complete run of a group whose metrics are there had settled (R, 1), and how many have."""
     frames, settled = [], 0
     for run in group.runs:
-        table = episodes_of(out, run, group.trial)
-        if table is None:
+        table, metrics = episodes_of(out, run, group.trial), run_folder(out, run).metrics()
+        if table is None or not metrics:
             continue
-        row = settled_row(run_folder(out, run).metrics(), mark) if table.reached.all() else None
+        row = settled_row(metrics, mark) if table.reached.all() else None
         settled += row is not None
         frames.append(run.learner.frames if row is None else row["frames"])
     return np.array(frames, dtype=np.float64).reshape(-1, 1), settled

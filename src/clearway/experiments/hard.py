@@ -74,7 +74,7 @@ def chosen(setting: Setting) -> TargetSets:
     path = setting.out / FILE
     question = {"rule": RULE, "scenes": {file.name: file.digest for file in setting.files}}
     found = kept(path, question, "found")
-    if found is None:
+    if found is None or set(found) != {scene.name for scene in setting.scenes}:
         found = {scene.name: asdict(hard_targets(scene)) for scene in setting.scenes}
         keep(path, question, {"found": found})
     return tuple(tuple(found[scene.name]["targets"]) for scene in setting.scenes)

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from clearway.files import written_whole
+from clearway.files import read_json, written_whole
 
 
 def kept(path: Path, question: Mapping[str, Any], name: str) -> Any | None:
     """What `keep` wrote under a name; None where the file is missing, damaged or belongs to another question."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         return content[name] if all(content[part] == value for part, value in question.items()) else None
-    except (FileNotFoundError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError):
         return None
 
 

@@ -28,7 +28,8 @@ class PaperRow:
     def average(self, metric: str, scenes: Sequence[str]) -> float | None:
         """The paper's own average where all of its scenes are among these, else the mean over those that are."""
         known = [value for value in self.by_scene(metric, scenes) if value is not None]
-        if len(known) == len(KINDS) == len(scenes):
+        kinds = {kind for scene in scenes for kind in KINDS if scene.startswith(kind)}
+        if len(known) == len(kinds) == len(KINDS) == len(scenes):
             return (self.steps if metric == "steps" else self.collisions)[AVERAGE]
         return round(sum(known) / len(known), 4) if len(known) == len(scenes) else None
 

@@ -46,7 +46,7 @@ class PlannedRun:
     @property
     def halfway(self) -> int:
         """Frames after half of the training; the agent is kept there too, see `RunFolder.milestone`."""
-        return self.learner.frames // 2
+        return max(1, self.learner.frames // 2)
 
     @property
     def name(self) -> str:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any, get_args
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
 from clearway.errors import RunError
@@ -89,9 +90,8 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
         KeyboardInterrupt: the user interrupted; the same command goes on.
     """
     setting = _setting(request, show_progress)
-    whole = _with_earlier(request)
     with written_whole(request.out / REQUEST_FILE) as part:
-        part.write_text(json.dumps(_request_json(whole), indent=2) + "\n", encoding="utf-8")
+        part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
     jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
     with board(request.out, jobs, show_progress) as show:
@@ -107,7 +107,7 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
                 threads=request.threads,
                 show=show,
             )
-    return _gathered(whole, setting)
+    return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
 
 
 def gather(out: Path) -> Reproduction:
@@ -125,11 +125,35 @@ def _read_request(out: Path) -> ReproduceRequest:
     try:
         content = read_json(path)
         dumps = [Path(dump) for dump in content.pop("dumps")]
-        return ReproduceRequest(out=out, dumps=dumps, **content)
+        return _checked(ReproduceRequest(out=out, dumps=dumps, **content))
     except FileNotFoundError as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
+
+
+def _checked(request: ReproduceRequest) -> ReproduceRequest:
+    """The request, if it is one that a command could make.
+
+    Raises:
+        ValueError: a name is unknown, or a number is none.
+    """
+    choices: tuple[tuple[Sequence[str], Any], ...] = (
+        (request.names, ExperimentName),
+        ([request.budget], BudgetName),
+        (request.rooms or (), RoomName),
+        (request.learners, LearnerName),
+    )
+    for given, kind in choices:
+        unknown = [name for name in given if name not in get_args(kind)]
+        if unknown:
+            raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(get_args(kind))}")
+    for count in (request.frames, request.seeds):
+        if count is not None and (type(count) is not int or count < 1):
+            raise ValueError(f"{count!r:.40} where a number of at least 1 is expected")
+    if not all(isinstance(text, str) for text in (request.encoder, *request.commands)):
+        raise ValueError("the encoder or a command is no text")
+    return request
 
 
 def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
@@ -146,8 +170,16 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
 
 
 def _question(request: ReproduceRequest) -> str:
-    """All of a request that must agree for its experiments to stand in one report."""
-    return json.dumps({name: value for name, value in _request_json(request).items() if name not in WHO_ASKED})
+    """All of a request that must agree for its experiments to stand in one report, defaults filled in."""
+    budget = BUDGETS[request.budget]
+    content = _request_json(request) | {
+        "budget": asdict(budget.changed(request.rooms, request.frames)),
+        "rooms": None,
+        "frames": None,
+        "seeds": request.seeds or budget.seeds,
+        "learners": sorted(request.learners),
+    }
+    return json.dumps({name: value for name, value in content.items() if name not in WHO_ASKED})
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:

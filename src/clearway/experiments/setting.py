@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from urllib.parse import quote
 
 from clearway.choices import LearnerName, ZoneLevel
 from clearway.envs.world import World, make_world
@@ -127,8 +128,13 @@ def prepare(
 
 
 def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) -> list[Path]:
-    """The default rooms with features, in files under `out`."""
-    paths = [out / SCENES / f"{name}.h5" for name in budget.rooms]
+    """The default rooms with features, in files under `out`.
+
+    A folder for each encoder and set of rooms: a random encoder is calibrated on all of them, so that the features of
+    one room are others beside others.
+    """
+    folder = out / SCENES / quote(encoder, safe="") / "+".join(budget.rooms)
+    paths = [folder / f"{name}.h5" for name in budget.rooms]
     if not all(path.exists() for path in paths):
         rooms = [cached_room_scene(name, progress=show_progress) for name in budget.rooms]
         for scene, path in zip(encode_scenes(rooms, encoder, progress=show_progress), paths, strict=True):

@@ -13,7 +13,7 @@ from clearway.learn.load import load_agent
 
 
 def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
-    """For each learner and scene the longest episode that the first seed's agents of both rewards finish.
+    """For each learner and scene the longest episode that most of the first seed's agents of both rewards finish.
 
     Learners of which one of the two runs is not complete are left out.
     """
@@ -29,6 +29,8 @@ def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
         for show in showcases(world, policies, history_length=history_length):
             walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
             name = f"map_{learner.replace(', ', '_')}_{show.scene}"
+            lost = [agent for agent, walk in walks.items() if walk[-1] != show.target]
             title = f"{learner}: {show.scene}, {show.shortest_path_steps} steps at least"
+            title += f" ({' and '.join(lost)} did not arrive)" if lost else ""
             found.append(ReportMap(name, title, show.scene, show.target, walks))
     return tuple(found)

@@ -26,6 +26,7 @@ STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
 FRAMES_PER_S = 3
 LAST_FRAME_TIMES = 6  # the last frame stays for so many
 SUFFIXES = (".mp4", ".gif")
+MOST_OF_A_GIF = 50  # frames/s; viewers show faster ones slowly
 
 
 @dataclass(frozen=True)
@@ -93,17 +94,23 @@ def _with_strip(picture: Image.Image, probabilities: np.ndarray | None, chosen: 
 
 
 def write_video(path: Path, pictures: Iterator[np.ndarray], frames_per_s: int = FRAMES_PER_S) -> None:
-    """Write an MP4 (H.264) or a GIF, by the path's ending.
+    """Write an MP4 (H.264) or a GIF, by the path's ending. A GIF counts in hundredths of a second.
 
     Raises:
-        ClearwayError: the ending is another one.
+        ClearwayError: the ending is another one, or a GIF cannot be as fast.
     """
     if path.suffix not in SUFFIXES:
         raise ClearwayError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}. Give another --out")
+    if path.suffix == ".gif" and frames_per_s > MOST_OF_A_GIF:
+        raise ClearwayError(
+            f"{path}: {frames_per_s} frames/s in a GIF, which viewers show {MOST_OF_A_GIF} of. Give fewer, or an MP4"
+        )
     with written_whole(path) as part:
         if path.suffix == ".gif":
             first, *others = [Image.fromarray(frame) for frame in _with_long_end(pictures)]
-            first.save(part, "GIF", save_all=True, append_images=others, duration=1000 // frames_per_s, loop=0)
+            first.save(
+                part, "GIF", save_all=True, append_images=others, duration=10 * round(100 / frames_per_s), loop=0
+            )
         else:
             _write_mp4(part, _with_long_end(pictures), frames_per_s)
 
