@@ -156,9 +156,12 @@ def test_a_killed_command_leaves_no_worker_that_keeps_its_runs_locked(tmp_path: 
 
 def test_memory_limits_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local, "_free_bytes", lambda: 3 * local.JOB_BYTES)
-    assert affordable_workers(8, threads=1) == 3
+    with pytest.warns(UserWarning, match=r"3 runs side by side instead of 8: one may take 1 GB, 3\.0 are free"):
+        assert affordable_workers(8, threads=1) == 3
     assert affordable_workers(2, threads=1) == 2
     monkeypatch.setattr(local, "_free_bytes", lambda: 0)
-    assert affordable_workers(8, threads=1) == 1
+    with pytest.warns(UserWarning, match="1 runs side by side instead of 8"):
+        assert affordable_workers(8, threads=1) == 1
+    assert affordable_workers(None, threads=1) == 1  # nothing to be told of
     monkeypatch.setattr(local, "_free_bytes", lambda: None)
     assert affordable_workers(8, threads=1) == 8

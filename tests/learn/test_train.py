@@ -297,6 +297,7 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
         ("threads", 7, "threads 1 instead of 7"),
         ("feature_store", "float16", "feature_store memory instead of float16"),
         ("device", "cuda", "device cpu instead of cuda"),
+        ("gpu", "a large one", "gpu None instead of a large one"),
         ("bfloat16", "maybe", "bfloat16 (True|False) instead of maybe"),
         ("torch", "1.0", "torch .* instead of 1.0"),
     ],

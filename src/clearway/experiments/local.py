@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import signal
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -77,11 +78,19 @@ class _Worker:
 
 
 def affordable_workers(wanted: int | None, threads: int) -> int:
-    """Jobs to run side by side: as wanted or one a core and thread, but no more than memory holds."""
+    """Jobs to run side by side: as wanted or one a core and thread, but no more than memory holds.
+
+    Warns:
+        UserWarning: memory holds fewer than were wanted.
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     asked = wanted or max(1, cores // threads)
     free = _free_bytes()
-    return asked if free is None else max(1, min(asked, free // JOB_BYTES))
+    found = asked if free is None else max(1, min(asked, free // JOB_BYTES))
+    if free is not None and wanted is not None and found < wanted:
+        each = f"one may take {JOB_BYTES / 1e9:g} GB, {free / 1e9:.1f} are free"
+        warnings.warn(f"{found} runs side by side instead of {wanted}: {each}", stacklevel=2)
+    return found
 
 
 def _free_bytes() -> int | None:

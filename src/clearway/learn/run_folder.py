@@ -163,7 +163,7 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             lock.acquire()
         except Timeout as error:
-            raise RunError(f"{self.path}: another process trains here. Choose another folder with --out") from error
+            raise RunError(f"{self.path}: another process trains here. Wait for it, or give another --out") from error
         except OSError as error:
             raise RunError(f"{self.path}: not a folder to write to ({error}). Choose another with --out") from error
         try:

@@ -36,12 +36,13 @@ from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.trainer import Trainer, Update
 from clearway.model.feature_map import FeatureMap
+from clearway.model.precision import multiplies_bfloat16
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
-SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "feature_store")  # of a run's versions and hardware
+SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 NETWORK = "network."  # tensors of the network among a trainer's
 
 
@@ -100,7 +101,13 @@ class RunRequest:
         record = record_of(
             self.scenes, self.paths or {}, self.targets, self.learner, self.reward, self.seed, self.zone_level
         )
-        where = {"device": self.device, "feature_store": self.feature_store}
+        device = torch.device(self.device)
+        where = {
+            "device": self.device,
+            "feature_store": self.feature_store,
+            "bfloat16": multiplies_bfloat16(device),
+            **({"gpu": torch.cuda.get_device_name(device)} if device.type == "cuda" else {}),
+        }
         return replace(record, hardware={**record.hardware, **where})
 
     def trainer(self) -> Learning:
@@ -191,9 +198,9 @@ def _warn_of_other_bits(folder: RunFolder, before: RunRecord, now: RunRecord) ->
     """Say where a run goes on in another way than it began, so that an uninterrupted one would have other bits."""
     then, here = ({**record.versions, **record.hardware} for record in (before, now))
     differ = [
-        f"{name} {here[name]} instead of {then[name]}"
+        f"{name} {here.get(name)} instead of {then[name]}"
         for name in SHAPES_BITS
-        if name in then and then[name] != here[name]
+        if name in then and then[name] != here.get(name)
     ]
     if differ:
         text = f"{folder.path}: goes on with {', '.join(differ)}; results will not be those of an uninterrupted run"
