@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from clearway.errors import RunError
+from clearway.errors import ClearwayError, RunError
 from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.plan import Job
@@ -91,7 +91,7 @@ def test_what_the_user_did_wrong_is_said_as_on_one_machine(tmp_path: Path) -> No
     setting = small_setting(tmp_path, seeds=1)
     (job,) = jobs_of(setting)
     setting.files[0].path.write_bytes(b"not a scene")
-    with pytest.raises(RunError, match=r"bathroom\.h5"):
+    with pytest.raises(ClearwayError, match=r"bathroom\.h5"):
         run_jobs_on_ray(setting.out, [job], address="local", workers=1, threads=1, show=nothing)
     assert not is_done(setting.out, job)
 
