@@ -52,7 +52,8 @@ def world_yardsticks(
     Args:
         world: see there.
         reward: is earned.
-        discount, entropy_weight: see `oracle`.
+        discount: see `oracle`.
+        entropy_weight: see there.
         starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
     """
     graph = torch.where(world.blocked, BLOCKED, world.next_state).cpu().numpy()

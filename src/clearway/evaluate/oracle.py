@@ -116,7 +116,8 @@ def yardstick(
 
     Args:
         task: see there.
-        discount, entropy_weight: of the policies.
+        discount: of rewards to come.
+        entropy_weight: of the soft policy.
         starts: (E,) int64 states among the task's to average over, one as often as it occurs; None: all of the task's.
     """
     best = optimal_policy(task, discount)
