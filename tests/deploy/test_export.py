@@ -38,14 +38,20 @@ def test_the_policy_alone_equals_the_network_in_pytorch(deployed, policy_file, r
     session = onnxruntime.InferenceSession(policy_file)
     found = session.run(["probabilities", "value"], {"history": features[history], "target": features[target]})
     np.testing.assert_allclose(found[0], torch.softmax(scores, 1).numpy(), **CLOSE)
-    np.testing.assert_allclose(found[1], value[:, None].numpy(), **CLOSE)
+    scale = agent.record.learner.reward_scale
+    np.testing.assert_allclose(found[1] * scale, value[:, None].numpy(), **CLOSE)
     assert np.ptp(found[0], axis=1).max() > 0.02  # trained enough that the actions differ
 
 
 @pytest.mark.parametrize("rows", [1, 3, 32])
 def test_policy_with_encoder_equals_the_evaluated_policy(deployed, rows) -> None:
-    """Walked from pictures, step by step, against the policy from tables that `clearway evaluate` judges."""
+    """Walked from pictures, step by step, against the policy from tables that `clearway evaluate` judges.
+
+    Values are in units of the reward, as the viewer shows them, not of what the learner made of it.
+    """
     chosen, scenes = deployed.chosen, deployed.scenes
+    scale = chosen.agent.record.learner.reward_scale
+    assert scale != 1
     world = run_world(chosen.agent.record, scenes)
     rng = np.random.default_rng(rows)
     states = rng.integers(0, len(deployed.pictures), (6, rows))
@@ -58,8 +64,9 @@ def test_policy_with_encoder_equals_the_evaluated_policy(deployed, rows) -> None
         start = np.full(rows, step == 0)
         found = model.step(deployed.pictures[states[step]], start, history, features)
         known = states[np.clip(np.arange(step - 3, step + 1), 0, None)].T  # (B, 4), the first repeated
-        expected = chosen.agent.policy(world)(torch.from_numpy(known) + first, torch.from_numpy(targets) + 2)
+        expected, value = chosen.agent.critic(world)(torch.from_numpy(known) + first, torch.from_numpy(targets) + 2)
         np.testing.assert_allclose(found.probabilities, expected.numpy(), **CLOSE)
+        np.testing.assert_allclose(found.value[:, 0] * scale, value.numpy(), **CLOSE)
         history = found.history
 
 

@@ -24,12 +24,16 @@ class PolicyGraph(nn.Module):
     def __init__(self, agent: Agent, scene: int) -> None:
         super().__init__()
         self.network, self.feature_map, self.scene = agent.network, agent.feature_map, scene
+        self.reward_scale = agent.record.learner.reward_scale
 
     def forward(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-        """Probabilities (B, A) and value (B, 1) for features of the last K pictures (B, K, F) and the target (B, F)."""
+        """Probabilities (B, A) and value (B, 1) for features of the last K pictures (B, K, F) and the target (B, F).
+
+        The value is in units of the reward, which the learner multiplied.
+        """
         fused = self.network.fused(self.feature_map(history), self.feature_map(target))
         output = self.network.head(fused, self.scene)
-        return torch.softmax(output[:, :ACTION_COUNT], 1), output[:, ACTION_COUNT:]
+        return torch.softmax(output[:, :ACTION_COUNT], 1), output[:, ACTION_COUNT:] / self.reward_scale
 
 
 class AgentGraph(nn.Module):

@@ -20,7 +20,7 @@ class Step(NamedTuple):
 
     Attributes:
         probabilities: (B, A) float32.
-        value: (B, 1) float32, the return that the agent expects.
+        value: (B, 1) float32, the discounted return that the agent expects, in units of the reward.
         history: (B, K, F) float32, to be given to the next step; its last row holds the features of what was seen.
     """
 

@@ -21,7 +21,7 @@ class Decision(NamedTuple):
     Attributes:
         action: the action chosen.
         probabilities: (A,) float32, of all actions.
-        value: the return that the agent expects.
+        value: the discounted return that the agent expects, in units of the reward.
     """
 
     action: Action
