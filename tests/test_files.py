@@ -1,5 +1,6 @@
 """Files written whole or not at all."""
 
+import errno
 import json
 import os
 import subprocess
@@ -98,6 +99,34 @@ def test_a_folder_in_the_way_is_named_and_nothing_is_left(tmp_path: Path) -> Non
             part.touch()
     assert caught.value.filename == str(tmp_path / "a.h5")
     assert names(tmp_path) == ["a.h5"]
+
+
+def test_a_link_stays_one_and_the_file_behind_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link.h5").symlink_to(tmp_path / "far" / "a.h5")
+    with written_whole(tmp_path / "link.h5") as part:
+        part.write_text("new")
+    assert (tmp_path / "link.h5").is_symlink()
+    assert (tmp_path / "far" / "a.h5").read_text() == "new"
+
+
+def test_devices_and_pipes_are_not_replaced_by_files(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="is a device or a pipe") as caught:
+        with written_whole(tmp_path / "pipe") as part:
+            part.touch()
+    assert caught.value.filename == str(tmp_path / "pipe")
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_full_disk_is_told_with_the_file_s_own_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    for named in (lambda part: None, str):
+        with pytest.raises(OSError, match=r"No space left on device: '.*/a\.png'"), written_whole(path) as part:
+            raise OSError(errno.ENOSPC, "Can't write (errno = 28, buf = 0x7f)", named(part))
+    with pytest.raises(FileNotFoundError) as caught, written_whole(path):
+        (tmp_path / "read.txt").read_text()
+    assert caught.value.filename == str(tmp_path / "read.txt")
 
 
 def test_a_cache_in_the_home_of_nobody_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:

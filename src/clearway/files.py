@@ -27,26 +27,42 @@ def written_whole(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; renamed to `path` on success, removed on any failure.
 
     The file reaches the disk (fsync) before it is renamed, so that a crash leaves the old file or the new one. What
-    processes that were killed left unfinished in the folder is removed.
+    processes that were killed left unfinished in the folder is removed. Where `path` is a link, the file that it leads
+    to is written.
 
     Raises:
-        OSError: the file cannot be written; IsADirectoryError where `path` is a folder.
+        OSError: the file cannot be written, and its name is that of `path`; IsADirectoryError where `path` is a folder.
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_leftovers(path.parent)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=path.parent)
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EEXIST, "is a device or a pipe, no file", str(path))
+    final = path.resolve()
+    final.parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(final.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{final.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=final.parent)
     os.close(handle)
     part = Path(name)
     try:
-        yield part
-        with part.open("rb+") as file:
-            os.fsync(file.fileno())
-        part.chmod(0o666 & ~_umask())
-        part.replace(path)
+        with _faults_named(part, path):
+            yield part
+            with part.open("rb+") as file:
+                os.fsync(file.fileno())
+            part.chmod(0o666 & ~_umask())
+            part.replace(final)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _faults_named(part: Path, path: Path) -> Iterator[None]:
+    """Let errors of writing `part`, which name it or nothing, name `path`."""
+    try:
+        yield
+    except OSError as fault:
+        if fault.errno is None or fault.filename not in (None, str(part)):
+            raise
+        raise OSError(fault.errno, os.strerror(fault.errno), str(path)) from fault
 
 
 def _remove_leftovers(folder: Path) -> None:

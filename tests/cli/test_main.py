@@ -200,6 +200,22 @@ def test_what_cannot_be_printed_is_told_in_one_line_or_let_be(trained, into, cod
     assert told in done.stderr and len(done.stderr.splitlines()) == bool(told)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device")
+def test_a_version_that_cannot_be_printed_is_told_in_one_line():
+    command = f"{shlex.quote(sys.executable)} -m clearway --version > /dev/full"
+    done = subprocess.run(["bash", "-c", command], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+
+
+def test_a_terminal_without_the_letters_gets_others(trained):
+    command = [sys.executable, "-m", "clearway", "evaluate", str(trained.run), "--episodes", "1", "--step-cap", "1"]
+    done = subprocess.run(
+        command, env={**ENVIRONMENT, "PYTHONIOENCODING": "ascii"}, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert "collision-aware" in done.stdout and done.stdout.isascii()
+
+
 def test_a_pipe_broken_elsewhere_is_no_success(clearway, trained, monkeypatch):
     def broken(*_, **__):
         raise BrokenPipeError(errno.EPIPE, "Broken pipe")

@@ -84,6 +84,11 @@ def test_a_gif_is_as_fast_as_asked_for(frames_per_s: int, duration_ms: int, tmp_
         assert film.info["duration"] == duration_ms
 
 
+def test_a_film_faster_than_any_screen_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ClearwayError, match=r"film\.mp4: 1000 frames/s, expected at most 240"):
+        write_video(tmp_path / "film.mp4", iter([np.zeros((4, 4, 3), np.uint8)]), frames_per_s=1000)
+
+
 def test_a_gif_faster_than_viewers_show_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ClearwayError, match=r"film\.gif: 51 frames/s in a GIF.*MP4"):
         write_video(tmp_path / "film.gif", iter([np.zeros((4, 4, 3), np.uint8)]), frames_per_s=51)

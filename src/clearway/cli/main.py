@@ -5,6 +5,7 @@ Exit codes: 0 success; 2 bad input, with one line that says what, where and the 
 
 from __future__ import annotations
 
+import io
 import os
 import select
 import sys
@@ -73,26 +74,20 @@ Command = (
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command that the arguments (by default the process's own) ask for, then exit."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words == ["--version"]:
-        from clearway.version import __version__
-
-        print(f"clearway {__version__}")
-        return
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # what a terminal has no letters for is no reason to end
     sys.exit(_exit_code(words))
 
 
 def _exit_code(words: Sequence[str]) -> int:
     try:
-        with refusals_in_one_line():
-            command = tyro.cli(
-                Annotated[Command, tyro.conf.arg(help="what to do")],  # or tyro reads all of typing for one
-                args=words,
-                prog="clearway",
-                description=DESCRIPTION,
-                config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-            )
-        with showing_warnings():
-            command.run()
+        if words == ["--version"]:
+            from clearway.version import __version__
+
+            print(f"clearway {__version__}")
+        else:
+            _run(words)
         sys.stdout.flush()  # here, where it can still be told that nothing could be written
     except ClearwayError as error:
         return _refused(str(error))
@@ -107,6 +102,20 @@ def _exit_code(words: Sequence[str]) -> int:
         print("interrupted", file=sys.stderr)
         return 130
     return 0
+
+
+def _run(words: Sequence[str]) -> None:
+    """Run the command that the words ask for."""
+    with refusals_in_one_line():
+        command = tyro.cli(
+            Annotated[Command, tyro.conf.arg(help="what to do")],  # or tyro reads all of typing for one
+            args=words,
+            prog="clearway",
+            description=DESCRIPTION,
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+        )
+    with showing_warnings():
+        command.run()
 
 
 def _reader_has_left() -> bool:

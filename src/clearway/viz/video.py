@@ -27,6 +27,7 @@ FRAMES_PER_S = 3
 LAST_FRAME_TIMES = 6  # the last frame stays for so many
 SUFFIXES = (".mp4", ".gif")
 MOST_OF_A_GIF = 50  # frames/s; viewers show faster ones slowly
+MOST_FRAMES_PER_S = 240
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def write_video(path: Path, pictures: Iterator[np.ndarray], frames_per_s: int = 
     """Write an MP4 (H.264) or a GIF, by the path's ending. A GIF counts in hundredths of a second.
 
     Raises:
-        ClearwayError: the ending is another one, or a GIF cannot be as fast.
+        ClearwayError: the ending is another one, or no film is as fast.
     """
     if path.suffix not in SUFFIXES:
         raise ClearwayError(f"{path}: expected a name that ends in {' or '.join(SUFFIXES)}. Give another --out")
@@ -105,6 +106,8 @@ def write_video(path: Path, pictures: Iterator[np.ndarray], frames_per_s: int = 
         raise ClearwayError(
             f"{path}: {frames_per_s} frames/s in a GIF, which viewers show {MOST_OF_A_GIF} of. Give fewer, or an MP4"
         )
+    if frames_per_s > MOST_FRAMES_PER_S:
+        raise ClearwayError(f"{path}: {frames_per_s} frames/s, expected at most {MOST_FRAMES_PER_S}. Give fewer")
     with written_whole(path) as part:
         if path.suffix == ".gif":
             first, *others = [Image.fromarray(frame) for frame in _with_long_end(pictures)]
