@@ -108,6 +108,23 @@ def test_all_rooms_need_a_folder(clearway, tmp_path):
     assert not path.exists()
 
 
+def test_no_other_file_is_lost_to_a_scene(clearway, trained, tmp_path):
+    notes = tmp_path / "notes.csv"
+    notes.write_text("mine")
+    assert clearway("scenes", "export", trained.scene, "--out", notes).refusal("notes.csv", ".h5 or .hdf5", "--out")
+    answer = clearway("scenes", "build", "--room", "bathroom", "--out", notes)
+    assert answer.refusal("notes.csv", "no scene's", "Give a folder")
+    assert notes.read_text() == "mine"
+
+
+def test_a_scene_that_is_replaced_is_told_of(clearway, trained, tmp_path):
+    words = ("scenes", "export", trained.scene, "--out", tmp_path / "again.h5")
+    assert [" ".join(clearway(*words).err.split()).endswith("replaces the scene that was there") for _ in range(2)] == [
+        False,
+        True,
+    ]
+
+
 @pytest.mark.parametrize("words", [("--seed", "-1"), ("--encoder-seed", "-1")], ids=" ".join)
 def test_rooms_have_no_negative_seed(clearway, tmp_path, words):
     answer = clearway("scenes", "build", "--room", "bathroom", "--out", tmp_path / "x.h5", *words)

@@ -71,6 +71,7 @@ def test_a_map_can_be_drawn_without_a_picture_from_above(clearway, tmp_path):
     [
         (("--name", "attic"), ("plans.npz", "attic", "Name one of hall, ell")),
         (("--features", "0"), ("plans.npz", "0 features", "Ask for")),
+        (("--features", "8", "--encoder", "resnet50"), ("--encoder says how to encode", "leave out --encoder")),
         (("--seed", "-1"), ("the seed must be 0 or more",)),
         (("--seed", "-1", "--features", "8"), ("the seed must be 0 or more",)),
         (("--cell-size", "0"), ("plans.npz", "'hall'", "cell size of 0.0 m")),

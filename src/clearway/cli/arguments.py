@@ -53,11 +53,12 @@ def check_named(what: str, named: Sequence[object]) -> None:
         raise ClearwayError(f"no {what} given. Name at least one")
 
 
-def check_ending(ending: str, **paths: Path | None) -> None:
-    """Check that files to be written, by option, have names that end so: no scene is lost. Raises ClearwayError."""
+def check_ending(*endings: str, **paths: Path | None) -> None:
+    """Check that files to be written, by option, have such endings: no other file is lost. Raises ClearwayError."""
     for name, path in paths.items():
-        if path is not None and path.suffix.lower() != ending:
-            raise ClearwayError(f"{path}: expected a name that ends in {ending}. Give another {_option(name)}")
+        if path is not None and path.suffix.lower() not in endings:
+            wanted = " or ".join(endings)
+            raise ClearwayError(f"{path}: expected a name that ends in {wanted}. Give another {_option(name)}")
 
 
 def _option(name: str) -> str:

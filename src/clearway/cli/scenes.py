@@ -9,8 +9,9 @@ from typing import Annotated, Literal
 import tyro
 
 from clearway.choices import RoomName
-from clearway.cli.arguments import check_at_least, check_ending, check_seeds, scene_files
+from clearway.cli.arguments import SCENE_SUFFIXES, check_at_least, check_ending, check_seeds, scene_files
 from clearway.cli.console import print_json, say, stdout_console
+from clearway.cli.imports.writing import replaces, write_and_say
 from clearway.errors import ClearwayError, printable
 from clearway.ray_cluster import kept_connected
 
@@ -23,7 +24,7 @@ class Build:
     """
 
     out: Path
-    """The scene file to write; for --room all, a folder for the four of them."""
+    """The scene file to write, .h5 or .hdf5, or a folder for it; for --room all, a folder for the four of them."""
     room: RoomName | Literal["all"] = "all"
     """Which room."""
     seed: int = 0
@@ -43,12 +44,14 @@ class Build:
         from clearway.perception import encode_scenes
         from clearway.scenes.library import cached_room_scene
         from clearway.scenes.rooms import ROOM_NAMES
-        from clearway.scenes.thor_v1 import write_scene
 
         check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)
         check_at_least(1, workers=self.workers)
-        if self.room == "all" and self.out.suffix:
+        in_folder = self.out.is_dir() or self.out.suffix.lower() not in SCENE_SUFFIXES
+        if self.room == "all" and not in_folder:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
+        if in_folder and self.out.exists() and not self.out.is_dir():
+            raise ClearwayError(f"{self.out}: a file, but no scene's. Give a folder or a name in .h5 with --out")
         names = ROOM_NAMES if self.room == "all" else (self.room,)
         workers, ray = self.workers, self.ray
         with kept_connected(ray, workers):
@@ -57,9 +60,7 @@ class Build:
                 scenes, self.encoder, seed=self.encoder_seed, progress=True, workers=workers, ray=ray
             )
         for scene in encoded:
-            path = self.out if self.out.suffix else self.out / f"{scene.name}.h5"
-            write_scene(scene, path)
-            say(f"{path}: {scene.state_count} states, {scene.cell_count} cells")
+            write_and_say(scene, self.out / f"{scene.name}.h5" if in_folder else self.out)
 
 
 @dataclass(frozen=True)
@@ -120,10 +121,12 @@ class Export:
 
         if self.file.is_dir():
             raise ClearwayError(f"{self.file}: a folder. Name one scene file")
+        check_ending(*SCENE_SUFFIXES, out=self.out)
         if self.out.resolve() == self.file.resolve():
             raise ClearwayError(f"{self.out}: would be written over the scene itself. Give another file with --out")
+        said = replaces(self.out)
         export_thor_v1(read_scene(self.file), self.out)
-        say(f"{self.out}: in the layout {self.format}")
+        say(f"{self.out}: in the layout {self.format}{said}")
 
 
 def _print_table(content: dict[str, object]) -> None:

@@ -39,7 +39,7 @@ class Encoding:
     def check_unused(self, why: str) -> None:
         """Check that no flag is given where nothing is encoded. Raises ClearwayError, which says why."""
         for field in fields(self):
-            if field.name != "encoder" and getattr(self, field.name) != field.default:
+            if getattr(self, field.name) != field.default:
                 flag = f"--{field.name.replace('_', '-')}"
                 raise ClearwayError(f"{flag} says how to encode, but {why}, or leave out {flag}")
 
@@ -69,13 +69,22 @@ def write_scenes(scenes: Sequence[Scene], out: Path, files: Sequence[Path] = ())
         out: the folder.
         files: that the scenes were read from, one each, and must not be written over; none where they were not.
     """
+    for scene, path in zip(scenes, _paths(scenes, out, files), strict=True):
+        write_and_say(scene, path)
+
+
+def write_and_say(scene: Scene, path: Path) -> None:
+    """Write a scene's file, and say so."""
     from clearway.scenes.thor_v1 import write_scene
 
-    for scene, path in zip(scenes, _paths(scenes, out, files), strict=True):
-        replaces = ", replaces the scene that was there" if path.exists() else ""
-        write_scene(scene, path)
-        said = f"{path}: {scene.state_count} states, {scene.cell_count} cells{replaces}"
-        say(said)
+    said = replaces(path)
+    write_scene(scene, path)
+    say(f"{path}: {scene.state_count} states, {scene.cell_count} cells{said}")
+
+
+def replaces(path: Path) -> str:
+    """The end of a line that says what was written, where a scene's file is there already."""
+    return ", replaces the scene that was there" if path.exists() else ""
 
 
 def place_name(file: Path) -> str:
