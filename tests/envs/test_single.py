@@ -140,6 +140,9 @@ def test_resets_that_do_not_fit() -> None:
     env = ImageGoalEnv(grid_scene(0))
     with pytest.raises(ResetNeeded):
         env.step(0)
+    for seed in (-1, 1.5):
+        with pytest.raises(EnvError, match="seed"):
+            env.reset(seed=seed)
     with pytest.raises(EnvError, match="is for vector environments"):
         env.reset(options={"reset_mask": np.array([True])})
     with pytest.raises(EnvError, match=r"not a target of grid\. Its targets: "):

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import ClearwayError, EnvError, SceneError
+from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from made import corridor_scene, grid_scene
@@ -294,6 +295,16 @@ BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] =
     (lambda: {"num_envs": 0}, EnvError, "at least 1 environment"),
     (lambda: {"history_length": 0}, EnvError, "at least 1 pose"),
     (lambda: {"max_episode_steps": 0}, EnvError, "at least 1 step"),
+    (lambda: {"num_envs": 2.0}, EnvError, "num_envs=2.0: expected a whole number"),
+    (lambda: {"history_length": 2.5}, EnvError, "history_length=2.5: expected a whole number"),
+    (lambda: {"max_episode_steps": 2.5}, EnvError, "max_episode_steps=2.5: expected a whole number"),
+    (lambda: {"autoreset_mode": "never"}, EnvError, "autoreset_mode='never' is unknown. Use one of NextStep"),
+    (lambda: {"scenes": 5}, EnvError, "scenes: 5 is neither a scene nor"),
+    (lambda: {"scenes": [grid_scene(0), None]}, EnvError, "scenes: None is neither a scene nor"),
+    (lambda: {"reward": Reward("mine", alpha=float("nan"))}, EnvError, "holds NaN or Inf"),
+    (lambda: {"targets": [5]}, EnvError, r"targets=\[5\]: expected state ids by scene name"),
+    (lambda: {"targets": {"grid": 5}}, EnvError, r"targets\['grid'\]=5: expected state ids"),
+    (lambda: {"targets": {"grid": [True]}}, SceneError, "target True is no state id"),
     (lambda: {"targets": {}}, SceneError, "the scene has no target"),
     (lambda: {"targets": {"other": [0]}}, SceneError, "other: targets are given for this scene"),
     (lambda: {"scenes": replace(corridor_scene(3), features=None)}, EnvError, "observations='pictures'"),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from clearway.choices import RewardName
 from clearway.envs.render import RENDER_MODES
@@ -13,6 +14,7 @@ from clearway.errors import EnvError
 from clearway.reward import REWARDS, Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
+from clearway.scenes.targets import default_targets
 
 SceneSource = Scene | str | Path
 Seeds = int | Sequence[int | None] | np.ndarray | None
@@ -21,9 +23,12 @@ NO_LIMIT = -1  # how gymnasium.make spells it; None means the same
 
 def loaded_scenes(scenes: SceneSource | Sequence[SceneSource]) -> list[Scene]:
     """The scenes themselves, or read from their files."""
-    sources = [scenes] if isinstance(scenes, (Scene, str, Path)) else list(scenes)
+    sources = [scenes] if isinstance(scenes, (Scene, str, Path)) or not isinstance(scenes, Iterable) else list(scenes)
     if not sources:
         raise EnvError("scenes is empty. Give at least one scene or scene file")
+    for source in sources:
+        if not isinstance(source, (Scene, str, Path)):
+            raise EnvError(f"scenes: {source!r:.80} is neither a scene nor a file's path. Give one of them, or several")
     return [source if isinstance(source, Scene) else _read(source) for source in sources]
 
 
@@ -36,6 +41,8 @@ def _read(path: str | Path) -> Scene:
 def chosen_reward(reward: RewardName | Reward) -> Reward:
     """The reward itself, or the one of that name."""
     if isinstance(reward, Reward):
+        if not np.isfinite(reward.table()).all():
+            raise EnvError(f"reward={reward} holds NaN or Inf. Give finite values")
         return reward
     if reward not in REWARDS:
         raise EnvError(f"reward={reward!r} is unknown. Use a Reward or one of {', '.join(map(repr, REWARDS))}")
@@ -43,7 +50,11 @@ def chosen_reward(reward: RewardName | Reward) -> Reward:
 
 
 def check_numbers(num_envs: int, history_length: int, max_episode_steps: int | None, render_mode: str | None) -> None:
-    """Raise EnvError where one of them is out of range."""
+    """Raise EnvError where one of them is out of range, or no whole number."""
+    numbers = {"num_envs": num_envs, "history_length": history_length, "max_episode_steps": max_episode_steps}
+    for name, number in numbers.items():
+        if not isinstance(number, (int, np.integer)) and (number is not None or name != "max_episode_steps"):
+            raise EnvError(f"{name}={number!r}: expected a whole number")
     if num_envs < 1:
         raise EnvError(f"num_envs={num_envs}: expected at least 1 environment")
     if history_length < 1:
@@ -52,6 +63,27 @@ def check_numbers(num_envs: int, history_length: int, max_episode_steps: int | N
         raise EnvError(f"max_episode_steps={max_episode_steps}: expected at least 1 step, or None for no limit")
     if render_mode is not None and render_mode not in RENDER_MODES:
         raise EnvError(f"render_mode={render_mode!r} is unknown. Use one of {', '.join(RENDER_MODES)}, or None")
+
+
+def chosen_targets(targets: Mapping[str, Sequence[int]] | None, scenes: Sequence[Scene]) -> dict[str, Sequence[int]]:
+    """Targets by scene name, the scenes' default ones for None; EnvError where they are nothing of the kind."""
+    if targets is None:
+        return {scene.name: default_targets(scene) for scene in scenes}
+    if not isinstance(targets, Mapping):
+        raise EnvError(f"targets={targets!r:.80}: expected state ids by scene name, such as {{'bathroom': [26, 37]}}")
+    for name, states in targets.items():
+        if isinstance(states, str) or not isinstance(states, Iterable):
+            raise EnvError(f"targets[{name!r}]={states!r:.80}: expected state ids, such as [26, 37]")
+    return {name: list(states) for name, states in targets.items()}
+
+
+def chosen_autoreset(mode: AutoresetMode | str) -> AutoresetMode:
+    """The mode itself, or the one of that name; EnvError where there is none."""
+    try:
+        return AutoresetMode(mode)
+    except ValueError as fault:
+        names = ", ".join(str(one.value) for one in AutoresetMode)
+        raise EnvError(f"autoreset_mode={mode!r} is unknown. Use one of {names}") from fault
 
 
 def checked_actions(actions: np.ndarray, env_count: int) -> np.ndarray:

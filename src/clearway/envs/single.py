@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from clearway.choices import RewardName, ZoneLevel
-from clearway.envs.arguments import SceneSource
+from clearway.envs.arguments import SceneSource, seed_words
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.options import RESET_MASK
 from clearway.envs.render import RENDER_MODES
@@ -145,6 +145,8 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         Raises:
             EnvError: the seed is negative, or an option is unknown or does not fit.
         """
+        if seed is not None:
+            seed_words(seed, 1)  # before Gymnasium, which raises other errors
         super().reset(seed=seed)
         if options and RESET_MASK in options:
             raise EnvError(f"options['{RESET_MASK}'] is for vector environments. Leave it out")

@@ -21,7 +21,9 @@ from clearway.envs.arguments import (
     Seeds,
     check_numbers,
     checked_actions,
+    chosen_autoreset,
     chosen_reward,
+    chosen_targets,
     loaded_scenes,
     seed_words,
 )
@@ -33,7 +35,6 @@ from clearway.envs.spaces import ObservationKind, observation_source, observatio
 from clearway.envs.world import make_world
 from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.scenes.targets import default_targets
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
@@ -102,9 +103,9 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     ) -> None:
         check_numbers(num_envs, history_length, max_episode_steps, render_mode)
         loaded = loaded_scenes(scenes)
-        chosen = {scene.name: default_targets(scene) for scene in loaded} if targets is None else targets
+        chosen = chosen_targets(targets, loaded)
         self.num_envs, self.render_mode = num_envs, render_mode
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = chosen_autoreset(autoreset_mode)
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
 
         seen = loaded if observations == "features" else [replace(scene, features=None) for scene in loaded]

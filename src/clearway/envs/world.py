@@ -201,7 +201,7 @@ def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) ->
         if not chosen:
             raise SceneError(scene.name, "the scene has no target", "Give at least one state id as its target")
         for target in chosen:
-            if not isinstance(target, Integral):
+            if not isinstance(target, Integral) or isinstance(target, bool):
                 raise SceneError(scene.name, f"target {target!r} is no state id", "Give whole numbers as targets")
             if not 0 <= target < scene.state_count:
                 valid = f"states are 0 to {scene.state_count - 1}"
