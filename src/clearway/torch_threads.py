@@ -6,6 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 
+def threads_in_use() -> int:
+    """How many threads torch uses now."""
+    import torch
+
+    return torch.get_num_threads()
+
+
 @contextmanager
 def torch_threads(count: int | None) -> Iterator[None]:
     """Let torch use `count` threads meanwhile; None leaves it as it is, with one a core."""

@@ -72,6 +72,15 @@ def test_batches_do_not_matter(own_cache: Path, monkeypatch: pytest.MonkeyPatch)
         assert np.allclose(a.features, b.features, atol=1e-3)
 
 
+def test_features_of_other_threads_or_batches_are_not_taken_from_the_cache(own_cache: Path) -> None:
+    """Their last bits differ, and those of workers are promised to be the same however many they are."""
+    settings = ({"threads": 2}, {"threads": 1}, {"threads": 1, "batch": 7})
+    for count, setting in enumerate(settings, start=1):
+        for _ in range(2):
+            encode_scenes(rooms()[:1], "random-resnet50", **setting)
+        assert len(list((own_cache / "features").glob("*.safetensors"))) == count
+
+
 def test_the_order_of_scenes_does_not_matter(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = encode_scenes(rooms(), "random-resnet50")
     monkeypatch.setenv("CLEARWAY_CACHE", str(own_cache / "other"))

@@ -19,7 +19,7 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
 from clearway.progress import picture_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
-from clearway.torch_threads import torch_threads
+from clearway.torch_threads import threads_in_use, torch_threads
 
 AUTO, TRAINED, RANDOM = "auto", "resnet50", "random-resnet50"
 BATCH_PICTURES = 32
@@ -93,7 +93,8 @@ def encode_scenes(
 ) -> list[Scene]:
     """The scenes with features of their pictures, all by one encoder.
 
-    Features are kept in the user's cache folder by the content of the pictures and the encoder's identity.
+    Features are kept in the user's cache folder by the content of the pictures, the encoder's identity, and what
+    decides the last bits: `batch` and the number of threads.
 
     Args:
         scenes: scenes with pictures; those to be trained together must be encoded together.
@@ -119,10 +120,12 @@ def encode_scenes(
         _encoding(workers, ray) as encode,
     ):
         record = find_record(encoder, scenes, seed=seed) if isinstance(encoder, str) else encoder
+        here = workers is None and ray is None
+        shaped_by = {"threads": threads_in_use() if here else 1, "batch": batch}
         encoded, done = [], 0
         for scene in scenes:
             pictures = _pictures(scene)
-            key = joint_key(content_key(pictures), record.identity)
+            key = joint_key(content_key(pictures), record.identity, shaped_by)
             make = partial(_encode_all, encode, record, pictures, batch, show_done, done)
             features = cached("features", key, make).arrays["features"]
             done += scene.state_count
