@@ -105,7 +105,12 @@ def test_another_room_seed_version_or_source_is_another_scene(cache, monkeypatch
     paths.add(scene_path("kitchen", 0))
     (package / "furniture" / "sofa.py").write_text("colour = 'blue'\n")
     paths.add(scene_path("kitchen", 0))
-    assert len(paths) == 6
+    for module in (library.building, library.grid, library.floor_plans):
+        changed = tmp_path / f"{module.__name__.rpartition('.')[2]}.py"
+        changed.write_text("pass\n")
+        monkeypatch.setattr(module, "__file__", str(changed))
+        paths.add(scene_path("kitchen", 0))
+    assert len(paths) == 9
     assert all(path.parent == cache for path in paths)
     assert build.built == 2
 

@@ -33,6 +33,8 @@ def test_sound_scenes_pass_without_quirks(seed: int) -> None:
         ("graph", (4, Action.TURN_LEFT), -1, "graph", "the left turn is blocked at state 4"),
         ("graph", (4, Action.TURN_RIGHT), 6, "graph", "a right and a left turn do not lead back at state 4"),
         ("graph", (4, Action.TURN_LEFT), 5, "graph", "a right and a left turn do not lead back at state 7"),
+        ("graph", (4, Action.MOVE_BACKWARD), 4, "graph", "a move leads where it began, and is not -1"),
+        ("graph", (slice(None), [Action.MOVE_FORWARD, Action.MOVE_BACKWARD]), -1, "graph", "has no open move"),
         ("features", (7, 2), np.nan, "resnet_feature", "1 states, first 7, hold NaN or Inf"),
         ("features", (7, 2), np.inf, "resnet_feature", "NaN or Inf"),
         ("locations_m", (0, 0), np.nan, "location", "NaN"),
@@ -46,6 +48,24 @@ def test_a_fault_is_named(part: str, where: object, value: float, dataset: str, 
     assert caught.value.dataset == dataset
     assert problem in str(caught.value)
     assert str(caught.value).startswith("some.h5, dataset")
+
+
+@pytest.mark.parametrize(
+    ("view", "problem"),
+    [
+        ({"image": np.zeros((0, 8, 3), np.uint8)}, "no picture"),
+        ({"image": np.zeros((8, 8), np.uint8)}, "no picture"),
+        ({"image": np.zeros((8, 8, 3))}, "float64"),
+        ({"x_min_m": 3.0, "x_max_m": 1.0}, "no rectangle"),
+        ({"z_min_m": 1.0, "z_max_m": 1.0}, "no rectangle"),
+        ({"z_max_m": np.inf}, "no rectangle"),
+    ],
+)
+def test_a_view_from_above_that_cannot_be_drawn_is_refused(view: dict, problem: str) -> None:
+    scene = corridor_scene(3)
+    with pytest.raises(SceneError, match=problem) as caught:
+        check_scene(replace(scene, top_view=replace(scene.top_view, **view)))
+    assert caught.value.dataset == "top_view"
 
 
 def test_wrong_shapes_and_types_are_refused() -> None:
@@ -76,7 +96,7 @@ def test_one_state_is_too_few() -> None:
 
 
 def turning_scene(heading_counts: tuple[int, ...]) -> Scene:
-    """Cells in a row without moves, each with its own number of headings."""
+    """Cells in a row along +z, each with its own number of headings; moves lead along the row."""
     headings, graph, first = [], [], 0
     for count in heading_counts:
         own = first + np.arange(count)
@@ -84,13 +104,17 @@ def turning_scene(heading_counts: tuple[int, ...]) -> Scene:
         graph += [(BLOCKED, *turns, BLOCKED) for turns in zip(np.roll(own, -1), np.roll(own, 1), strict=True)]
         first += count
     cell = np.repeat(np.arange(len(heading_counts)), heading_counts)
+    graph = np.array(graph, np.int32)
+    along = np.flatnonzero(np.array(headings) == 0)
+    graph[along[:-1], Action.MOVE_FORWARD] = along[1:]
+    graph[along[1:], Action.MOVE_BACKWARD] = along[:-1]
     return Scene(
         name="turning",
         observations=None,
         features=None,
-        locations_m=np.stack([0.5 * cell, 0.0 * cell], axis=1),
+        locations_m=np.stack([0.0 * cell, 0.5 * cell], axis=1),
         headings_deg=np.array(headings),
-        graph=np.array(graph, np.int32),
+        graph=graph,
         made_by=Provenance("test"),
     )
 

@@ -119,7 +119,7 @@ def scene_name(name: str, seed: int) -> str:
 
 def shaping_versions() -> dict[str, str]:
     """Versions of the packages that shape a room's pictures."""
-    return {"clearway": __version__, "mujoco": version("mujoco"), "numpy": version("numpy")}
+    return {"clearway": __version__, **{package: version(package) for package in ("mujoco", "numpy", "scipy")}}
 
 
 def check_mujoco() -> None:

@@ -12,6 +12,7 @@ from typing import Protocol
 
 from clearway import files
 from clearway.errors import SceneError
+from clearway.scenes import build as building
 from clearway.scenes import floor_plans, grid, rooms
 from clearway.scenes.build import build_floor_plan, build_scene, scene_name, shaping_versions
 from clearway.scenes.floor_plans import FloorPlan
@@ -103,12 +104,12 @@ def _cached(path: Path, title: str, make: Callable[[], Scene]) -> Scene:
 
 
 def _sources_hash() -> str:
-    """Hash of the source files of the room builder and of its graphs, so that a change of them makes a new scene."""
+    """Hash of the source files that build rooms, their graphs and views, so that a change of them makes a new scene."""
     folder = Path(rooms.__file__).parent
     sources = {source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
     digest = hashlib.sha256()
-    graphs = {"grid": Path(grid.__file__), "floor_plans": Path(floor_plans.__file__)}
-    for name, source in {**sources, **graphs}.items():
+    others = {module.__name__: Path(str(module.__file__)) for module in (building, floor_plans, grid)}
+    for name, source in {**sources, **others}.items():
         content = source.read_bytes()
         digest.update(f"{name} {len(content)}\n".encode())
         digest.update(content)

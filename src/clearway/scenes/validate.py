@@ -13,7 +13,7 @@ import numpy as np
 from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, MOVES, TURNS, Action
 from clearway.scenes.graph import turn_counts
-from clearway.scenes.scene import Observations, Scene
+from clearway.scenes.scene import Observations, Scene, TopView
 
 MIN_STATES = 2
 MAX_STATES = 65_536
@@ -34,6 +34,7 @@ def check_scene(scene: Scene, source: str | Path | None = None) -> None:
     source = scene.name if source is None else source
     check_graph(scene.graph, source)
     check_turns(scene.graph, source)
+    check_moves(scene.graph, source)
     check_poses(scene.locations_m, scene.headings_deg, scene.state_count, source)
     if scene.features is not None:
         if isinstance(scene.features, np.ndarray):  # features in a file are checked whenever they are read
@@ -42,6 +43,8 @@ def check_scene(scene: Scene, source: str | Path | None = None) -> None:
             raise SceneError(source, "has features but no record of their encoder", "Encode the scene again")
     if scene.observations is not None:
         check_observations(scene.observations, scene.state_count, source)
+    if scene.top_view is not None:
+        check_top_view(scene.top_view, source)
     if not MIN_CELL_SIZE_M <= scene.cell_size_m <= MAX_COORDINATE_M:  # NaN fails the comparison
         problem = f"has a cell size of {scene.cell_size_m} m"
         raise SceneError(source, problem, f"Give a length from {MIN_CELL_SIZE_M} to {MAX_COORDINATE_M:,.0f} m")
@@ -83,6 +86,14 @@ def check_turns(graph: np.ndarray, source: str | Path) -> None:
     _check(allowed, source, "graph", f"has {usual} headings, expected {MIN_HEADINGS} to {MAX_HEADINGS}")
 
 
+def check_moves(graph: np.ndarray, source: str | Path) -> None:
+    """Check that moves that are not blocked lead elsewhere, and that there are such. Raises SceneError."""
+    moves = graph[:, list(MOVES)]
+    stuck = (moves == np.arange(len(graph))[:, None]).any(axis=1)
+    _check_states(~stuck, source, f"a move leads where it began, and is not {BLOCKED} as blocked ones are,")
+    _check(bool((moves != BLOCKED).any()), source, "graph", "has no open move, so that nobody can go anywhere")
+
+
 def check_features(features: np.ndarray, state_count: int, source: str | Path) -> None:
     """Check that features are (S, F) finite floats. Raises SceneError."""
     name = "resnet_feature"
@@ -114,6 +125,18 @@ def check_observations(observations: Observations, state_count: int, source: str
     fits = fits and all(1 <= side <= MAX_PICTURE_SIDE for side in shape[1:3])
     wanted = f"({state_count}, height, width, 3) with sides up to {MAX_PICTURE_SIDE}"
     _check(fits, source, "observation", f"has shape {tuple(shape)}, expected {wanted}")
+
+
+def check_top_view(view: TopView, source: str | Path) -> None:
+    """Check that the picture from above is (height, width, 3) uint8 and covers some floor. Raises SceneError."""
+    shape = view.image.shape
+    fits = len(shape) == 3 and shape[2] == 3 and all(1 <= side <= MAX_PICTURE_SIDE for side in shape[:2])
+    fits = fits and view.image.dtype == np.uint8
+    _check(fits, source, "top_view", f"is {view.image.dtype} of shape {shape}, no picture")
+    extent_m = (view.x_min_m, view.x_max_m, view.z_min_m, view.z_max_m)
+    covers = view.x_min_m < view.x_max_m and view.z_min_m < view.z_max_m
+    sane = all(abs(side) <= MAX_COORDINATE_M for side in extent_m)
+    _check(covers and sane, source, "top_view", f"covers {extent_m} m (x from, to, z from, to), which is no rectangle")
 
 
 def pose_quirks(scene: Scene) -> list[str]:

@@ -11,7 +11,7 @@ from clearway.errors import SceneError
 from clearway.scenes.importers import photographs
 from clearway.scenes.importers.images import read_images
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.scenes.validate import check_scene, pose_quirks
+from clearway.scenes.validate import SceneWarning, check_scene, pose_quirks
 from made import graph_of_cells
 
 CELLS = np.array([[0, 0], [0, 1], [1, 1]])
@@ -70,10 +70,25 @@ def test_columns_may_stand_in_any_order_beside_others(tmp_path: Path) -> None:
 def test_blocked_edges_come_from_their_own_table(tmp_path: Path) -> None:
     table, _ = photographed(tmp_path)
     blocked = write_csv(tmp_path / "blocked.csv", [["x1", "z1", "x2", "z2"], [0, 0, 0, 0.5]])
-    scene = read_images(table, step_m=0.5, blocked=blocked)
+    with pytest.warns(SceneWarning, match=r"flat\.csv: the locations form 2 parts"):
+        scene = read_images(table, step_m=0.5, blocked=blocked)
     assert scene.components.max() == 1  # the first cell is cut off
     with pytest.raises(SceneError, match=r"blocked\.csv.*joins no two"):
         read_images(table, step_m=0.5, blocked=write_csv(blocked, [["x1", "z1", "x2", "z2"], [0, 0, 9, 9]]))
+
+
+def test_faults_of_the_poses_are_not_blamed_on_the_blocked_edges(tmp_path: Path) -> None:
+    table, rows = photographed(tmp_path)
+    blocked = write_csv(tmp_path / "blocked.csv", [["x1", "z1", "x2", "z2"], [0, 0, 0, 0.5]])
+    write_csv(table, [["file", "x", "z", "heading"], *rows[:-1]])
+    with pytest.raises(SceneError, match=r"flat\.csv: the location \(0\.5, 0\.5\) lacks the heading 270"):
+        read_images(table, step_m=0.5, blocked=blocked)
+
+
+def test_pictures_too_large_for_a_scene_file_are_refused(tmp_path: Path) -> None:
+    table, _ = photographed(tmp_path)
+    with pytest.raises(SceneError, match=r"4000 x 3000 pixels.*Give another --height"):
+        read_images(table, step_m=0.5, height_px=3000)
 
 
 def test_a_photograph_taken_upright_is_shown_upright(tmp_path: Path) -> None:
@@ -119,6 +134,7 @@ def test_a_picture_too_large_is_refused_before_it_is_unpacked(tmp_path: Path, mo
         ([["file", "x", "z"]], ("lacks the column heading", "file,x,z,heading")),
         ([["file", "x", "z", "heading"]], ("has 0 rows",)),
         ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, 0]], ("line 2 has fewer values",)),
+        ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, 5, 0, 5, 90]], ("line 2 has 6 values in 4", "a point")),
         ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, "here", 0]], ("line 2 holds '0,here,0'",)),
         ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, "nan", 0]], ("line 2 holds",)),
         ([["file", "x", "z", "heading"], ["photos/0-0.png", 0, 1e9, 0]], ("line 2 holds",)),

@@ -45,8 +45,8 @@ def test_eight_headings_move_along_diagonals_where_a_location_lies_there() -> No
 
 def test_a_location_a_little_off_is_still_reached_and_one_far_off_is_not() -> None:
     for off_m, reached in ((0.04, True), (0.06, False)):
-        locations_m, headings_deg = recorded(np.array([[0, 0], [0, 1]]))
-        locations_m[4:, 1] += off_m
+        locations_m, headings_deg = recorded(np.array([[0, 0], [0, 1], [1, 0]]))
+        locations_m[4:8, 1] += off_m
         graph = recorded_pose_graph(locations_m, headings_deg, 0.5, source="poses.csv")
         assert (graph[0, Action.MOVE_FORWARD] == 4) == reached
 
@@ -78,7 +78,16 @@ def test_faults_are_named(change, parts: tuple[str, ...]) -> None:
         assert part in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("cells", "problem"),
+    [(L_SHAPE, r"no move of 0\.3 m leads .*; the nearest two are 0\.5 m apart"), (L_SHAPE[:1], "there is only one")],
+)
+def test_a_step_that_leads_nowhere_is_refused(cells: np.ndarray, problem: str) -> None:
+    with pytest.raises(SceneError, match=problem):
+        recorded_pose_graph(*recorded(cells), 0.3, source="poses.csv")
+
+
 @pytest.mark.parametrize("edge", [[[0, 0], [0, 1.0]], [[0, 0], [7, 7]], [[0.1, 0], [0, 0.5]]])
 def test_a_blocked_edge_must_join_neighbours(edge: list) -> None:
     with pytest.raises(SceneError, match="joins no two neighbouring locations"):
-        recorded_pose_graph(*recorded(L_SHAPE), 0.5, blocked_edges=np.array([edge]), source="blocked.csv")
+        recorded_pose_graph(*recorded(L_SHAPE), 0.5, blocked_edges=np.array([edge]), source="poses.csv")

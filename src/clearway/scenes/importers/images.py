@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import csv
 import math
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.scenes.graph import components
 from clearway.scenes.importers.photographs import HEIGHT_PX, photographs, picture_within
 from clearway.scenes.importers.pose_graph import recorded_pose_graph
 from clearway.scenes.scene import Provenance, Scene
-from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES, check_scene
+from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES, SceneWarning, check_scene
 from clearway.version import __version__
 
 SOURCE = "images"
@@ -46,6 +48,9 @@ def read_images(
 
     Raises:
         SceneError: a table cannot be read or does not fit, or a picture is missing, too large or none.
+
+    Warns:
+        SceneWarning: some locations cannot be reached from others.
     """
     if not 0 < step_m < math.inf:
         raise SceneError(table, f"a step of {step_m} m", "Give a length above 0")
@@ -57,7 +62,13 @@ def read_images(
     if blocked is not None:
         lines = _rows(blocked, EDGE_COLUMNS)
         edges = np.array([_numbers(blocked, number, row) for number, row in lines]).reshape(-1, 2, 2)
-    graph = recorded_pose_graph(locations_m, headings_deg, step_m, blocked_edges=edges, source=blocked or table)
+    graph = recorded_pose_graph(
+        locations_m, headings_deg, step_m, blocked_edges=edges, source=table, blocked_source=blocked
+    )
+    parts = int(components(graph).max()) + 1
+    if parts > 1:
+        text = f"{table}: the locations form {parts} parts without a way between them. Check --step and what is blocked"
+        warnings.warn(text, SceneWarning, stacklevel=2)
     scene = Scene(
         name=name or table.stem,
         observations=photographs(paths, height_px, width_px),
@@ -89,9 +100,12 @@ def _rows(path: Path, columns: tuple[str, ...]) -> list[tuple[int, list[str]]]:
     if lacking:
         raise SceneError(path, f"lacks the column {lacking[0]}", f"Head it with {','.join(columns)}")
     places = [head.index(column) for column in columns]
-    short = next((number for number, line in lines[1:] if len(line) < len(head)), None)
-    if short is not None:
-        raise SceneError(path, f"line {short} has fewer values than columns", f"Give all of {', '.join(columns)}")
+    for number, line in lines[1:]:
+        if len(line) < len(head):
+            raise SceneError(path, f"line {number} has fewer values than columns", f"Give all of {', '.join(columns)}")
+        if any(line[len(head) :]):
+            problem = f"line {number} has {len(line)} values in {len(head)} columns"
+            raise SceneError(path, problem, "Write decimals with a point, and put texts with commas in quotes")
     rows = [(number, [line[place].strip() for place in places]) for number, line in lines[1:]]
     if not 1 <= len(rows) <= MAX_STATES:
         raise SceneError(path, f"has {len(rows)} rows, expected 1 to {MAX_STATES}", "Give one row a pose or edge")

@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from clearway.errors import SceneError
+from clearway.scenes.importers.limits import check_picture_size
 from clearway.scenes.limits import array_limit
 from clearway.scenes.pictures import file_stamp
 
@@ -55,7 +56,7 @@ class Photographs:
         """The pictures asked for.
 
         Raises:
-            SceneError: a file is gone, has changed, is no picture, or has more than 8 bits a channel.
+            SceneError: a file is gone, has changed, is no picture, or a grey one of more than 8 bits.
         """
         wanted = np.arange(self.shape[0])[index]
         pictures = np.empty((wanted.size, *self.shape[1:]), np.uint8)
@@ -86,11 +87,12 @@ def photographs(paths: Sequence[Path], height_px: int = HEIGHT_PX, width_px: int
         width_px: of the pictures; None: as the sides of the first file say. Others are cut to fit.
 
     Raises:
-        SceneError: the first file is no picture, or has more than 8 bits a channel.
+        SceneError: the first file is no picture, or a grey one of more than 8 bits; or the size is too large.
     """
     if width_px is None:
         width, height = _opened(paths[0]).size
         width_px = max(1, round(height_px * width / height))
+    check_picture_size(paths[0], height_px, width_px)
     return Photographs(tuple(paths), tuple(map(file_stamp, paths)), (len(paths), height_px, width_px, 3))
 
 

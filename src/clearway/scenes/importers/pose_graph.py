@@ -16,6 +16,7 @@ from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 SAME_PLACE_M = 1e-3  # locations closer than this are one
 REACH = 0.1  # a move ends at a location no farther from where it should end than this share of a step
 HEADING_TOLERANCE_DEG = 1.0
+STEP = "Give the distance of neighbouring locations as the step, and headings along which they lie"
 
 
 def recorded_pose_graph(
@@ -25,6 +26,7 @@ def recorded_pose_graph(
     *,
     blocked_edges: np.ndarray | None = None,
     source: str | Path,
+    blocked_source: str | Path | None = None,
 ) -> np.ndarray:
     """The graph of recorded poses, (S, A) int32; -1 where a move is blocked.
 
@@ -37,9 +39,11 @@ def recorded_pose_graph(
         step_m: length of a move.
         blocked_edges: (E, 2, 2) pairs of locations, x and z of each, without a way between them.
         source: file that errors name.
+        blocked_source: file that errors of blocked edges name; by default `source`.
 
     Raises:
-        SceneError: a pose stands twice, a location lacks a heading, or a blocked edge is none.
+        SceneError: a pose stands twice, a location lacks a heading, no location lies a step from another, or a blocked
+            edge is none.
     """
     places, location = _grouped(locations_m)
     pose = _poses(location, headings_deg, places, source)  # (L, H)
@@ -48,7 +52,9 @@ def recorded_pose_graph(
     ahead_m = step_m * np.stack([np.sin(turn), np.cos(turn)], axis=1)  # (H, 2)
     neighbour = _neighbours(places, ahead_m, step_m)  # (L, H)
     behind = _neighbours(places, -ahead_m, step_m)
-    blocked = _blocked_ways(places, neighbour, behind, blocked_edges, source)
+    if (neighbour == BLOCKED).all() and (behind == BLOCKED).all():
+        raise SceneError(source, f"no move of {step_m:g} m leads from one location to another{_nearest(places)}", STEP)
+    blocked = _blocked_ways(places, neighbour, behind, blocked_edges, blocked_source or source)
     graph = np.full((len(location), ACTION_COUNT), BLOCKED, np.int32)
     graph[pose, Action.TURN_RIGHT] = np.roll(pose, -1, axis=1)
     graph[pose, Action.TURN_LEFT] = np.roll(pose, 1, axis=1)
@@ -103,6 +109,14 @@ def _neighbours(places: np.ndarray, ahead_m: np.ndarray, step_m: float) -> np.nd
     """The location that a move ends at by location and heading, (L, H); -1 for none."""
     far, nearest = KDTree(places).query(places[:, None] + ahead_m, distance_upper_bound=REACH * step_m)
     return np.where(np.isfinite(far), nearest, BLOCKED)
+
+
+def _nearest(places: np.ndarray) -> str:
+    """How far the two nearest locations are apart, the end of a sentence."""
+    if len(places) == 1:
+        return "; there is only one"
+    apart_m = np.asarray(KDTree(places).query(places, k=2)[0])[:, 1]
+    return f"; the nearest two are {apart_m.min():g} m apart"
 
 
 def _blocked_ways(
