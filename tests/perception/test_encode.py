@@ -50,6 +50,12 @@ def test_scenes_are_encoded_together_by_one_encoder() -> None:
         assert scene.features.dtype == np.float32
 
 
+def test_another_seed_is_another_encoder_though_one_is_cached() -> None:
+    first, second = (encode_scenes(rooms()[:1], "random-resnet50", seed=seed)[0].encoder for seed in (0, 1))
+    assert (first.settings["seed"], second.settings["seed"]) == (0, 1)
+    assert first.identity != second.identity
+
+
 def test_the_record_in_a_file_makes_the_same_features(tmp_path: Path) -> None:
     scene = encode_scenes(rooms(), "random-resnet50")[0]
     write_scene(scene, tmp_path / "a.h5")

@@ -72,6 +72,10 @@ def test_every_scene_is_in_the_sample() -> None:
     assert np.allclose(features[0], -features[1], atol=1e-3)  # the mean lies halfway
 
 
+def test_more_scenes_than_pictures_to_sample_give_one_each() -> None:
+    assert tiny_record(sample_pictures=1).settings["sample_pictures"] == len(ROOMS) == 2
+
+
 def test_an_altered_record_is_refused() -> None:
     record = tiny_record()
     moved = {**record.arrays, "feature_mean": record.arrays["feature_mean"] + 1}
