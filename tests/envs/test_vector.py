@@ -187,6 +187,16 @@ def test_seeds_by_environment() -> None:
     assert [row[1:] for row in mixed] == [row[1:] for row in counted[1:]]
 
 
+def test_a_seed_is_for_the_environments_of_the_mask_alone() -> None:
+    envs = ImageGoalVectorEnv(grid_scene(0, width=9), num_envs=3)
+    counted = episode_starts(envs, seed=7)
+    episode_starts(envs, seed=7, resets=1)
+    envs.reset(seed=7, options={"reset_mask": np.array([True, False, False])})
+    mixed = episode_starts(envs, resets=3)
+    assert [row[0] for row in mixed] == [row[0] for row in counted[1:5]]
+    assert [row[1:] for row in mixed] == [row[1:] for row in counted[2:]]
+
+
 def test_seeds_beyond_64_bits_wrap() -> None:
     envs = ImageGoalVectorEnv(grid_scene(0), num_envs=2)
     assert episode_starts(envs, seed=2**64 - 1) == episode_starts(envs, seed=[2**64 - 1, 0])
@@ -225,6 +235,14 @@ def test_options_choose_scene_target_and_start() -> None:
         mask = np.array([False, False, True])
         _, info = envs.reset(options={"scene": "second", "target": 0, "start": 9, "reset_mask": mask})
         assert [info[key][2] for key in ("scene", "target", "state")] == [1, 0, 9]
+
+
+def test_a_target_that_the_options_leave_open_is_drawn() -> None:
+    envs = ImageGoalVectorEnv(corridor_scene(5), targets={"corridor": [0, 8, 16]}, num_envs=60)
+    _, info = envs.reset(seed=0, options={"start": 4})
+    states, counts = np.unique(info["target"], return_counts=True)
+    assert states.tolist() == [0, 8, 16]
+    assert counts.min() > 10
 
 
 @pytest.mark.parametrize(
@@ -284,6 +302,16 @@ def test_resets_that_are_missing() -> None:
     envs.reset(options={"start": np.array([12, 4])})
     envs.step(np.array([0, 0]))
     with pytest.raises(ResetNeeded, match=r"environments \[0\] are over"):
+        envs.step(np.array([0, 0]))
+
+
+def test_episodes_that_a_reset_left_out_stay_over() -> None:
+    envs = ImageGoalVectorEnv(corridor_scene(5), targets={"corridor": [16]}, num_envs=2, autoreset_mode="Disabled")
+    envs.reset(options={"start": 12})
+    _, _, terminated, *_ = envs.step(np.array([0, 0]))
+    assert terminated.tolist() == [True, True]
+    envs.reset(options={"reset_mask": np.array([True, False])})
+    with pytest.raises(ResetNeeded, match=r"environments \[1\] are over"):
         envs.step(np.array([0, 0]))
 
 
