@@ -63,3 +63,10 @@ def test_what_the_layout_needs_must_be_there(change, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="lacks pictures or features"):
         export_thor_v1(change(grid_scene(1)), tmp_path / "grid.h5")
     assert not list(tmp_path.iterdir())
+
+
+def test_it_is_a_file_that_hdf5_1_8_reads(tmp_path: Path) -> None:
+    export_thor_v1(grid_scene(1), tmp_path / "grid.h5")
+    with h5py.File(tmp_path / "grid.h5", "r") as file:
+        superblock = file.id.get_create_plist().get_version()[0]
+    assert superblock <= 2  # HDF5 1.10 brought the third

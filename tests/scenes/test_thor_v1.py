@@ -1,3 +1,4 @@
+import os
 import pickle
 import warnings
 from dataclasses import replace
@@ -11,7 +12,7 @@ from clearway.errors import SceneError
 from clearway.scenes import hdf5
 from clearway.scenes.graph import distances
 from clearway.scenes.pictures import FilePictures
-from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.scenes.thor_v1 import read_scene, step_length_m, write_scene
 from clearway.scenes.validate import SceneWarning
 from dumps import full_scene, published_dump
 from made import corridor_scene, graph_of_cells
@@ -114,6 +115,13 @@ def test_observation_and_distances_are_optional(tmp_path: Path) -> None:
     assert scene.distances.max() == 5
 
 
+def test_the_cell_size_is_the_length_of_most_moves() -> None:
+    scene = corridor_scene(5)
+    locations_m = scene.locations_m.copy()
+    locations_m[16:, 1] += 0.1  # the last cell lies off the grid
+    assert step_length_m(locations_m, scene.graph) == 0.5
+
+
 def test_odd_poses_only_warn(tmp_path: Path) -> None:
     published_dump(tmp_path / "a.h5", lambda file: file["rotation"].write_direct(np.full(16, 90, np.float32)))
     with warnings.catch_warnings(record=True) as told:
@@ -153,6 +161,17 @@ def test_pictures_of_a_replaced_or_deleted_file_are_refused(tmp_path: Path) -> N
     with pytest.raises(SceneError, match="has changed since"):
         pictures[0]
     (tmp_path / "a.h5").unlink()
+    with pytest.raises(SceneError, match="has changed since"):
+        pictures[0]
+
+
+def test_pictures_of_a_file_written_to_in_place_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    write_scene(full_scene(), path)
+    pictures, before = read_scene(path).observations, path.stat()
+    path.write_bytes(path.read_bytes())
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns + 10**9))  # its clock may tick slower than this test
+    assert (path.stat().st_ino, path.stat().st_size) == (before.st_ino, before.st_size)
     with pytest.raises(SceneError, match="has changed since"):
         pictures[0]
 
