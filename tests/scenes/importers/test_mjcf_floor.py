@@ -113,6 +113,24 @@ def test_the_agent_stands_on_floors_only() -> None:
         found(WALLS)
 
 
+def test_the_agent_does_not_move_across_a_ditch() -> None:
+    slabs = """
+      <geom type="box" size=".475 .8 .1" pos=".225 .5 -.1"/>
+      <geom type="box" size=".475 .8 .1" pos="1.275 .5 -.1"/>
+      <geom type="box" size=".05 .275 .1" pos=".75 1.025 -.1"/>
+    """  # a ditch at x = 0.7 to 0.8 between cells, with a bridge at z = 1
+    grid = found(slabs + WALLS)
+    assert places(grid) == FULL
+    assert ways(found(ENDLESS_FLOOR + WALLS)) - ways(grid) == {((0.5, z), (1.0, z)) for z in (0.0, 0.5)}
+
+
+@pytest.mark.parametrize(("lower_m", "columns"), [(0.09, [0.0, 0.5, 1.0, 1.5]), (0.11, [0.0, 0.5, 1.0])])
+def test_a_floor_counts_down_to_0_1_m_below_the_height_given(lower_m: float, columns: list[float]) -> None:
+    floor = '<geom type="box" size=".75 .8 .1" pos=".45 .5 -.1"/>'  # up to x = 1.2
+    step = f'<geom type="box" size=".3 .8 .1" pos="1.5 .5 {-0.1 - lower_m}"/>'
+    assert places(found(floor + step + WALLS)) == [place for place in FULL if place[0] in columns]
+
+
 def test_a_floor_may_lie_at_any_height() -> None:
     storey = '<geom type="box" size="1.05 .8 .1" pos=".75 .5 2.9"/>'
     post = '<geom type="cylinder" size=".05 .5" pos=".5 .5 3.5"/>'

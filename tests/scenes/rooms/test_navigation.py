@@ -63,8 +63,8 @@ def test_the_larger_of_two_compartments_is_kept():
 
 @pytest.mark.parametrize(
     ("height_m", "cells"),
-    [((0.6, 0.65), 15), ((1.45, 1.6), 15), ((1.6, 1.7), 16), ((0.0, 0.01), 16), ((0.0, 0.3), 15)],
-    ids=["table top", "low shelf", "high shelf", "rug", "stool"],
+    [((0.6, 0.65), 15), ((1.45, 1.6), 15), ((1.6, 1.7), 16), ((0.0, 0.019), 16), ((0.0, 0.021), 15), ((0.0, 0.3), 15)],
+    ids=["table top", "low shelf", "high shelf", "rug below 2 cm", "rug above 2 cm", "stool"],
 )
 def test_the_agent_passes_over_rugs_and_under_high_shelves_only(height_m, cells):
     grid = find_grid(SmallRoom().add_box((0.7, 0.8), (0.7, 0.8), height_m))
