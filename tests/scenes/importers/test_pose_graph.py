@@ -51,6 +51,13 @@ def test_a_location_a_little_off_is_still_reached_and_one_far_off_is_not() -> No
         assert (graph[0, Action.MOVE_FORWARD] == 4) == reached
 
 
+def test_locations_a_hair_apart_are_one() -> None:
+    locations_m, headings_deg = recorded(L_SHAPE)
+    hair_m = np.random.default_rng(0).uniform(-4e-4, 4e-4, locations_m.shape)
+    graph = recorded_pose_graph(locations_m + hair_m, headings_deg, 0.5, source="poses.csv")
+    np.testing.assert_array_equal(graph, graph_of_cells(L_SHAPE))
+
+
 def test_a_blocked_edge_is_blocked_both_ways_and_nothing_else() -> None:
     edge = np.array([[[0.0, 0.5], [0.0, 1.0]]])
     free = recorded_pose_graph(*recorded(L_SHAPE), 0.5, source="poses.csv")
