@@ -1,19 +1,24 @@
-"""The viewer's service as the command starts it, asked over the network."""
+"""The viewer's service as the command starts it, asked over the network, and what its application does alone."""
 
 import io
 import json
 import re
+import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from http.client import HTTPConnection, HTTPResponse
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import av
 import numpy as np
 import pytest
 from PIL import Image
+from starlette.testclient import TestClient
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from clearway.view import server
 from clearway.view.stage import Stage
 
 
@@ -175,3 +180,22 @@ def test_a_film_that_cannot_be_made_says_why(address: str) -> None:
         answer, content = get(address, f"film.mp4?{query}")
         assert answer.status == 400
         assert said in json.loads(content)["text"]
+
+
+def test_films_are_made_one_at_a_time(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    making: list[Path] = []
+    at_once = []
+
+    def write_film(stage: Stage, episode: object, path: Path, frames_per_s: int) -> None:
+        making.append(path)
+        time.sleep(0.1)
+        at_once.append(len(making))
+        making.remove(path)
+        path.write_bytes(b"film")
+
+    monkeypatch.setattr(server, "write_film", write_film)
+    client = TestClient(server.make_app(stage))
+    with ThreadPoolExecutor(3) as pool:
+        answers = list(pool.map(client.get, ["/film.mp4"] * 3))
+    assert [answer.content for answer in answers] == [b"film"] * 3
+    assert at_once == [1, 1, 1]

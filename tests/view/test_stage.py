@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from clearway.errors import RunError, SceneError
-from clearway.view.stage import Stage, agent_world, run_stage, scene_stage
+from clearway.view.stage import Stage, _has, agent_world, run_stage, scene_stage
 from made import corridor_scene, grid_scene
 from small_runs import FEATURES
 from small_stage import small_agent, write_scenes
@@ -39,6 +39,13 @@ def test_agents_without_a_scene_in_common_are_refused(tmp_path: Path) -> None:
     files = write_scenes(tmp_path, [corridor_scene(5, feature_count=FEATURES), grid])
     with pytest.raises(RunError, match=r"second: trained on other rooms than .*first \(corridor and grid\)"):
         run_stage([first, second], files)
+
+
+@pytest.mark.parametrize("part", ["graph", "locations_m", "headings_deg"])
+def test_a_scene_of_the_same_name_with_other_poses_or_moves_is_not_shared(stage: Stage, part: str) -> None:
+    shown, scene = stage.agents[1], stage.scenes[0]
+    assert _has(shown, replace(scene))
+    assert not _has(shown, replace(scene, **{part: getattr(scene, part)[::-1]}))
 
 
 def test_runs_of_one_name_are_told_apart_by_their_paths(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from clearway.envs.world import World
+from clearway.evaluate.episodes import episode_seeds, run_episodes
 from clearway.evaluate.selection import ActionSelection
 from clearway.reward import COLLISION_AWARE
 from clearway.view.episode import MOST_STEPS
@@ -109,6 +110,26 @@ def test_sampled_actions_repeat_with_the_seed_and_follow_the_probabilities() -> 
     assert first != actions(2)
     turns = [action for seed in range(10) for action in actions(seed)]
     assert turns.count(RIGHT) / len(turns) == pytest.approx(0.7, abs=0.05)
+
+
+def test_by_an_episode_s_seed_it_walks_as_in_the_evaluation() -> None:
+    world = corridor_world()
+    own = mind(world, "sampled")
+    table = run_episodes(
+        world,
+        lambda history, target: own.critic(history, target)[0],
+        episodes_per_target=1,
+        step_cap=MOST_STEPS,
+        seed=5,
+        record=True,
+        history_length=own.history_length,
+    )
+    assert table.trajectories is not None
+    for target, seed in enumerate(episode_seeds(world, 1, 5).tolist()):
+        walk = Walker(world, target, int(table.start[target]), COLLISION_AWARE, seed=seed, mind=own)
+        while walk.step():
+            pass
+        assert walk.actions == table.trajectories[target].actions.tolist()
 
 
 def test_recorded_actions_come_first_then_the_agent_chooses() -> None:
