@@ -51,9 +51,11 @@ def test_a_location_a_little_off_is_still_reached_and_one_far_off_is_not() -> No
         assert (graph[0, Action.MOVE_FORWARD] == 4) == reached
 
 
-def test_locations_a_hair_apart_are_one() -> None:
+@pytest.mark.parametrize(("origin_m", "hair"), [(0.0, 4e-4), (0.0625, 1e-12), (0.1125, 1e-12)])
+def test_locations_a_hair_apart_are_one(origin_m: float, hair: float) -> None:
+    """Wherever they lie: half millimetres are no borders."""
     locations_m, headings_deg = recorded(L_SHAPE)
-    hair_m = np.random.default_rng(0).uniform(-4e-4, 4e-4, locations_m.shape)
+    hair_m = origin_m + np.random.default_rng(0).uniform(-hair, hair, locations_m.shape)
     graph = recorded_pose_graph(locations_m + hair_m, headings_deg, 0.5, source="poses.csv")
     np.testing.assert_array_equal(graph, graph_of_cells(L_SHAPE))
 

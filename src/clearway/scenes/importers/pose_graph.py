@@ -8,6 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from clearway.errors import SceneError
@@ -68,8 +70,11 @@ def recorded_pose_graph(
 
 def _grouped(locations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distinct locations (L, 2), in order of first appearance, and the one of each pose, (S,)."""
-    keys = np.round(locations_m / SAME_PLACE_M).astype(np.int64)
-    _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    given, spot = np.unique(locations_m, axis=0, return_inverse=True)
+    pairs = KDTree(given).query_pairs(SAME_PLACE_M, output_type="ndarray")
+    near = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(given), len(given)))
+    _, place = connected_components(near, directed=False)
+    _, first, group = np.unique(place[spot.reshape(-1)], return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
