@@ -1,19 +1,23 @@
 """The service as its clients meet it, in process."""
 
+import asyncio
 import json
 
 import numpy as np
 import pytest
+from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 
 import clearway
 from clearway.errors import DeployError
+from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
 from serving import TOKEN, grey, picture_bytes
 from sums import CARD, Sums, plain
 
 PNG = {"content-type": "image/png"}
+PATIENT_S = 10  # for what must happen, on a busy machine
 
 
 def fault(answer) -> str:
@@ -102,21 +106,38 @@ def test_a_body_that_does_not_say_its_length_is_cut_off_too(client) -> None:
     assert fault(client.put(f"{session}/target", content=endless(), headers=PNG)) == "413 body_too_large"
 
 
-@pytest.mark.parametrize("token", [None, "", "x", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "é" * 10])
+WRONG_TOKENS = (None, "", "x", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "é" * 10)
+RIGHT = {"authorization": f"Bearer {TOKEN}"}
+
+
+def bearing(token: str | None) -> dict[str, bytes]:
+    return {} if token is None else {"authorization": f"Bearer {token}".encode()}
+
+
+@pytest.mark.parametrize("token", WRONG_TOKENS)
 def test_wrong_tokens(called, service, token) -> None:
-    client = called(service, None)
-    headers = {} if token is None else {"authorization": f"Bearer {token}".encode()}
+    client, headers = called(service, None), bearing(token)
     for method, path in (("GET", "/agent"), ("POST", "/sessions"), ("GET", "/metrics"), ("GET", "/openapi.json")):
         answer = client.request(method, path, headers=headers)
         assert fault(answer) == "401 unauthorised"
         assert answer.headers["www-authenticate"] == "Bearer"
-    with pytest.raises(WebSocketDisconnect), client.websocket_connect("/sessions/x/stream", headers=headers):
-        pass
     assert len(service.sessions) == 0
     for other in (f"Basic {TOKEN}", TOKEN):
         assert fault(client.get("/agent", headers={"authorization": other})) == "401 unauthorised"
     assert client.get("/health").json() == {"status": "ok"}  # says nothing else
     assert client.get("/agent", headers={"authorization": f"bearer {TOKEN}"}).status_code == 200
+
+
+@pytest.mark.parametrize("token", WRONG_TOKENS)
+def test_a_stream_opens_with_the_token_alone(called, service, token) -> None:
+    client = called(service, None)
+    path = f"/sessions/{client.post('/sessions', json={}, headers=RIGHT).json()['session_id']}/stream"
+    with pytest.raises(WebSocketDenialResponse) as denied, client.websocket_connect(path, headers=bearing(token)):
+        pass
+    assert fault(denied.value) == "401 unauthorised"
+    with client.websocket_connect(path, headers=RIGHT) as socket:
+        socket.send_bytes(grey(1))
+        assert json.loads(socket.receive_text())["error"]["code"] == "no_target"
 
 
 @pytest.mark.parametrize(
@@ -233,6 +254,52 @@ def test_the_stream_of_a_session(client) -> None:
         assert closed.value.code == 1008
     with pytest.raises(WebSocketDisconnect), client.websocket_connect(f"{session}/stream"):
         pass
+
+
+async def listening(service: Service, session_id: str, sent: list[dict]) -> None:
+    """A stream whose client says nothing, until the service ends it; what the service sends is added to `sent`."""
+    connect = [{"type": "websocket.connect"}]
+
+    async def receive() -> dict:
+        if not connect:
+            await asyncio.Event().wait()
+        return connect.pop()
+
+    async def send(message: dict) -> None:
+        sent.append(message)
+
+    path = f"/sessions/{session_id}/stream"
+    extensions = {"websocket.http.response": {}}
+    scope = {"type": "websocket", "path": path, "headers": [], "query_string": b"", "extensions": extensions}
+    await asyncio.wait_for(make_app(service)(scope, receive, send), PATIENT_S)
+
+
+def test_a_stream_that_nobody_uses_is_closed() -> None:
+    service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1)), []
+    asyncio.run(listening(service, service.sessions.open("sampled", None).id, sent))
+    assert [message["type"] for message in sent] == ["websocket.accept", "websocket.close"]
+    assert (sent[1]["code"], sent[1]["reason"]) == (1008, "unused for too long")
+
+
+def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
+    service = Service(Sums(), Limits(sessions=1))
+    session = service.sessions.open("sampled", None)
+
+    async def two() -> tuple[list[dict], list[dict]]:
+        first, second = [], []
+        held = asyncio.create_task(listening(service, session.id, first))
+        while not first:
+            await asyncio.sleep(0.001)
+        await listening(service, session.id, second)
+        assert not held.done()
+        held.cancel()
+        return first, second
+
+    first, (refusal, body) = asyncio.run(two())
+    assert [message["type"] for message in first] == ["websocket.accept"]
+    assert refusal["status"] == 503
+    assert json.loads(body["body"])["error"]["code"] == "overloaded"
+    assert not service.streams.locked()
 
 
 def test_figures_for_prometheus(client) -> None:

@@ -1,6 +1,7 @@
 """Concurrent pictures go through the model together."""
 
 import asyncio
+import threading
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from serving import grey
 from sums import Sums, plain
 
 TARGET = np.array([1.0, 1.0], np.float32)
+PATIENT_S = 10  # for what must happen, on a busy machine
 
 
 def ignore(pictures: int, seconds: float) -> None:
@@ -59,6 +61,16 @@ def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() ->
     assert [(answer.step, answer.decision.value) for answer in asyncio.run(run())] == [(1, 4.0), (2, 5.0)]
 
 
+def test_a_step_sent_while_the_target_is_computed_waits_for_it() -> None:
+    async def run() -> tuple[None, Answer]:
+        service = Service(Sums(seconds=0.05), Limits())
+        session = service.sessions.open("argmax", None)
+        return await asyncio.gather(service.set_target(session, grey(2)), service.step(session, grey(1)))
+
+    _, answer = asyncio.run(run())
+    assert (answer.step, answer.decision.value) == (1, 2004.0)
+
+
 def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:
     model = Sums(0.05)
 
@@ -73,6 +85,38 @@ def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:
 
     asyncio.run(ask())
     assert model.batches == [1, 1]
+
+
+@pytest.mark.parametrize("fails", [False, True], ids=["answers", "a model that fails"])
+def test_an_asker_who_goes_while_the_batch_is_computed_leaves_the_others_theirs(fails) -> None:
+    gone = threading.Event()
+
+    class Waits(Sums):
+        def step(self, seen, start, history, target):
+            result = super().step(seen, start, history, target)
+            assert gone.wait(PATIENT_S)
+            if fails:
+                raise ZeroDivisionError
+            return result
+
+    model = Waits()
+
+    async def ask() -> list[object]:
+        batcher = Batcher(model, Limits(), ignore)
+        first, *others = [asyncio.create_task(batcher.step(plain(level), None, TARGET)) for level in range(3)]
+        while not model.batches:
+            await asyncio.sleep(0.001)
+        first.cancel()
+        gone.set()
+        async with asyncio.timeout(PATIENT_S):
+            return await asyncio.gather(*others, return_exceptions=True)
+
+    found = asyncio.run(ask())
+    assert model.batches == [3]
+    if fails:
+        assert [type(each) for each in found] == [ZeroDivisionError] * 2
+    else:
+        assert [float(step.value[0]) for step in found] == [1004.0, 1008.0]
 
 
 def test_too_many_that_wait_are_refused_at_once() -> None:
