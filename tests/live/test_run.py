@@ -1,0 +1,102 @@
+"""Agents of several scenes in the room: each scene's own layers decide there; which agents can be compared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from clearway.envs.world import World, make_world
+from clearway.errors import RunError
+from clearway.learn.load import Agent
+from clearway.live.agent import live_policy
+from clearway.live.episodes import LiveProtocol
+from clearway.live.room import LiveRoom
+from clearway.live.run import Stage, check_alike, walk_setting
+from clearway.live.settings import Perturbations, Setting
+from clearway.perception.encode import encoder_from_record
+from clearway.scenes.actions import Action
+from clearway.scenes.rooms.camera import eye_view
+from clearway.scenes.rooms.render import studio
+from small_live import state_at
+from small_runs import small_request, small_world
+
+SURE = 1_000.0  # of an action's score
+
+
+@pytest.fixture
+def agent() -> Agent:
+    """Trained for a moment on a corridor and a grid."""
+    request = small_request()
+    trainer = request.trainer()
+    for _ in range(3):
+        trainer.update()
+    return Agent(request.record(), trainer.network, trainer.feature_map, trainer.frames)
+
+
+def histories(world: World, target: torch.Tensor) -> torch.Tensor:
+    """For each target a history (B, K) of states of its scene."""
+    first = world.scene_offset[world.target_scene[target]]
+    return first[:, None] + torch.randint(20, (len(target), 4), generator=torch.Generator().manual_seed(0))
+
+
+def test_the_policy_of_pictures_is_the_evaluated_one_in_every_scene(agent) -> None:
+    world = small_world()
+    features = world.features
+    assert features is not None
+    for scene, targets in enumerate(([0, 1, 2], [3, 4])):
+        target = torch.tensor(targets * 3)
+        history = histories(world, target)
+        expected = agent.policy(world)(history, target)
+        seen = features[history], features[world.target_state[target]]
+        torch.testing.assert_close(live_policy(agent, scene)(*seen), expected, rtol=1e-4, atol=1e-6)
+        other = live_policy(agent, 1 - scene)(*seen)
+        assert not torch.allclose(other, expected, rtol=1e-2)
+
+
+def resolved(live: LiveRoom, names: tuple[str, ...]) -> tuple[list[LiveRoom], Agent]:
+    """The room under several names, and an agent that walks ahead in the first and turns right in the others."""
+    scenes = [replace(live.scene, name=name) for name in names]
+    targets = {name: (state_at(live.scene, 1.75, 1.75, 0),) for name in names}
+    request = small_request(scenes=scenes, targets=targets)
+    trainer = request.trainer()
+    bias = trainer.network.output_bias.data
+    bias[0, Action.MOVE_FORWARD] = SURE
+    bias[1:, Action.TURN_RIGHT] = SURE
+    rooms = [replace(live, scene=scene) for scene in scenes]
+    return rooms, Agent(request.record(), trainer.network, trainer.feature_map, 0)
+
+
+def test_in_every_scene_its_own_layers_decide(live) -> None:
+    rooms, agent = resolved(live, ("first", "second"))
+    assert live.scene.encoder is not None
+    encoder = encoder_from_record(live.scene.encoder)
+    protocol = LiveProtocol(2, 3, 0, "sampled", agent.record.learner.history_length)
+    with studio(live.model, eye_view(), workers=1) as camera:
+        places = []
+        for room in rooms:
+            name = room.scene.name
+            world = make_world([room.scene], {name: agent.record.targets[name]})
+            places.append(Stage(room, world, encoder, camera))
+        outcome = walk_setting(places, {"agent": agent}, Setting("none", Perturbations()), protocol)
+    ahead, turning = outcome.tables["agent"]
+    for walk in ahead.walks:
+        assert (np.diff(walk[:, 2]) == 0).all()
+    for walk in turning.walks:
+        assert (np.diff(walk[:, 2]) % 360 == 90).all()
+
+
+def test_agents_that_differ_in_what_they_walk_to_are_not_compared(agent) -> None:
+    check_alike({"one": agent, "same": agent})
+    record = agent.record
+    corridor, grid = record.scenes
+    others = (
+        replace(record, scenes=(corridor, replace(grid, targets=(5, 21)))),
+        replace(record, scenes=(corridor, replace(grid, digest="0" * 16))),
+        replace(record, learner=replace(record.learner, history_length=2)),
+    )
+    for other in others:
+        with pytest.raises(RunError, match="differ in their scenes, targets or history length"):
+            check_alike({"one": agent, "other": replace(agent, record=other)})
