@@ -13,7 +13,7 @@ from clearway.envs.world import World, make_world
 from clearway.evaluate.episodes import run_episodes
 from clearway.evaluate.policies import random_policy, shortest_path_policy
 from clearway.live.episodes import LivePolicy, LiveProtocol, LiveTable, run_live_episodes
-from clearway.live.settings import Perturbations
+from clearway.live.settings import MOST, Perturbations
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder
 from clearway.scenes.actions import ACTION_COUNT
@@ -169,6 +169,13 @@ def test_furniture_moves_by_no_more_than_it_may_and_into_nothing(live, world, ca
     distances_m = [np.hypot(*offset) for layout in table.layouts for offset in layout.moved_m]
     assert max(distances_m) <= 0.3
     assert len({layout.moved_m for layout in table.layouts}) == 8
+
+
+def test_perturbations_at_their_most_can_be_walked(live, world, camera):
+    table = walked(live, world, camera, uniform, replace(PROTOCOL, step_cap=3), **MOST)
+    width_m, depth_m = live.room.width_m, live.room.depth_m
+    for walk in table.walks:
+        assert ((walk[:, :2] >= 0) & (walk[:, :2] <= (width_m, depth_m))).all()
 
 
 def test_an_episode_draws_the_same_whatever_else_is_perturbed(live, world, camera):

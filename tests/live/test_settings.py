@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from clearway.live.draws import Draws
-from clearway.live.settings import REFERENCE, Perturbations, label_of, sweep_settings
+from clearway.live.settings import MOST, REFERENCE, Perturbations, label_of, sweep_settings
 
 GREY = np.full((20, 30, 3), 100, np.uint8)
 
@@ -25,6 +25,13 @@ def test_a_sweep_has_every_perturbation_alone_and_all_together_at_every_strength
 def test_labels_name_what_is_changed():
     assert label_of(Perturbations()) == "none"
     assert label_of(Perturbations(light=0.3, new_obstacle=True)) == "light ± 30%, new obstacle"
+
+
+def test_every_magnitude_has_a_most_that_full_strength_keeps_to():
+    assert MOST.keys() == {name for name, value in REFERENCE.to_json().items() if not isinstance(value, bool)}
+    assert REFERENCE.too_strong is None and Perturbations(**MOST).too_strong is None
+    for name, most in MOST.items():
+        assert Perturbations(**{name: 1.01 * most}).too_strong == name
 
 
 def test_light_is_one_factor_an_episode_within_its_range():

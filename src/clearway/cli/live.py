@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
 from clearway.cli.console import print_json, say, stderr_console, stdout_console
 from clearway.errors import ClearwayError
-from clearway.live.settings import Perturbations
+from clearway.live.settings import MOST, REFERENCE, Perturbations
 
 if TYPE_CHECKING:
     from clearway.learn.load import Agent
@@ -47,6 +47,9 @@ class Live:
         negative = [name.replace("_", "-") for name, value in numbers.items() if value < 0]
         if negative:
             raise ClearwayError(f"--{negative[0]} is below 0. Give 0 or more")
+        if strong := self.perturbations.too_strong:
+            problem = f"--{strong.replace('_', '-')} is {numbers[strong]:g}, expected at most {MOST[strong]:g}"
+            raise ClearwayError(f"{problem}. Give a smaller number")
         if self.sweep and self.perturbations != Perturbations():
             raise ClearwayError("--sweep sets the perturbations itself. Leave their flags out")
         if not self.sweep and self.strengths != Live().strengths:
@@ -55,6 +58,10 @@ class Live:
             raise ClearwayError("--strengths is empty. Give one or more numbers above 0")
         for strength in self.strengths:
             check_positive(strengths=strength)
+            scaled = REFERENCE.scaled(strength)
+            if strong := scaled.too_strong:
+                problem = f"{strong.replace('_', '-')} would be {getattr(scaled, strong):g}, more than {MOST[strong]:g}"
+                raise ClearwayError(f"--strengths is {strength:g}: {problem}. Give a smaller number")
 
 
 def evaluate_live(

@@ -40,6 +40,11 @@ class Perturbations:
         """As JSON values: numbers, and whether there is a new obstacle."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
+    @property
+    def too_strong(self) -> str | None:
+        """The first magnitude above its `MOST`, or None."""
+        return next((name for name, most in MOST.items() if getattr(self, name) > most), None)
+
 
 REFERENCE = Perturbations(
     distance_noise=0.05,
@@ -52,6 +57,17 @@ REFERENCE = Perturbations(
     new_obstacle=True,
 )
 """Full strength in a sweep."""
+
+MOST = {
+    "distance_noise": 1.0,
+    "angle_noise": 180.0,
+    "camera_height_jitter": 1.0,
+    "camera_pitch_jitter": 90.0,
+    "light": 1.0,
+    "pixel_noise": 255.0,
+    "move_furniture": 10.0,
+}
+"""Of every magnitude: at light 1 an episode may be black, and no room is longer than 10 m."""
 
 
 @dataclass(frozen=True)
