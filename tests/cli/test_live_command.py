@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from clearway.learn.checkpoint import newest_checkpoint
+from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import train
+from clearway.live.run import walk_setting
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from small_live import walkable_room, walkable_scene
@@ -103,6 +106,42 @@ def test_a_sweep_has_a_row_a_setting(clearway, runs):
 )
 def test_flags_that_cannot_be_used(clearway, runs, words, parts):
     assert clearway("evaluate", runs.bold, *words).refusal(*parts)
+
+
+def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_before_it(clearway, runs, monkeypatch):
+    def names() -> set[str]:
+        return {path.name for path in runs.wary.iterdir() if path.name.startswith("live")}
+
+    short = ("evaluate", runs.wary, "--live", "--episodes", 1, "--step-cap", 1)
+    assert clearway(*short, "--light", 0.2).code == 0
+    assert names() == {"live.json", "live.md"}
+    before = (runs.wary / "live.json").read_text(), (runs.wary / "live.md").read_text()
+    walked = []
+
+    def walk_twice(*given):
+        if len(walked) == 2:
+            raise KeyboardInterrupt
+        walked.append(walk_setting(*given))
+        return walked[-1]
+
+    with monkeypatch.context() as patch:
+        patch.setattr("clearway.live.run.walk_setting", walk_twice)
+        assert clearway(*short, "--sweep").code == 130
+    assert ((runs.wary / "live.json").read_text(), (runs.wary / "live.md").read_text()) == before
+    part = json.loads((runs.wary / "live.part.json").read_text())
+    assert [result["setting"] for result in part["results"]] == ["none", "move ± 0.025 m"]
+    assert "| move ± 0.025 m |" in (runs.wary / "live.part.md").read_text()
+    assert clearway(*short).code == 0
+    assert names() == {"live.json", "live.md"}
+    assert [result["setting"] for result in json.loads((runs.wary / "live.json").read_text())["results"]] == ["none"]
+
+
+def test_a_checkpoint_is_the_first_run_s_own(clearway, runs):
+    """That of --against is its newest."""
+    own, other = (newest_checkpoint(RunFolder(run).checkpoints) for run in (runs.bold, runs.wary))
+    words = ("evaluate", runs.bold, "--live", "--episodes", 1, "--step-cap", 1, "--checkpoint")
+    clearway(*words, other).refusal(str(other), "not a checkpoint of")
+    assert clearway(*words, own, "--against", runs.wary).code == 0
 
 
 def test_the_same_run_twice_is_refused(clearway, runs):

@@ -14,7 +14,7 @@ from clearway.learn.load import Agent
 from clearway.live.agent import live_policy
 from clearway.live.episodes import LiveProtocol
 from clearway.live.room import LiveRoom
-from clearway.live.run import Stage, check_alike, walk_setting
+from clearway.live.run import Stage, check_alike, finish_live, walk_setting
 from clearway.live.settings import Perturbations, Setting
 from clearway.perception.encode import encoder_from_record
 from clearway.scenes.actions import Action
@@ -86,6 +86,19 @@ def test_in_every_scene_its_own_layers_decide(live) -> None:
         assert (np.diff(walk[:, 2]) == 0).all()
     for walk in turning.walks:
         assert (np.diff(walk[:, 2]) % 360 == 90).all()
+
+
+def test_finished_results_are_written_where_links_lead(tmp_path) -> None:
+    """As other results of a run are."""
+    kept, run = tmp_path / "kept.json", tmp_path / "run"
+    run.mkdir()
+    kept.write_text("old")
+    (run / "live.json").symlink_to(kept)
+    for name in ("live.part.json", "live.part.md"):
+        (run / name).write_text("new")
+    finish_live(run)
+    assert kept.read_text() == (run / "live.md").read_text() == "new"
+    assert {path.name for path in run.iterdir()} == {"live.json", "live.md"}
 
 
 def test_agents_that_differ_in_what_they_walk_to_are_not_compared(agent) -> None:

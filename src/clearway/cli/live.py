@@ -88,7 +88,7 @@ def evaluate_live(
     scenes = run_scenes(next(iter(agents.values())).record, scene_files(scene_paths) if scene_paths else None)
     _check_rooms_can_be_built()
     from clearway.live.episodes import LiveProtocol
-    from clearway.live.run import check_alike, live_json, stages, walk_setting, write_live
+    from clearway.live.run import check_alike, finish_live, live_json, stages, walk_setting, write_live_part
     from clearway.live.tables import rich_tables
 
     check_alike(agents)
@@ -103,7 +103,8 @@ def evaluate_live(
             for setting in settings:
                 outcomes.append(walk_setting(places, agents, setting, protocol, show))
                 results = [outcome.result for outcome in outcomes]
-                write_live(folder, results, protocol, encoder)  # what is complete outlives an interruption
+                write_live_part(folder, results, protocol, encoder)  # what is complete outlives an interruption
+        finish_live(folder)
         if pictures is not None:
             _draw(pictures, places, outcomes)
     if json:

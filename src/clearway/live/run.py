@@ -24,6 +24,7 @@ from clearway.scenes.rooms.render import Camera, studio
 from clearway.scenes.scene import Scene
 
 JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
+JSON_PART, MARKDOWN_PART = "live.part.json", "live.part.md"
 
 
 @dataclass(frozen=True)
@@ -132,9 +133,17 @@ def live_json(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: st
     }
 
 
-def write_live(folder: Path, results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> None:
-    """Leave live.json and live.md in a run folder."""
-    with written_whole(folder / JSON_FILE) as part:
+def write_live_part(folder: Path, results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> None:
+    """Leave the settings walked so far in a run folder, as live.part.json and live.part.md."""
+    with written_whole(folder / JSON_PART) as part:
         part.write_text(json_text(live_json(results, protocol, encoder)), encoding="utf-8")
-    with written_whole(folder / MARKDOWN_FILE) as part:
+    with written_whole(folder / MARKDOWN_PART) as part:
         part.write_text(markdown_tables(results, protocol, encoder), encoding="utf-8")
+
+
+def finish_live(folder: Path) -> None:
+    """Make what `write_live_part` left last the run's live.json and live.md: no setting is missing any more."""
+    for part, name in ((JSON_PART, JSON_FILE), (MARKDOWN_PART, MARKDOWN_FILE)):
+        with written_whole(folder / name) as whole:
+            whole.write_bytes((folder / part).read_bytes())
+        (folder / part).unlink()
