@@ -21,6 +21,7 @@ def table(**columns: list[float]) -> LiveTable:
     """Two targets, two episodes each."""
     plain: dict[str, list[float]] = {
         "start": [0, 0, 0, 0],
+        "seed": [0, 1, 2, 3],
         "steps": [10, 4, 5, 5],
         "contacts": [3, 0, 0, 1],
         "reached": [False, True, True, True],

@@ -3,13 +3,22 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import torch
 from PIL import Image
 
-from clearway.live.report import Comparison, Figures, LiveResult
-from clearway.live.settings import Perturbations
+from clearway.envs.world import make_world
+from clearway.live.episodes import LiveProtocol, run_live_episodes
+from clearway.live.report import Comparison, Figures, LiveResult, summarise
+from clearway.live.run import LiveOutcome, Stage
+from clearway.live.settings import REFERENCE, Perturbations, Setting
+from clearway.perception.encode import encoder_from_record
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.rooms.camera import eye_view
+from clearway.scenes.rooms.render import studio
 from clearway.viz.figures import CURVES
-from clearway.viz.live import PANELS, ROW_IN, _moves_to, draw_live_figures
+from clearway.viz.live import PANELS, ROW_IN, _moves_to, _view, draw_live_figures
 from made import corridor_scene
+from small_live import walkable_live
 
 
 def figures(value: float) -> Figures:
@@ -46,3 +55,29 @@ def test_a_place_lies_ahead_where_free_moves_lead_there() -> None:
     assert _moves_to(scene, 4 * 1 + 2, place_m) == 0  # looks the other way
     assert _moves_to(scene, 4 * 1 + 1, place_m) == 0  # blocked
     assert _moves_to(scene, 4 * 3, place_m) == 0  # stands there
+
+
+def test_the_view_is_what_the_agent_saw_in_that_episode() -> None:
+    """At its start, under every perturbation: layout, light, jitter and noise are the episode's own."""
+    live, seen = walkable_live(), []
+    assert live.scene.encoder is not None
+    encoder = encoder_from_record(live.scene.encoder)
+
+    class Looking:
+        def encode(self, pictures: np.ndarray) -> np.ndarray:
+            seen.append(pictures.copy())
+            return encoder.encode(pictures)
+
+    def uniform(history: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+        return torch.full((len(target), ACTION_COUNT), 1 / ACTION_COUNT)
+
+    world = make_world([live.scene], {live.scene.name: (8, 41)})
+    protocol = LiveProtocol(episodes_per_target=2, step_cap=1, seed=5, selection="sampled", history_length=4)
+    with studio(live.model, eye_view(), workers=1) as camera:
+        table = run_live_episodes(live, world, uniform, Looking(), camera, REFERENCE, protocol)
+        result = summarise("all", REFERENCE, {"uniform": (table,)}, seed=0)
+        outcome = LiveOutcome(Setting("all", REFERENCE), result, {"uniform": (table,)})
+        stage = Stage(live, world, encoder, camera)
+        for episode, start in enumerate(seen[0]):
+            x_m, z_m, heading_deg = table.walks[episode][0].tolist()
+            np.testing.assert_array_equal(_view(stage, 0, outcome, episode, (x_m, z_m, heading_deg)), start)

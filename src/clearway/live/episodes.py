@@ -50,6 +50,7 @@ class LiveTable:
     Attributes:
         target: (N,) int64, index of the world's target, ascending.
         start: (N,) int64, first state in the scene's numbering.
+        seed: (N,) int64, of the episode's `Draws`.
         steps: (N,) int64, steps taken; the cap where the target was not reached.
         contacts: (N,) int64, moves that ended at an obstacle.
         reached: (N,) bool, the target was reached before the cap.
@@ -64,6 +65,7 @@ class LiveTable:
 
     target: np.ndarray
     start: np.ndarray
+    seed: np.ndarray
     steps: np.ndarray
     contacts: np.ndarray
     reached: np.ndarray
@@ -233,6 +235,7 @@ def _table(walkers: list[_Walker], target: np.ndarray, distance: np.ndarray) -> 
     return LiveTable(
         target=target,
         start=np.array([walker.start for walker in walkers]),
+        seed=np.array([walker.draws.seed for walker in walkers]),
         steps=np.array([len(walker.steps) for walker in walkers]),
         contacts=np.array([sum(step.contact for step in walker.steps) for walker in walkers]),
         reached=np.array([walker.reached for walker in walkers]),

@@ -143,9 +143,9 @@ def _draw_from_above(axes: Axes, stage: Stage, scene_index: int, outcome: LiveOu
 def _view(
     stage: Stage, scene_index: int, outcome: LiveOutcome, episode: int, pose: tuple[float, float, float]
 ) -> np.ndarray:
-    """What the agent would see at a pose in this setting's episode, (height, width, 3) uint8."""
+    """What the agent would see at a pose, first of all in this setting's episode, (height, width, 3) uint8."""
     table = next(iter(outcome.tables.values()))[scene_index]
-    draws = Draws(episode, outcome.setting.perturbations)
+    draws = Draws(int(table.seed[episode]), outcome.setting.perturbations)
     shot = first_person_shot(
         *pose,
         height_m=CAMERA_HEIGHT_M + draws.height_error_m(),
