@@ -3,13 +3,14 @@
 import socket
 import threading
 
+import httpx
 import numpy as np
 import pytest
 from PIL import Image
 
 from clearway.errors import ClearwayError, DeployError
 from clearway.serve import protocol
-from clearway.serve.client import KEEP_ALIVE_S, Client, ServiceError, picture_file
+from clearway.serve.client import KEEP_ALIVE_S, Client, ClientSession, ServiceError, picture_file
 from imported import imported_by
 from serving import TOKEN, grey, picture_bytes
 from sums import plain
@@ -54,6 +55,37 @@ def test_a_wrong_token_and_an_address_where_nobody_answers(called, service) -> N
     assert issubclass(ServiceError, ClearwayError)
 
 
+@pytest.mark.parametrize("url", ["http://127.0.0.1:notaport", "http://[::1", "http://a\nb"])
+def test_addresses_that_cannot_be(url) -> None:
+    with pytest.raises(ServiceError, match=r"unreachable: .* is no address .* Give one such as http") as caught:
+        Client(url, TOKEN)
+    assert caught.value.code == "unreachable"
+
+
+def test_a_host_s_name_that_cannot_be_looked_up() -> None:
+    with Client(f"http://{'x' * 70}", TOKEN) as client, pytest.raises(ServiceError, match=r"unreachable: .*address"):
+        client.agent()
+
+
+@pytest.mark.parametrize("token", ["", "tökenx", "secret token", "secret\n"])
+def test_tokens_that_cannot_be_sent(token) -> None:
+    with pytest.raises(ServiceError, match=r"unauthorised: the token is .* Give the one that the service") as caught:
+        Client("http://127.0.0.1:9", token)
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"<html>", b"", b"[]", b"{}", b"\xff\xfe"])
+def test_another_service_that_answers_every_request(content) -> None:
+    stranger = httpx.Client(
+        base_url="http://stranger", transport=httpx.MockTransport(lambda request: httpx.Response(200, content=content))
+    )
+    client = with_service(stranger, Client("http://stranger", TOKEN))
+    session = ClientSession(client, "x")
+    for ask in (client.agent, client.session, lambda: session.act(plain(1))):
+        with pytest.raises(ServiceError, match="status 200: http://stranger: no clearway service answers there"):
+            ask()
+
+
 def test_connections_are_given_up_before_the_service_does() -> None:
     with Client("http://127.0.0.1:9", TOKEN) as client:
         assert client._http._transport._pool._keepalive_expiry == KEEP_ALIVE_S < protocol.KEEP_ALIVE_S
@@ -85,6 +117,16 @@ def test_how_pictures_are_sent(tmp_path) -> None:
     assert picture_file(path) == picture_file(str(path)) == (grey(3), "image/png")
     content, content_type = picture_file(plain(3))
     assert content_type == "image/png" and content.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["nofile.png", ".", "a\0b.png"])
+def test_pictures_that_cannot_be_read(client, tmp_path, name) -> None:
+    session = with_service(client, Client("http://testserver", TOKEN)).session()
+    for give in (session.set_target, session.act):
+        with pytest.raises(DeployError, match=r"cannot be read \(.*\)\. Name a JPEG, PNG or WebP file"):
+            give(tmp_path / name)
+        with pytest.raises(DeployError, match="cannot be read"):
+            give(str(tmp_path / name))
 
 
 def test_a_client_needs_nothing_of_the_service_or_the_learner() -> None:

@@ -13,11 +13,12 @@ import numpy as np
 
 from clearway.deploy.model import checked_picture
 from clearway.deploy.navigator import Decision, Selection, checked_seed
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, DeployError
 from clearway.scenes.actions import Action
 
 TIMEOUT_S = 30.0
 KEEP_ALIVE_S = 3.0  # of an idle connection; the service's is longer, so that it never closes one that is used
+ANSWER = ("action_index", "probabilities", "value")  # of a step
 KINDS = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png", b"RIFF": "image/webp"}
 
 
@@ -25,7 +26,8 @@ class ServiceError(ClearwayError):
     """The service refused, or cannot be reached.
 
     Args:
-        code: the service's code, for example "too_many_sessions"; "unreachable" where there was no answer.
+        code: the service's code, for example "too_many_sessions"; "unreachable" where there was no answer, "status 404"
+            and the like where something else answered.
         message: what it says.
     """
 
@@ -45,6 +47,9 @@ class Client:
         url: for example "http://127.0.0.1:8000".
         token: that the service printed when it started.
         timeout_s: for one answer.
+
+    Raises:
+        ServiceError: the address or the token cannot be one.
     """
 
     def __init__(self, url: str, token: str, timeout_s: float = TIMEOUT_S) -> None:
@@ -52,20 +57,27 @@ class Client:
             import httpx
         except ImportError as fault:
             raise ClearwayError("the client needs httpx. Install it: pip install 'clearway[serve]'") from fault
+        if not token or " " in token or not (token.isascii() and token.isprintable()):
+            problem = "the token is empty or holds other than plain letters"
+            raise ServiceError("unauthorised", f"{problem}. Give the one that the service printed when it started")
+        try:
+            address = httpx.URL(url)
+        except httpx.InvalidURL as fault:
+            problem = f"{url} is no address ({fault})"
+            raise ServiceError("unreachable", f"{problem}. Give one such as http://127.0.0.1:8000") from fault
         headers = {"authorization": f"Bearer {token}"}
         limits = httpx.Limits(keepalive_expiry=KEEP_ALIVE_S)
-        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s, limits=limits, trust_env=False)
-        self._unreachable = httpx.HTTPError
+        self._http = httpx.Client(base_url=address, headers=headers, timeout=timeout_s, limits=limits, trust_env=False)
+        self._unreachable = (httpx.HTTPError, UnicodeError)  # the latter: a host's name that cannot be looked up
 
     def agent(self) -> dict[str, Any]:
-        """What the agent is."""
-        found: dict[str, Any] = self.ask("GET", "/agent").json()
-        return found
+        """What the agent is. Raises ServiceError."""
+        return self.ask_json("GET", "/agent", "scene")
 
     def session(self, *, selection: Selection = "sampled", seed: int | None = None) -> ClientSession:
         """Open a session; the arguments are `Navigator`'s. Raises ServiceError, DeployError."""
-        answer = self.ask("POST", "/sessions", json={"selection": selection, "seed": checked_seed(seed)})
-        return ClientSession(self, answer.json()["session_id"])
+        wanted = {"selection": selection, "seed": checked_seed(seed)}
+        return ClientSession(self, self.ask_json("POST", "/sessions", "session_id", json=wanted)["session_id"])
 
     def ask(self, method: str, path: str, **content: Any) -> Any:
         """An answer of the service. Raises ServiceError where it refuses or cannot be reached."""
@@ -79,9 +91,24 @@ class Client:
         try:
             kept = answer.json()["error"]
             code, message = str(kept["code"]), str(kept["message"])
-        except (ValueError, KeyError, TypeError):
-            code, message = f"status {answer.status_code}", "no clearway service answers there. Check the address"
+        except (ValueError, KeyError, TypeError) as fault:
+            raise self._stranger(answer) from fault
         raise ServiceError(code, message)
+
+    def ask_json(self, method: str, path: str, *names: str, **content: Any) -> dict[str, Any]:
+        """The JSON object of an answer, which holds these names. Raises ServiceError as `ask`, and where it is none."""
+        answer = self.ask(method, path, **content)
+        try:
+            found = answer.json()
+        except ValueError as fault:
+            raise self._stranger(answer) from fault
+        if not isinstance(found, dict) or not found.keys() >= set(names):
+            raise self._stranger(answer)
+        return found
+
+    def _stranger(self, answer: Any) -> ServiceError:
+        problem = f"{self._http.base_url}: no clearway service answers there"
+        return ServiceError(f"status {answer.status_code}", f"{problem}. Check the address")
 
     def close(self) -> None:
         """Close the connection."""
@@ -98,7 +125,7 @@ class ClientSession:
     """An agent on its way, kept by the service; see `Client.session`. Used as a context, it is closed at the end."""
 
     def __init__(self, client: Client, session_id: str) -> None:
-        self._client, self.session_id = client, session_id
+        self._client, self.session_id, self._path = client, session_id, f"/sessions/{session_id}"
 
     def set_target(self, picture: object) -> None:
         """Begin an episode: walk to where this picture was taken.
@@ -109,24 +136,19 @@ class ClientSession:
 
         Raises:
             ServiceError: the service refused it.
-            DeployError: it is no picture.
+            DeployError: it is no picture, or a file that cannot be read.
         """
-        self._send("PUT", "target", picture)
+        self._client.ask("PUT", f"{self._path}/target", **_body(picture))
 
     def act(self, picture: object) -> Decision:
         """What to do, seeing a picture; kinds and errors as in `set_target`."""
-        answer = self._send("POST", "steps", picture).json()
+        answer = self._client.ask_json("POST", f"{self._path}/steps", *ANSWER, **_body(picture))
         probabilities = np.array(answer["probabilities"], np.float32)
         return Decision(Action(answer["action_index"]), probabilities, float(answer["value"]))
 
     def close(self) -> None:
         """End the session. Raises ServiceError where it has ended already."""
-        self._client.ask("DELETE", f"/sessions/{self.session_id}")
-
-    def _send(self, method: str, what: str, picture: object) -> Any:
-        content, kind = picture_file(picture)
-        path = f"/sessions/{self.session_id}/{what}"
-        return self._client.ask(method, path, content=content, headers={"content-type": kind})
+        self._client.ask("DELETE", self._path)
 
     def __enter__(self) -> ClientSession:
         return self
@@ -140,9 +162,9 @@ class ClientSession:
 
 
 def picture_file(picture: object) -> tuple[bytes, str]:
-    """A picture as a file's content, and its content type; see `ClientSession.set_target`."""
+    """A picture as a file's content, and its content type; see `ClientSession.set_target` for kinds and errors."""
     if isinstance(picture, str | Path):
-        picture = Path(picture).read_bytes()
+        picture = _content(Path(picture))
     if isinstance(picture, bytes):
         kinds = [kind for begin, kind in KINDS.items() if picture.startswith(begin)]
         return picture, kinds[0] if kinds else "image/png"
@@ -151,3 +173,18 @@ def picture_file(picture: object) -> tuple[bytes, str]:
     file = io.BytesIO()
     Image.fromarray(checked_picture(np.asarray(picture))).save(file, "PNG", compress_level=1)
     return file.getvalue(), "image/png"
+
+
+def _body(picture: object) -> dict[str, Any]:
+    """A picture as a request's content with its header."""
+    content, kind = picture_file(picture)
+    return {"content": content, "headers": {"content-type": kind}}
+
+
+def _content(path: Path) -> bytes:
+    """What a file holds. Raises DeployError where it cannot be read."""
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as fault:  # the latter: no system takes such a name
+        reason = fault.strerror if isinstance(fault, OSError) else fault
+        raise DeployError(f"{path}: cannot be read ({reason}). Name a JPEG, PNG or WebP file") from fault
