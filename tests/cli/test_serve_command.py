@@ -21,6 +21,7 @@ from sums import Sums, plain
         (("x.onnx", "--sessions", "0"), ("sessions is 0",)),
         (("x.onnx", "--idle-s", "15"), ("sessions expire after 15 s",)),
         (("x.onnx", "--deadline-s", "nan"), ("deadline_s is nan",)),
+        (("x.onnx", "--idle-s", "inf"), ("idle_s is inf", "Give a smaller number")),
     ],
     ids=lambda value: " ".join(value),
 )

@@ -63,6 +63,7 @@ def test_names_of_sessions_cannot_be_guessed() -> None:
         ({"sessions": 0}, "sessions is 0"),
         ({"deadline_s": -1.0}, "deadline_s is -1.0"),
         ({"idle_s": float("nan")}, "idle_s is nan"),
+        ({"idle_s": float("inf")}, "idle_s is inf, expected a finite number"),
         ({"idle_s": 20.0, "deadline_s": 10.0}, "sessions expire after 20 s and requests may take 10 s"),
     ],
 )

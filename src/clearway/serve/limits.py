@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from clearway.errors import DeployError
@@ -12,7 +13,8 @@ class Limits:
     """Bounds on what strangers can make the service do.
 
     Raises:
-        DeployError: a bound is not positive, or a session could expire while one of its requests is answered.
+        DeployError: a bound is not positive and finite, or a session could expire while one of its requests is
+            answered.
     """
 
     body_bytes: int = 4 << 20
@@ -38,6 +40,8 @@ class Limits:
         for name, value in vars(self).items():
             if not value > 0:
                 raise DeployError(f"{name} is {value}, expected more than 0. Give a larger number")
+            if value == math.inf:
+                raise DeployError(f"{name} is inf, expected a finite number. Give a smaller number")
         if self.idle_s <= 2 * self.deadline_s:
             problem = f"sessions expire after {self.idle_s:g} s and requests may take {self.deadline_s:g} s"
             raise DeployError(f"{problem}. Let sessions live more than twice as long as requests")
