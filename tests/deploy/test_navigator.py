@@ -152,6 +152,9 @@ def test_sources_that_cannot_be_used(deployed, tmp_path) -> None:
         clearway.Navigator(tmp_path / "nothing.onnx")
     with pytest.raises(DeployError, match=r"is for scene cellar, not attic\. Export the run with --scene attic"):
         clearway.Navigator(deployed.agent, scene="attic")
+    with pytest.raises(DeployError, match=r"the agent is for scene attic, not kitchen\. Open the agent for kitchen"):
+        clearway.Navigator(Sums(), scene="kitchen")
+    assert clearway.Navigator(Sums(), scene="attic").card.scene == "attic"
     with pytest.raises(DeployError, match=r"selection is 'best'\. Choose one of sampled, argmax"):
         clearway.Navigator(Sums(), selection="best")
     assert open_model(str(deployed.agent), "cellar").card.scene == "cellar"

@@ -57,13 +57,13 @@ class Navigator:
 
     Args:
         source: an ONNX file, a run folder, or an agent opened with `open_model`, which several navigators may share.
-        scene: which of a run's scenes; None for the first.
+        scene: which of a run's scenes; None for the first. A file and an opened agent hold one, which it must be.
         selection: "sampled" draws actions by their probabilities, as in training and in the published protocol;
             "argmax" takes the most probable one, and can walk in circles.
         seed: of the draws; None for one that differs every time.
 
     Raises:
-        ClearwayError: there is no such selection or seed; see `open_model`.
+        ClearwayError: there is no such selection or seed, or the agent is for another scene; see `open_model`.
     """
 
     def __init__(
@@ -78,6 +78,8 @@ class Navigator:
             raise DeployError(f"selection is {selection!r}. Choose one of {', '.join(get_args(Selection))}")
         self._model = open_model(source, scene) if isinstance(source, str | Path) else source
         self.card = self._model.card
+        if scene not in (None, self.card.scene):
+            raise DeployError(f"the agent is for scene {self.card.scene}, not {scene}. Open the agent for {scene}")
         self._selection, self._rng, self._lock = selection, np.random.default_rng(checked_seed(seed)), Lock()
         self._target: np.ndarray | None = None
         self._history: np.ndarray | None = None
