@@ -4,7 +4,7 @@ from collections import deque
 
 import numpy as np
 import torch
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from clearway.envs.navigation import Navigation
@@ -35,6 +35,8 @@ def scenes(draw: st.DrawFn) -> Scene:
     graph[:, Action.TURN_LEFT] = place * headings + (heading - 1) % headings
     for action in MOVES:
         graph[:, action] = draw(ends)
+        graph[graph[:, action] == state, action] = -1
+    assume((graph[:, MOVES] >= 0).any())
     scene = Scene(
         name="random",
         observations=None,

@@ -214,7 +214,7 @@ def read_table(path: Path) -> str:
 
 
 def turned_round(name: str) -> bytes:
-    return table([(name, 0, 0, heading) for heading in (0, 90, 180, 270)])
+    return table([(name, 0, z, heading) for z in (0, 0.5) for heading in (0, 90, 180, 270)])
 
 
 def write_picture(folder: Path) -> None:

@@ -39,7 +39,7 @@ def test_a_room_becomes_a_scene(small_room):
     assert isinstance(scene.made_by, Provenance)
     assert (scene.made_by.source, scene.made_by.room, scene.made_by.seed) == ("room", "bathroom", 3)
     assert scene.made_by.versions["clearway"] == __version__
-    assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy"}
+    assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy", "scipy"}
 
 
 def test_the_default_room_has_the_rooms_name(small_room):
@@ -78,7 +78,7 @@ def test_a_floor_plan_becomes_a_furnished_scene():
     for near, far in ((2.0 - top.x_min_m, top.x_max_m - 2.5), (-1.0 - top.z_min_m, top.z_max_m + 0.5)):
         assert sorted((round(near, 2), round(far, 2))) in ([0.35, 0.85], [0.85, 0.85])
     assert (scene.made_by.source, scene.made_by.room, scene.made_by.seed) == ("floor_plan", None, 3)
-    assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy"}
+    assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy", "scipy"}
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ import numpy as np
 from clearway.scenes import floor_plans
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Provenance, Scene
+from clearway.scenes.validate import check_moves
 from clearway.version import __version__
 
 
@@ -85,10 +86,11 @@ def build_floor_plan(
     from clearway.scenes.rooms.render_cluster import render_at
     from clearway.scenes.rooms.topview import render_top_view
 
+    locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
+    check_moves(graph, plan.source or plan.name)
     with _status(f"furnishing and lighting {plan.name}", progress):
         room, layout = build_plan_room(plan, seed)
         model = room.spec.compile()
-    locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
     top_view = render_top_view(model, room.width_m, room.depth_m)
     x_m, z_m = layout.origin_m
     view = first_person_view(locations_m - np.array(layout.origin_m), headings_deg)

@@ -91,7 +91,9 @@ def check_moves(graph: np.ndarray, source: str | Path) -> None:
     moves = graph[:, list(MOVES)]
     stuck = (moves == np.arange(len(graph))[:, None]).any(axis=1)
     _check_states(~stuck, source, f"a move leads where it began, and is not {BLOCKED} as blocked ones are,")
-    _check(bool((moves != BLOCKED).any()), source, "graph", "has no open move, so that nobody can go anywhere")
+    if (moves == BLOCKED).all():
+        remedy = "Check how far neighbouring cells are apart, and what is blocked"
+        raise SceneError(source, "has no open move, so that nobody can go anywhere", remedy, "graph")
 
 
 def check_features(features: np.ndarray, state_count: int, source: str | Path) -> None:

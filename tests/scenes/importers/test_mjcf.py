@@ -69,10 +69,10 @@ def test_hidden_geoms_and_limits_of_the_model_s_own_hide_nothing(path: Path) -> 
     hidden = '<geom type="box" size=".15 .15 .6" pos="1 3 2.5" group="3"/>'  # around the red post, to collide with
     far = '<statistic extent="200"/>'  # MuJoCo would draw nothing nearer than a hundredth of it
     path.write_text(WORLD.replace("</worldbody>", f"{hidden}</worldbody>{far}"))
-    world = World(floor_m=2.0, camera_m=0.8, extent_m=(0.7, 1.3, 1.7, 3.3), spawn_m=(1.0, 2.0))
+    world = World(floor_m=2.0, camera_m=0.8, extent_m=(0.7, 1.3, 0.7, 3.3), spawn_m=(1.0, 2.0))
     scene = read_mjcf(path, world, AgentShape(step_m=1.0), height_px=30, width_px=40, workers=1)
-    assert scene.locations_m.tolist() == [[1.0, 2.0]] * 4
-    assert 20 in columns_of(scene.observations[0], RED)
+    assert scene.locations_m[::4].tolist() == [[1.0, 1.0], [1.0, 2.0]]
+    assert 20 in columns_of(scene.observations[4], RED)
     assert scene.top_view is not None
     assert columns_of(scene.top_view.image, RED).size
 

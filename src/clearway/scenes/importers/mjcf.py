@@ -23,7 +23,7 @@ from clearway.scenes.rooms.obstacles import AgentShape, bounding_boxes
 from clearway.scenes.rooms.render_cluster import render_at
 from clearway.scenes.rooms.topview import PIXELS_PER_M, render_from_above
 from clearway.scenes.scene import Provenance, Scene, TopView
-from clearway.scenes.validate import check_scene
+from clearway.scenes.validate import check_moves, check_scene
 
 SOURCE = "mjcf"
 SHOWN_GROUPS = (0, 1, 2)  # as MuJoCo's own viewer starts
@@ -73,6 +73,7 @@ def read_mjcf(
     floor = floor_of(path, model, data, world, agent.step_m)
     grid = find_cells(path, model, data, floor, world, agent)
     check_picture_count(path, len(grid.graph), height_px, width_px, SMALLER)
+    check_moves(grid.graph, path)
     top_m = _set_lens(model, data, floor, world.floor_m)
     view = first_person_view(
         grid.state_locations_m,
