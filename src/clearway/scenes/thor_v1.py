@@ -102,7 +102,7 @@ def write_scene(scene: Scene, path: str | Path) -> None:
         with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
             _write_all(file, scene, path)
     except OSError as fault:
-        problem = f"cannot be written ({fault})"
+        problem = f"cannot be written ({fault.strerror or fault})"
         raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
 
 
