@@ -20,7 +20,7 @@ medians (smallest - largest).
 Seconds until every target is solved, on the first scene: our DEFAULT, SB3's PPO with its own default settings (and
 `--ppo-envs` environments), and SB3's PPO with the values of our recipe as far as it has them (400 environments x 20
 steps, 2 epochs of 4 minibatches, discount, lambda, clips, scaled reward, falling learning rate and entropy; hindsight
-and balancing it has not). Both kinds of environment are our batched one, the faster for SB3. A target is solved when
+and look-ahead it has not). Both kinds of environment are our batched one, the faster for SB3. A target is solved when
 each of 100 sampled episodes ends in under 500 steps; an agent is looked at every few seconds with its clock stopped.
 An agent has failed when its minutes, or the frames of its schedules, are used up.
 """
@@ -96,7 +96,9 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=15.0, help="of each side in each repeat")
     parser.add_argument("--cap-minutes", type=float, default=20.0, help="of training until solved; 0 leaves this out")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="of the training until solved")
-    parser.add_argument("--ppo-envs", type=int, nargs="+", default=[8], help="environments of SB3's PPO as it comes")
+    parser.add_argument(
+        "--ppo-envs", type=int, nargs="*", default=[8], help="environments of SB3's PPO as it comes; none: leave it out"
+    )
     parser.add_argument("--no-tuned", action="store_true", help="leave out SB3's PPO with our recipe's values")
     parser.add_argument("--threads", type=int, help="of torch; default: torch's choice")
     parser.add_argument("--json", type=Path, help="file for the figures")

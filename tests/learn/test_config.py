@@ -82,7 +82,7 @@ def test_the_default_is_the_recipe() -> None:
         "envs_by": "states",
         "whiten_features": True,
         "hindsight": True,
-        "balance": 3.0,
+        "balance": 0.0,
         "centre_features": True,
         "feature_basis": 0,
         "width": 512,

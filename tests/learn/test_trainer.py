@@ -236,7 +236,7 @@ def test_targets_reached_less_often_are_drawn_more_often() -> None:
     assert unbalanced.navigation.choice.weights.tolist() == [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
 
 
-@pytest.mark.parametrize("preset", [DEFAULT, DEFAULT.as_a2c(), PAPER_A2C])
+@pytest.mark.parametrize("preset", [DEFAULT, replace(DEFAULT, balance=3.0), DEFAULT.as_a2c(), PAPER_A2C])
 def test_a_seed_repeats_and_tensors_bring_a_trainer_back_bit_for_bit(preset: Learner) -> None:
     learner = small_learner(preset)
     trainer, again, resumed = (small_trainer(learner, SHORTEST, seed=9) for _ in range(3))

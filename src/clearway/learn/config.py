@@ -91,7 +91,7 @@ class Learner:
     falls linearly to 0, see `settle`. 0: none."""
     lookahead_temperature: float = 0.005
     """How much better counts: probabilities grow by exp(advantage / temperature) at most."""
-    balance: float = 3.0
+    balance: float = 0.0
     """A target's weight at reset is 1 + balance * (1 - its recent success); 0 draws all alike."""
 
     # The loss
@@ -223,7 +223,7 @@ class Learner:
 
 
 DEFAULT = Learner()
-"""PPO with hindsight and balanced targets; why each part is there, with figures: docs/learning.md."""
+"""PPO with hindsight and look-ahead; why each part is there, with figures: docs/learning.md."""
 
 PAPER_A2C = Learner(
     frames=10_000_000,
