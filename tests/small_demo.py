@@ -33,6 +33,6 @@ def shrink_demo(patch: pytest.MonkeyPatch) -> None:
 
     patch.setattr("clearway.experiments.demo.cached_room_scene", room)
     patch.setattr("clearway.experiments.demo.encode_scenes", encode)
-    patch.setattr("clearway.experiments.demo.LEARNER", small_learner())
+    patch.setattr("clearway.experiments.demo.DEFAULT", small_learner())
     brief = partial(evaluate_runs, episodes_per_target=5, step_cap=60)
     patch.setattr("clearway.experiments.demo.evaluate_runs", brief)

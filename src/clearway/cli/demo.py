@@ -21,7 +21,7 @@ class Demo:
     """Folder for the scene, the two runs, the pictures and index.html; a new demo replaces an older one there."""
     seed: int = 0
     """Of the agents; the room is the default bathroom."""
-    frames: int = 320_000
+    frames: int = 600_000
     """Training frames of each agent."""
     encoder: str = "auto"
     """As for clearway scenes build."""

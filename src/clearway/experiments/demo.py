@@ -25,9 +25,6 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 
 ROOM = "bathroom"
 REWARDS = (COLLISION_AWARE, SHORTEST)
-LEARNER = replace(  # a basis of 512 loses nothing, as 180 poses span fewer directions; so the first layer is cheap
-    DEFAULT, frames=320_000, envs=200, feature_basis=512, siamese_step="minibatch", siamese_lr=1.0, lr_start=1e-3
-)
 MARK = "demo.json"  # tells a demo's folder from a user's own
 
 
@@ -75,7 +72,7 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     Raises:
         ClearwayError: the folder holds something else, or a part of the demo cannot run here.
     """
-    learner = replace(LEARNER, frames=request.frames)
+    learner = replace(DEFAULT, frames=request.frames)
     _claim(request.out)
     clock = _Clock()
     room = cached_room_scene(ROOM, progress=show_progress)
