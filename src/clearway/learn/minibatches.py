@@ -1,7 +1,7 @@
 """Minibatches in which everything that the network sees twice is computed once.
 
 Trained agents come by the same way again and again, and many targets are walked to from the same poses: at the end of
-the demo a minibatch holds 0.25 histories a row, and 0.43 pairs of a history and a target. Outputs depend on nothing
+the demo a minibatch holds 0.18 histories a row, and 0.34 pairs of a history and a target. Outputs depend on nothing
 else. So rows of one history are dealt into the same minibatch, each pair is computed once, and its rows' gradients are
 added up before they go back through the network. Nothing is approximated. Where the network computes round numbers of
 rows faster, pairs and histories are repeated up to such a number; nothing is learnt from those.
