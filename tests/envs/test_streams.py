@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.envs.streams import Streams, stream_keys
+from clearway.envs.streams import AHEAD, Streams, stream_keys
 
 WORD = 2**64
 
@@ -65,6 +65,24 @@ def test_unused_streams_do_not_advance() -> None:
     streams.uniform(torch.tensor([True, False, True]))
     first, second = reference.uniform(), reference.uniform()
     assert streams.uniform().tolist() == [second[0], first[1], second[2]]
+
+
+def test_streams_go_on_from_where_others_stood() -> None:
+    streams, copy = Streams(torch.arange(3), 1), Streams(torch.arange(3), 1)
+    for _ in range(5):
+        streams.uniform(torch.tensor([True, False, True]))
+    copy.uniform()
+    copy.seek(streams.drawn.clone())
+    for _ in range(2 * AHEAD):
+        assert torch.equal(copy.uniform(), streams.uniform())
+
+
+def test_drawing_for_some_and_for_all_may_take_turns() -> None:
+    together, alone = Streams(torch.arange(3), 1), [Streams(torch.tensor([seed]), 1) for seed in range(3)]
+    for turn in range(2 * AHEAD):
+        index = torch.tensor([turn % 3, (turn + 1) % 3])
+        assert together.at(index).tolist() == [alone[number].uniform().item() for number in index.tolist()]
+        assert together.uniform().tolist() == [stream.uniform().item() for stream in alone]
 
 
 def test_reseeding_begins_some_streams_anew() -> None:

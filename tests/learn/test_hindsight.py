@@ -47,17 +47,18 @@ def acted(world: World, walks: list[tuple[int, int, list[int]]], cut_after: dict
             if reached[t, env] or truncated[t, env]:
                 poses = torch.full((4,), int(world.next_state[there, RIGHT]))
     return Rollout(
-        history,
-        target,
-        action,
-        arrived,
-        torch.zeros(steps, envs),
-        reached,
-        truncated,
-        history,
-        Activations.empty(0, 0, history.device),
-        history[-1],
-        target[-1],
+        history=history,
+        target=target,
+        action=action,
+        arrived=arrived,
+        reward=torch.zeros(steps, envs),
+        reached=reached,
+        truncated=truncated,
+        blocked=torch.zeros_like(reached),
+        last_history=history,
+        kept=Activations.empty(0, 0, history.device),
+        history_after=history[-1],
+        target_after=target[-1],
     )
 
 
@@ -201,7 +202,7 @@ def test_segments_of_real_rollouts_equal_their_definition() -> None:
     trainer = small_trainer(small_learner(rollout_steps=12, step_limit=9, envs=40))
     world = trainer.world
     trainer.lookup.refresh()
-    rollout = trainer.collector.collect(trainer.statistics)
+    rollout = trainer.collector.collect()
     target_state, target_scene = world.target_state.tolist(), world.target_scene.tolist()
     own, here, arrived = rollout.target.tolist(), rollout.history[..., -1].tolist(), rollout.arrived.tolist()
     ended = (rollout.reached | rollout.truncated).tolist()

@@ -89,7 +89,7 @@ def test_what_waits_is_found(work: Callable[[Tensor], object]) -> None:
 def test_a_rollout_never_waits(learner: Learner) -> None:
     trainer = trainer_after_a_while(learner)
     trainer.lookup.refresh()
-    assert waits(lambda: trainer.collector.collect(trainer.statistics)) == []
+    assert waits(lambda: trainer.collector.collect()) == []
 
 
 def test_an_update_of_a2c_waits_once_for_its_figures() -> None:

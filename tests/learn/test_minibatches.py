@@ -135,7 +135,7 @@ def test_no_minibatch_is_empty_where_few_histories_differ(kinds: int, parts: int
 def test_a_step_is_the_one_that_every_row_by_itself_would_make(row_step: int) -> None:
     exact = small_learner(DEFAULT, epochs=1, minibatches=2, hindsight=True, matmul_precision="highest")
     trainer = small_trainer(exact)
-    rollout = trainer.collector.collect(trainer.statistics)
+    rollout = trainer.collector.collect()
     batch, _ = trainer._batch(rollout, looks_ahead=True)
     batch = trainer._with_hindsight(rollout, batch)
     deck = Deck(batch, trainer.world.state_count, trainer.world.target_count, row_step)

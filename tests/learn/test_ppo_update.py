@@ -18,7 +18,7 @@ from small_runs import small_learner, small_trainer
 def gathered_epochs(trainer: Trainer) -> list[list[Minibatch]]:
     """What the trainer's first update will learn from; uses up the rollout."""
     learner = trainer.learner
-    rollout = trainer.collector.collect(trainer.statistics)
+    rollout = trainer.collector.collect()
     batch, _ = trainer._batch(rollout, looks_ahead=True)
     if learner.hindsight:
         batch = trainer._with_hindsight(rollout, batch)

@@ -54,7 +54,7 @@ def advantages_step_by_step(trainer: Trainer, rollout: Rollout, value: Tensor, a
 def naive_update(trainer: Trainer, lr: float) -> SiameseActorCritic:
     """The network after one A2C update from where the trainer stands, computed afresh; uses up the rollout."""
     learner, network = trainer.learner, copy.deepcopy(trainer.network)
-    rollout = trainer.collector.collect(trainer.statistics)
+    rollout = trainer.collector.collect()
     scores, value = predicted(trainer, network, rollout.history, rollout.target)
     _, after = predicted(trainer, network, rollout.history_after, rollout.target_after)
     advantage = advantages_step_by_step(trainer, rollout, value.detach(), after.detach())

@@ -239,7 +239,7 @@ def test_without_the_siamese_weight_refresh_follows_all_other_parameters() -> No
     every = torch.arange(len(TARGET_STATE))
 
     def target_branch() -> tuple[Tensor, Tensor]:
-        term = lookup._target_terms(every).clone()
+        term = lookup._target_terms(every, out=torch.empty(len(every), lookup.width))
         return lookup.wanted.clone(), term
 
     before, stale = lookup.first_layer.projected.clone(), target_branch()

@@ -196,5 +196,5 @@ class Navigation:
         self.history = tensors["history"].to(here).clone()
         self.target = tensors["target"].to(here).clone()
         self.elapsed = tensors["elapsed"].to(here).clone()
-        self.start_stream.drawn = tensors["starts_drawn"].to(here).clone()
-        self.target_stream.drawn = tensors["targets_drawn"].to(here).clone()
+        self.start_stream.seek(tensors["starts_drawn"].to(here).clone())
+        self.target_stream.seek(tensors["targets_drawn"].to(here).clone())

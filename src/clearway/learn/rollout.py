@@ -15,7 +15,6 @@ from torch import Tensor
 
 from clearway.envs.navigation import Navigation, Transition
 from clearway.envs.streams import Streams
-from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.policy import sampled
 
@@ -24,7 +23,7 @@ ACTION_STREAM = 3
 
 def sample_actions(scores: Tensor, uniform: Tensor) -> Tensor:
     """Actions (B,) int64 drawn from softmax(scores (B, A)) with uniform numbers (B,) in [0, 1)."""
-    return sampled(torch.softmax(scores.double(), 1), uniform)
+    return sampled(torch.softmax(scores, 1, dtype=torch.float64), uniform)
 
 
 def as_rows(values: Tensor) -> Tensor:
@@ -47,7 +46,7 @@ class Rollout:
         action: (T, N) int64.
         arrived: (T, N) int64, the pose each step led to.
         reward: (T, N) float32 as the reward table has it.
-        reached, truncated: (T, N) bool.
+        reached, truncated, blocked: (T, N) bool.
         last_history: (T, N, K) int64, the history after each step, before any new episode began.
         kept: activations of all rows, as `as_rows` orders them; only the output where they are not to be used again.
         history_after, target_after: (N, K), (N,) int64, where the environments stand now.
@@ -60,6 +59,7 @@ class Rollout:
     reward: Tensor
     reached: Tensor
     truncated: Tensor
+    blocked: Tensor
     last_history: Tensor
     kept: Activations
     history_after: Tensor
@@ -94,20 +94,20 @@ class Collector:
         self.one_step = Activations.empty(count, network.width, device, dtype=network.dtype)
         width = network.width if keep_hidden else 0
         self.kept = Activations.empty(count * steps, width, device, dtype=network.dtype)
+        self.memory = [self._memory(t) for t in range(steps)]
 
     @torch.no_grad()
-    def collect(self, statistics: EpisodeStatistics) -> Rollout:
+    def collect(self) -> Rollout:
         """Walk T steps from where the environments stand; ended episodes begin anew at once."""
         nav = self.navigation
         seen: list[tuple[Tensor, Tensor, Tensor, Transition, Tensor]] = []
         for t in range(self.steps):
             history, target = nav.history, nav.target
-            now = self.network.forward(history, target, self.rows_per_scene, self._memory(t))
+            now = self.network.forward(history, target, self.rows_per_scene, self.memory[t])
             if not self.keep_hidden:
                 by_step(self.kept.output, self.steps)[t] = now.output
             action = sample_actions(now.scores, self.action_stream.uniform())
             step = nav.step(action)
-            statistics.add(target, step)
             seen.append((history, target, action, step, nav.history))
             nav.restart(step.ended)
         histories, targets, actions, steps, last_histories = zip(*seen, strict=True)
@@ -119,6 +119,7 @@ class Collector:
             reward=torch.stack([step.reward for step in steps]),
             reached=torch.stack([step.reached for step in steps]),
             truncated=torch.stack([step.truncated for step in steps]),
+            blocked=torch.stack([step.blocked for step in steps]),
             last_history=torch.stack(last_histories),
             kept=self.kept,
             history_after=nav.history,

@@ -1,6 +1,6 @@
 """What happens to training episodes, per target: for the progress bar, the log and the balancing of targets.
 
-Axis letters: N environments, M targets.
+Axis letters: T steps, N environments, M targets.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Transition
+from clearway.learn.rollout import Rollout
 
 WINDOW = 20  # episodes of a target after which its success rate is taken anew
 EPISODES, REACHED, STEPS, COLLISIONS = range(4)
@@ -32,17 +32,16 @@ class EpisodeStatistics:
         self.window = torch.zeros(target_count, 2, dtype=torch.float64, device=device)
         self.recent_success = torch.zeros(target_count, dtype=torch.float64, device=device)
 
-    def add(self, target: Tensor, step: Transition) -> None:
-        """Count one step of every environment, target (N,) int64."""
-        self.open_steps += 1
-        self.open_collisions += step.blocked
-        ended = step.ended.to(torch.float64)
-        reached = step.reached.to(torch.float64)
-        row = torch.stack([ended, reached, self.open_steps * ended, self.open_collisions * ended], 1)
+    def add(self, rollout: Rollout) -> None:
+        """Count all steps of a rollout."""
+        ended = rollout.reached | rollout.truncated
+        steps = _since_the_last_end(torch.ones_like(ended), ended, self.open_steps)
+        collisions = _since_the_last_end(rollout.blocked, ended, self.open_collisions)
+        row = torch.stack([ended, rollout.reached, steps * ended, collisions * ended], 2).flatten(0, 1)
+        target = rollout.target.flatten()
         self.totals.index_add_(0, target, row)
         self.window.index_add_(0, target, row[:, :2])
-        self.open_steps *= 1 - ended
-        self.open_collisions *= 1 - ended
+        self.open_steps, self.open_collisions = (count[-1] * ~ended[-1] for count in (steps, collisions))
 
     def drop_open(self) -> None:
         """Forget the episodes under way, which do not go on."""
@@ -75,3 +74,18 @@ class EpisodeStatistics:
         """Go on from where `tensors` was called."""
         for name, here in vars(self).items():
             setattr(self, name, tensors[name].to(here.device).clone())
+
+
+def _since_the_last_end(flag: Tensor, ended: Tensor, before: Tensor) -> Tensor:
+    """How often `flag` (T, N) was True since its environment's last end, that of its own step not counted.
+
+    Args:
+        flag, ended: (T, N) bool.
+        before: (N,) float64, the count of the episode under way at the first step.
+
+    Returns:
+        (T, N) float64.
+    """
+    count = before + flag.cumsum(0)  # never falls, so that the greatest at an end is the last end's
+    at_last_end = torch.where(ended, count, 0.0).cummax(0).values
+    return count - torch.cat([torch.zeros_like(before)[None], at_last_end[:-1]])

@@ -154,7 +154,8 @@ class Trainer:
             self._begin_staggered()
         lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
-        rollout = self.collector.collect(self.statistics)
+        rollout = self.collector.collect()
+        self.statistics.add(rollout)
         batch, explained = self._batch(rollout, looks_ahead=settings.lookahead_weight > 0)
         rows = len(batch)
         if learner.hindsight:
@@ -344,7 +345,7 @@ class Trainer:
             optimiser.load_tensors(part_of(tensors, "optimiser"))
         self.navigation.load_tensors(part_of(tensors, "navigation"))
         self.statistics.load_tensors(part_of(tensors, "statistics"))
-        self.action_stream.drawn = tensors["actions.drawn"].to(self.world.device).clone()
+        self.action_stream.seek(tensors["actions.drawn"].to(self.world.device).clone())
         self.observed.next_state = tensors["observed.next_state"].to(self.world.device).clone()
         self.navigation.choice.reweigh(tensors["choice.weights"].to(self.world.device).clone())
         self.frames, self.updates = frames, updates

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import torch
 from torch import Tensor
@@ -185,11 +186,11 @@ class LookupNetwork:
         """
         out = out or Activations.empty(len(target), self.width, history.device, len(history), self.dtype)
         torch.add(self.first_layer.seen(history), self.siamese_bias, out=out.seen).relu_()
+        self._target_terms(target, out=out.fused)
         if history_of is None:
-            torch.addmm(self._target_terms(target), out.seen, self.fusion_in, out=out.fused).relu_()
+            out.fused.addmm_(out.seen, self.fusion_in).relu_()
         else:
-            observed = out.seen @ self.fusion_in
-            torch.add(observed[history_of], self._target_terms(target), out=out.fused).relu_()
+            out.fused.add_((out.seen @ self.fusion_in).index_select(0, history_of)).relu_()
         self._forward_scenes(rows_per_scene, out)
         return out
 
@@ -211,20 +212,24 @@ class LookupNetwork:
         sums, row = self.first_layer.starts(state)
         seen = sums.add_(self.siamese_bias).relu_()
         row, target = row[padding.rows], target[padding.rows]
-        torch.add((seen @ self.fusion_in)[row], self._target_terms(target), out=out.fused).relu_()
+        self._target_terms(target, out=out.fused).add_((seen @ self.fusion_in).index_select(0, row)).relu_()
         self._forward_scenes(padding.rows_per_scene, out)
         return out.value[padding.place]
 
     def _forward_scenes(self, rows_per_scene: Sequence[int], out: Activations) -> None:
         """The scenes' own layers, from `fused` on."""
-        net, first = self.network, 0
-        for head, count in enumerate(self._rows_per_head(rows_per_scene)):
-            if count:
-                part = out.rows(first, first + count)
-                torch.addmm(self.scene_bias[head], part.fused, self.scene_in[head], out=part.special).relu_()
-                special = part.special.to(part.output.dtype)
-                torch.addmm(net.output_bias[head], special, net.output_weight[head].T, out=part.output)
-            first += count
+        net = self.network
+        counts = self._rows_per_head(rows_per_scene)
+        parts = [
+            (head, slice(last - count, last))
+            for head, (count, last) in enumerate(zip(counts, accumulate(counts), strict=True))
+            if count
+        ]
+        for head, rows in parts:
+            torch.addmm(self.scene_bias[head], out.fused[rows], self.scene_in[head], out=out.special[rows])
+        special = out.special.relu_().to(out.output.dtype)
+        for head, rows in parts:
+            torch.addmm(net.output_bias[head], special[rows], net.output_weight[head].T, out=out.output[rows])
 
     @torch.no_grad()
     def backward(
@@ -301,11 +306,11 @@ class LookupNetwork:
         """Number of rows of each head: of its scene, or all of them."""
         return rows_per_scene if self.network.shape.head_count > 1 else (sum(rows_per_scene),)
 
-    def _target_terms(self, target: Tensor) -> Tensor:
-        """The target's part of the fusion layer, before its ReLU, for targets (B,): (B, H)."""
+    def _target_terms(self, target: Tensor, out: Tensor) -> Tensor:
+        """The target's part of the fusion layer, before its ReLU, for targets (B,), written to `out` (B, H)."""
         if len(self.known) > FEW_TARGETS:
             self._know(target[~self.known[target]].unique())
-        return self.target_term[target]
+        return torch.index_select(self.target_term, 0, target, out=out)
 
     @torch.no_grad()
     def _know(self, targets: Tensor) -> None:

@@ -265,5 +265,5 @@ class WorkerGroup:
     def load_tensors(self, tensors: Mapping[str, Tensor]) -> None:
         """Go on from where `tensors` was called."""
         self.navigation.load_tensors(part_of(tensors, "navigation"))
-        self.action_stream.drawn = tensors["actions.drawn"].clone()
+        self.action_stream.seek(tensors["actions.drawn"].clone())
         self.open_collisions = tensors["open_collisions"].clone()
