@@ -97,3 +97,9 @@ def test_an_update_of_a2c_waits_once_for_its_figures() -> None:
     ended = trainer.statistics.totals[:, 0].sum()
     assert waits(trainer.update) == ["tolist"]
     assert trainer.statistics.totals[:, 0].sum() > ended
+
+
+def test_ppo_s_waits_do_not_grow_with_the_number_of_minibatches() -> None:
+    few, many = (waits(trainer_after_a_while(DEFAULT, minibatches=count).update) for count in (2, 5))
+    assert few == many
+    assert 0 < len(few) < 30

@@ -69,6 +69,22 @@ def test_round_numbers_of_pairs_and_histories_hold_the_same() -> None:
         assert int((by_pair.sum(1) > 0).sum()) == part.pair_count
 
 
+@pytest.mark.parametrize("states", [2**20, 2**40, 2**50])
+def test_more_kinds_of_histories_than_numbers_make_no_difference(states: int) -> None:
+    """Keys of 3 poses and a target do not fit into 64 bits then."""
+    batch = made_batch()
+    for part, plain in zip(
+        Deck(batch, states, TARGETS).dealt(3, torch.Generator()),
+        Deck(batch, STATES, TARGETS).dealt(3, torch.Generator()),
+        strict=True,
+    ):
+        assert torch.equal(part.rows.action, plain.rows.action)
+        assert torch.equal(part.history, plain.history)
+        assert torch.equal(part.target, plain.target)
+        assert torch.equal(part.history_of, plain.history_of)
+        assert torch.equal(part.pair_of, plain.pair_of)
+
+
 def test_rows_of_one_history_are_learnt_from_together() -> None:
     parts = dealt(made_batch())
     histories = [{tuple(row) for row in part.history.tolist()} for part in parts]

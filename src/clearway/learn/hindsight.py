@@ -19,6 +19,7 @@ from clearway.learn.losses import Batch
 from clearway.learn.returns import vtrace
 from clearway.learn.rollout import Rollout
 from clearway.model.lookup import LookupNetwork
+from clearway.model.sums import counted
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def find_segments(rollout: Rollout, navigation: Navigation) -> Segments:
         alive = ((alive & open_t[t]) | hit[t]) & elsewhere[t]
         used[t] = alive
     env, step, slot = used.transpose(0, 1).nonzero(as_tuple=True)  # ordered by scene, as environments are
-    rows_per_scene = tuple(torch.bincount(choice.groups[env], minlength=world.scene_count).tolist())
+    rows_per_scene = tuple(counted(choice.groups[env], world.scene_count).tolist())
     return Segments(step, env, slot, members[env, slot], hit[step, env, slot], rows_per_scene)
 
 

@@ -19,6 +19,7 @@ from torch import Tensor
 from clearway.envs.navigation import Navigation
 from clearway.envs.world import World
 from clearway.model.lookup import LookupNetwork
+from clearway.model.sums import counted
 
 UNKNOWN = -1
 
@@ -64,18 +65,18 @@ def better_policy(
         discount, reward_scale, temperature: as in the learner's settings.
     """
     world = navigation.world
-    here = history[:, -1:]
-    after = observed.next_state[here[:, 0]]  # (B, A)
-    known = after != UNKNOWN
-    keys = (target[:, None] * world.state_count + after)[known]
+    after = observed.next_state[history[:, -1]]  # (B, A)
+    row, action = (after != UNKNOWN).nonzero(as_tuple=True)
+    arrived = after[row, action]
+    keys = target[row] * world.state_count + arrived
     pairs, pair_of = torch.unique(keys, return_inverse=True)  # ascending: ordered by target, so by scene
     state, goal = pairs % world.state_count, pairs // world.state_count
-    rows_per_scene = torch.bincount(world.target_scene[goal], minlength=world.scene_count).tolist()
+    rows_per_scene = counted(world.target_scene[goal], world.scene_count).tolist()
     start_value = network.start_values(state, goal, rows_per_scene)  # (P,)
     reached = state == world.target_state[goal]
     worth = discount * torch.where(reached, 0.0, start_value)
-    blocked = (after == here)[known]
-    reward = navigation.reward_table[reached[pair_of].long(), blocked.long(), world.zone[after[known]]] * reward_scale
+    blocked = arrived == history[row, -1]
+    reward = navigation.reward_table[reached[pair_of].long(), blocked.long(), world.zone[arrived]] * reward_scale
     advantage = torch.zeros_like(log_pi)
-    advantage[known] = reward + worth[pair_of] - value[:, None].expand_as(after)[known]
+    advantage[row, action] = reward + worth[pair_of] - value[row]
     return torch.softmax(log_pi + advantage / temperature, 1)

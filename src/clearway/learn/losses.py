@@ -63,9 +63,8 @@ class Batch:
 def merged(first: Batch, second: Batch) -> Batch:
     """The rows of two batches, each ordered by scene, as one batch ordered by scene; `better` is the first one's."""
     scenes = torch.arange(len(first.rows_per_scene), device=first.action.device)
-    scene = torch.cat(
-        [scenes.repeat_interleave(torch.tensor(b.rows_per_scene, device=scenes.device)) for b in (first, second)]
-    )
+    rows = torch.tensor([first.rows_per_scene, second.rows_per_scene], device=scenes.device).flatten()
+    scene = scenes.repeat(2).repeat_interleave(rows, output_size=len(first) + len(second))
     order = torch.argsort(scene, stable=True)
 
     better = None

@@ -11,15 +11,18 @@ Axis letters: B rows, P pairs, U histories, K history, A actions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import torch
 from torch import Tensor
 
 from clearway.learn.losses import Batch
 from clearway.model.padding import Padding
-from clearway.model.sums import sum_ascending
+from clearway.model.sums import counted, sum_ascending
+
+MOST_KINDS = 2**63 - 1  # that an int64 can tell apart
 
 
 @dataclass(frozen=True)
@@ -71,57 +74,75 @@ class Deck:
     Attributes:
         batch: its rows in the new order.
         history, pair: (B,) int64, ascending: the rank of each row's history, and of its pair.
+        first_of_history: (U,) int64, the first row of each history.
     """
 
     def __init__(self, batch: Batch, state_count: int, target_count: int, row_step: int = 1) -> None:
         self.row_step = row_step
         slots = batch.history.flip(1).T  # newest first: states are numbered by scene, so sorting keeps scenes together
-        history = slots[0]
+        history, kinds = slots[0], state_count
         for slot in slots[1:]:
-            history = _rank(history * state_count + slot)
-        pair = _rank(history * target_count + batch.target)
+            history, kinds = _joined(history, kinds, slot, state_count)
+        pair, _ = _joined(history, kinds, batch.target, target_count)
         order = torch.argsort(pair, stable=True)
         self.batch = batch.rows(order, batch.rows_per_scene)
-        self.history, self.pair = _rank(history)[order], pair[order]
+        self.first_of_history, self.history = _runs(history[order])
+        _, self.pair = _runs(pair[order])
         rows_per_scene = torch.tensor(batch.rows_per_scene, device=pair.device)
-        self.scene = torch.arange(len(rows_per_scene), device=pair.device).repeat_interleave(rows_per_scene)
+        self.scene = torch.arange(len(rows_per_scene), device=pair.device).repeat_interleave(
+            rows_per_scene, output_size=len(pair)
+        )
 
     def dealt(self, parts: int, generator: torch.Generator) -> list[Minibatch]:
         """Minibatches with every row in one of them, as many histories of each scene in each; shuffled anew.
 
         Fewer than `parts` where there are fewer histories.
         """
-        first, _ = _runs(self.history)
+        first = self.first_of_history
         shuffled = torch.randperm(len(first), generator=generator, device=first.device)
         order = shuffled[torch.argsort(self.scene[first][shuffled], stable=True)]
         parts = min(parts, len(first))
         part_of = torch.empty_like(order)
         part_of[order] = torch.arange(len(order), device=order.device) % parts
-        part = part_of[self.history]
-        return [self._minibatch((part == number).nonzero()[:, 0]) for number in range(parts)]
+        histories = [len(order) // parts + (number < len(order) % parts) for number in range(parts)]
+        return self._divided(part_of[self.history], histories)
 
-    def _minibatch(self, index: Tensor) -> Minibatch:
-        """The rows in index (B,) int64, ascending, which hold all rows of each of their histories."""
-        first, pair_of = _runs(self.pair[index])
-        padding = Padding.to_multiples(self.row_step, self._per_scene(index[first]), index.device)
-        pairs = index[first][padding.rows]
+    def _divided(self, part: Tensor, histories_per_part: Sequence[int]) -> list[Minibatch]:
+        """A minibatch of the rows of each part (B,) int64, of which every history's rows are the same.
+
+        All parts are made at once: no pair and no history is in two, and a GPU's host waits for some sizes once.
+        """
+        scene_count, parts = len(self.batch.rows_per_scene), len(histories_per_part)
+        group = part * scene_count + self.scene
+        order = torch.argsort(part, stable=True)
+        first, pair_of = _runs(self.pair[order])
+        pairs = order[first]
+        groups = parts * scene_count
+        rows_per_group, pairs_per_group = torch.stack([counted(group, groups), counted(group[pairs], groups)]).tolist()
+        padding = Padding.to_multiples(self.row_step, pairs_per_group, part.device)
+        pairs, pair_of = pairs[padding.rows], padding.place[pair_of]
         first_pair, history_of = _runs(self.history[pairs])
         histories = pairs[first_pair]
-        repeated = histories[-1:].expand(-len(histories) % self.row_step)
-        return Minibatch(
-            rows=self.batch.rows(index, self._per_scene(index)),
-            pair_of=padding.place[pair_of],
-            target=self.batch.target[pairs],
-            history_of=history_of,
-            history=self.batch.history[torch.cat([histories, repeated])],
-            pairs_per_scene=padding.rows_per_scene,
-            pair_count=len(first),
-            history_count=len(histories),
+        row_counts, pair_counts, padded_counts = (
+            [tuple(counts[first : first + scene_count]) for first in range(0, groups, scene_count)]
+            for counts in (rows_per_group, pairs_per_group, padding.rows_per_scene)
         )
-
-    def _per_scene(self, index: Tensor) -> tuple[int, ...]:
-        """How many of some rows lie in each scene."""
-        return tuple(torch.bincount(self.scene[index], minlength=len(self.batch.rows_per_scene)).tolist())
+        rows = _slices(map(sum, row_counts))
+        padded = _slices(map(sum, padded_counts))
+        own = _slices(histories_per_part)
+        return [
+            Minibatch(
+                rows=self.batch.rows(order[rows[number]], row_counts[number]),
+                pair_of=pair_of[rows[number]] - padded[number].start,
+                target=self.batch.target[pairs[padded[number]]],
+                history_of=history_of[padded[number]] - own[number].start,
+                history=self.batch.history[_with_the_last_repeated(histories[own[number]], self.row_step)],
+                pairs_per_scene=padded_counts[number],
+                pair_count=sum(pair_counts[number]),
+                history_count=histories_per_part[number],
+            )
+            for number in range(parts)
+        ]
 
 
 def dealt_epochs(
@@ -143,12 +164,29 @@ def dealt_epochs(
         yield deck.dealt(parts, generator)
 
 
-def _rank(keys: Tensor) -> Tensor:
-    """The rank (B,) int64 of each key (B,) among those that differ."""
-    return torch.unique(keys, return_inverse=True)[1]
+def _joined(key: Tensor, kinds: int, last: Tensor, last_kinds: int) -> tuple[Tensor, int]:
+    """One key for two, in lexicographic order: `key` (B,) int64 of [0, kinds), then `last` of [0, last_kinds).
+
+    Returns:
+        the key (B,) int64, and the number of values that it may take.
+    """
+    if kinds * last_kinds > MOST_KINDS:
+        key, kinds = torch.unique(key, return_inverse=True)[1], len(key)
+    return key * last_kinds + last, kinds * last_kinds
 
 
 def _runs(ascending: Tensor) -> tuple[Tensor, Tensor]:
     """Where each run of equal numbers begins, and the run of each number; (R,) and (B,) int64."""
     _, run, count = torch.unique_consecutive(ascending, return_inverse=True, return_counts=True)
     return count.cumsum(0) - count, run
+
+
+def _with_the_last_repeated(rows: Tensor, step: int) -> Tensor:
+    """Rows (B,), up to a multiple of `step`."""
+    return torch.cat([rows, rows[-1:].expand(-len(rows) % step)])
+
+
+def _slices(counts: Iterable[int]) -> list[slice]:
+    """Where so many numbers each stand, one after the other."""
+    counts = list(counts)
+    return [slice(last - count, last) for count, last in zip(counts, accumulate(counts), strict=True)]

@@ -32,6 +32,7 @@ from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
+from clearway.model.sums import counted
 from clearway.reward import Reward
 
 SHUFFLE_SALT = 1_000_003
@@ -252,7 +253,7 @@ class Trainer:
         if len(env):
             target = rollout.target[step, env]
             scene = self.world.target_scene[target]
-            rows_per_scene = torch.bincount(scene, minlength=self.world.scene_count).tolist()
+            rows_per_scene = counted(scene, self.world.scene_count).tolist()
             _, values = self.lookup.judged(rollout.last_history[step, env], target, rows_per_scene)
             bonus[step, env] = self.learner.discount * values
         return bonus

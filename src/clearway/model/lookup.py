@@ -81,15 +81,6 @@ class Activations:
         fused, special = (torch.empty(rows, width, device=device, dtype=dtype) for _ in range(2))
         return cls(seen, fused, special, torch.empty(rows, OUTPUTS, device=device))
 
-    def rows(self, first: int, last: int) -> Activations:
-        """A view of the rows first to last, last excluded."""
-        return Activations(
-            self.seen[first:last],
-            self.fused[first:last],
-            self.special[first:last],
-            self.output[first:last],
-        )
-
 
 def projects_all(states: int, most_seen: int | None, device: torch.device) -> bool:
     """Whether the first layer is computed of all states, or of those that occur, of which there are `most_seen`.
@@ -219,12 +210,7 @@ class LookupNetwork:
     def _forward_scenes(self, rows_per_scene: Sequence[int], out: Activations) -> None:
         """The scenes' own layers, from `fused` on."""
         net = self.network
-        counts = self._rows_per_head(rows_per_scene)
-        parts = [
-            (head, slice(last - count, last))
-            for head, (count, last) in enumerate(zip(counts, accumulate(counts), strict=True))
-            if count
-        ]
+        parts = [(head, rows) for head, rows in self._rows_of_heads(rows_per_scene) if rows.start < rows.stop]
         for head, rows in parts:
             torch.addmm(self.scene_bias[head], out.fused[rows], self.scene_in[head], out=out.special[rows])
         special = out.special.relu_().to(out.output.dtype)
@@ -289,9 +275,7 @@ class LookupNetwork:
     ) -> None:
         """Gradients of the scenes' own layers; writes dL/d(special), dL/d(fused after ReLU), both (B, H)."""
         net = self.network
-        first = 0
-        for head, count in enumerate(self._rows_per_head(rows_per_scene)):
-            rows = slice(first, first + count)
+        for head, rows in self._rows_of_heads(rows_per_scene):
             add_up(grad_output[rows], out=grad_of(net.output_bias)[head])
             grad_out = grad_output[rows].to(self.dtype)
             multiply(grad_out.T, kept.special[rows], out=grad_of(net.output_weight)[head])
@@ -300,11 +284,11 @@ class LookupNetwork:
             multiply(grad_special[rows].T, kept.fused[rows], out=grad_of(net.scene_weight)[head])
             add_up(grad_special[rows], out=grad_of(net.scene_bias)[head])
             torch.mm(grad_special[rows], self.scene_weight[head], out=grad_fused[rows])
-            first += count
 
-    def _rows_per_head(self, rows_per_scene: Sequence[int]) -> Sequence[int]:
-        """Number of rows of each head: of its scene, or all of them."""
-        return rows_per_scene if self.network.shape.head_count > 1 else (sum(rows_per_scene),)
+    def _rows_of_heads(self, rows_per_scene: Sequence[int]) -> list[tuple[int, slice]]:
+        """Each head and its rows: those of its scene, or all of them."""
+        counts = rows_per_scene if self.network.shape.head_count > 1 else (sum(rows_per_scene),)
+        return [(head, slice(last - counts[head], last)) for head, last in enumerate(accumulate(counts))]
 
     def _target_terms(self, target: Tensor, out: Tensor) -> Tensor:
         """The target's part of the fusion layer, before its ReLU, for targets (B,), written to `out` (B, H)."""
