@@ -373,6 +373,23 @@ def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[
     assert [len(table.rows) for table in summary] == [30, 14]
 
 
+def test_a_report_takes_with_it_what_one_that_was_cut_off_left(
+    tmp_path: Path, setting: Setting, sections: dict[str, Section], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Killed(BaseException):
+        pass
+
+    def killed(*_: object) -> None:
+        raise Killed
+
+    with monkeypatch.context() as patch, pytest.raises(Killed):
+        patch.setattr(report, "_markdown", killed)
+        write_report(tmp_path, "Title", [sections["fig3"]], {}, "", setting.scenes)
+    assert list((tmp_path / "figures").iterdir())
+    write_report(tmp_path, "Title", [sections["fig5"]], {}, "", setting.scenes)
+    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["fig5.png"]
+
+
 def test_a_report_takes_with_it_what_an_earlier_one_left(
     tmp_path: Path, setting: Setting, sections: dict[str, Section]
 ) -> None:

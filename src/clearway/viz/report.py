@@ -47,6 +47,8 @@ def write_report(
         scenes: those of the maps.
     """
     _remove_stale(folder, sections)
+    content = {"title": title, "warning": warning, "facts": dict(facts), "sections": [asdict(s) for s in sections]}
+    _write_text(folder / JSON, json_text(content))  # first, so that what a killed one leaves is known to the next
     for section in sections:
         for table in section.tables:
             _write_csv(folder / TABLES / f"{table.name}.csv", table)
@@ -54,15 +56,8 @@ def write_report(
             draw_report_figure(figure, folder / FIGURES / f"{figure.name}.png")
         for shown in section.maps:
             draw_report_map(shown, scenes, folder / FIGURES / f"{shown.name}.png")
-    content = {"title": title, "warning": warning, "facts": dict(facts), "sections": [asdict(s) for s in sections]}
-    texts = {
-        JSON: json_text(content),
-        MARKDOWN: _markdown(title, sections, facts, warning),
-        HTML: _page(folder, title, sections, facts, warning),
-    }
-    for name, text in texts.items():
-        with written_whole(folder / name) as part:
-            part.write_text(text, encoding="utf-8")
+    _write_text(folder / MARKDOWN, _markdown(title, sections, facts, warning))
+    _write_text(folder / HTML, _page(folder, title, sections, facts, warning))
     return folder / HTML
 
 
@@ -79,6 +74,11 @@ def _remove_stale(folder: Path, sections: Sequence[Section]) -> None:
     for place, name in names:
         if Path(name).name == name:  # a file may say anything; nothing outside the report's folders is touched
             (folder / place / name).unlink(missing_ok=True)
+
+
+def _write_text(path: Path, text: str) -> None:
+    with written_whole(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _write_csv(path: Path, table: ReportTable) -> None:
