@@ -24,6 +24,9 @@ siamese layer is computed, as often as `siamese_step` says: once a pass (the fir
 minibatch. Look-ahead's forward pass, a row for each next pose and target that occur, is timed but not counted. The
 agents are untrained, and walk at random; trained ones repeat themselves, so their rows cost half of that.
 
+Basis. Those named so learn from features in their 512 leading directions, so that F is 512: a reduced network, which is
+not compared with the naive one, as that has all features.
+
 Precision. Cases are computed in float32 but for those named bfloat16, whose `matmul_precision` is medium; they are left
 out where the device has no instructions for it.
 
@@ -73,6 +76,7 @@ from clearway.scenes.targets import seeded_targets
 
 STATES = (180, 408, 468, 676)
 FEATURES = 2048
+BASIS = 512  # directions of the reduced features
 ROW_CHUNK = 4000  # rows of a naive update held at a time
 ENDLESS = 10**9  # frames of the schedules; none ends during a benchmark
 PPO = replace(DEFAULT, frames=ENDLESS, matmul_precision="highest")
@@ -249,6 +253,7 @@ class Case:
         update: does one update.
         gflop: what the algorithm needs for an update so far as known, see the file's docstring; None for the naive one.
         factors: dtype of the factors of its matrix products.
+        comparable: with the naive version of its size.
         seconds: of every update measured.
         shares: of the matrix-product peak at that time, likewise.
     """
@@ -259,6 +264,7 @@ class Case:
     update: Callable[[], object]
     gflop: Callable[[], float] | None = None
     factors: torch.dtype = torch.float32
+    comparable: bool = False
     seconds: list[float] = field(default_factory=list)
     shares: list[float] = field(default_factory=list)
 
@@ -268,10 +274,10 @@ class Case:
         return statistics.median(rates), rates[0], rates[-1]
 
 
-def needed_gflop(targets: int, states: float, learner: Learner, updates: Sequence[Update]) -> float:
-    """GFLOP of one update, by the formulas above; mean over some updates that projected so many states."""
-    width = learner.width
-    projection = 2 * states * FEATURES * learner.history_length * width
+def needed_gflop(world: World, features: int, states: float, learner: Learner, updates: Sequence[Update]) -> float:
+    """GFLOP of an update on so many features, by the formulas above; mean over some that projected so many states."""
+    width, targets = learner.width, world.target_count
+    projection = 2 * states * features * learner.history_length * width
     tables = projection + 2 * targets * width * width
     of_history, of_row = 2 * width * width, 2 * width * width + 2 * width * OUTPUTS
     rows = learner.envs * learner.rollout_steps
@@ -302,11 +308,12 @@ def fast_case(world: World, learner: Learner) -> Case:
         states.append(layer.known if isinstance(layer, VisitedStates) else world.state_count)
 
     def gflop() -> float:
-        return needed_gflop(world.target_count, statistics.fmean(states), learner, updates)
+        return needed_gflop(world, trainer.feature_map.input_count, statistics.fmean(states), learner, updates)
 
-    dtype = trainer.lookup.dtype
-    name = learner.algorithm if dtype == torch.float32 else f"{learner.algorithm} bfloat16"
-    return Case(name, learner.envs, learner.rollout_steps, update, gflop, dtype)
+    dtype, basis = trainer.lookup.dtype, learner.feature_basis
+    name = learner.algorithm + (" bfloat16" if dtype == torch.bfloat16 else "") + (f" basis {basis}" if basis else "")
+    comparable = learner.algorithm == "a2c" and not basis
+    return Case(name, learner.envs, learner.rollout_steps, update, gflop, dtype, comparable)
 
 
 def naive_case(world: World, learner: Learner) -> Case:
@@ -362,8 +369,10 @@ def run(device: str, quick: bool, progress: Callable[[str], None]) -> tuple[Peak
     learners = [replace(A2C, envs=envs, rollout_steps=steps) for envs, steps in sizes]
     cases = [fast_case(world, learner) for learner in learners]
     cases += [fast_case(world, PPO)]
+    cases += [fast_case(world, replace(one, feature_basis=BASIS)) for one in (learners[1], PPO)]
     if factor_dtype("medium", world.device) == torch.bfloat16:
-        cases += [fast_case(world, replace(one, matmul_precision="medium")) for one in (*learners[1:], PPO)]
+        rounded = (*learners[1:], PPO, replace(PPO, feature_basis=BASIS))
+        cases += [fast_case(world, replace(one, matmul_precision="medium")) for one in rounded]
     cases += [naive_case(world, learner) for learner in learners]
     repeats, peak_repeats = (2, 2) if quick else (9, 3)
     product_sizes = (1024, 2048) if quick else (1024, 2048, 4096)
@@ -408,7 +417,7 @@ def figures(cases: list[Case]) -> list[Figures]:
         rate, low, high = case.frames_per_s()
         needed = case.gflop() if case.gflop else None
         share = statistics.median(case.shares) if case.shares else None
-        ratio = rate / naive[case.envs, case.steps] if case.name.startswith("a2c") else None
+        ratio = rate / naive[case.envs, case.steps] if case.comparable else None
         count = len(case.seconds)
         lines.append(Figures(case.name, case.envs, case.steps, count, rate, low, high, needed, share, ratio))
     return lines
@@ -417,7 +426,7 @@ def figures(cases: list[Case]) -> list[Figures]:
 def table(lines: list[Figures]) -> str:
     """The lines as text."""
     heads = "case", "envs x steps", "frames/s", "min - max", "GFLOP/update", "of peak", "x naive"
-    text = [("{:<14} {:>13} {:>10} {:>21} {:>13} {:>8} {:>8}").format(*heads)]
+    text = [("{:<22} {:>13} {:>10} {:>21} {:>13} {:>8} {:>8}").format(*heads)]
     for line in lines:
         size = f"{line.envs} x {line.steps}"
         spread = f"{line.frames_per_s_min:,.0f} - {line.frames_per_s_max:,.0f}"
@@ -425,7 +434,7 @@ def table(lines: list[Figures]) -> str:
         share = f"{line.share_of_peak:.0%}" if line.share_of_peak else "-"
         ratio = f"{line.times_naive:.1f}" if line.times_naive else "-"
         rate = f"{line.frames_per_s:,.0f}"
-        text.append(f"{line.case:<14} {size:>13} {rate:>10} {spread:>21} {needed:>13} {share:>8} {ratio:>8}")
+        text.append(f"{line.case:<22} {size:>13} {rate:>10} {spread:>21} {needed:>13} {share:>8} {ratio:>8}")
     return "\n".join(text)
 
 

@@ -50,7 +50,7 @@ def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
 def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
     blocks = code_blocks(ROOT / "docs/tutorial.md")
     changes = {
-        "--frames 320000": "--frames 4000",
+        "--frames 600000": "--frames 4000",
         "demo --out demo": "demo --frames 4000 --out demo",
         "clearway evaluate": "clearway evaluate --episodes 5",
     }

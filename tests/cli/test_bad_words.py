@@ -49,6 +49,7 @@ def test_a_refusal_in_colours_is_one_plain_line():
         (("--alpha", "nan"), ("--alpha is nan",)),
         (("--terminal", "inf"), ("--terminal is inf",)),
         (("--frames", "-5"), ("frames is -5",)),
+        (("--feature-basis", "-1"), ("feature_basis is -1",)),
         (("--seed", "-1"), ("--seed is -1", "0 to 2147483647")),
         (("--seed", str(2**31)), ("--seed is 2147483648",)),
         (("--threads", "0"), ("--threads is 0",)),

@@ -171,9 +171,11 @@ def test_training_ends_with_the_number_of_solved_targets(clearway, trained, smal
 def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):
     for name in ("one", "two"):
         dump(tmp_path / "scenes" / f"{name}.h5")
-    words = ("train", tmp_path / "scenes", "--out", tmp_path / "run", *small, "--reward", "shortest")
+    chosen = ("--reward", "shortest", "--feature-basis", 8)
+    words = ("train", tmp_path / "scenes", "--out", tmp_path / "run", *small, *chosen)
     assert clearway(*words, "--targets", "one=0,5", "two=7").code == 0
     record = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert record["learner"]["feature_basis"] == 8
     assert {scene["name"]: scene["targets"] for scene in record["scenes"]} == {"one": [0, 5], "two": [7]}
     assert record["reward"]["name"] == "shortest"
 

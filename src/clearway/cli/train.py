@@ -49,6 +49,9 @@ class Train:
     """Single settings of the learner, for example --set envs=200 clip_rewards=true (all: clearway.learn.config)."""
     frames: int | None = None
     """Training frames, instead of the preset's own."""
+    feature_basis: int | None = None
+    """Learn from features in so many leading principal directions, instead of the preset's choice; 0: as they are. It
+    loses nothing where poses are fewer, and costs quality elsewhere."""
     seed: int = 0
     """Of parameters, environments, actions and the choice of targets."""
     threads: int | None = None
@@ -99,4 +102,6 @@ class Train:
             learner = replace(learner, algorithm=self.algorithm)
         if self.frames is not None:
             learner = replace(learner, frames=self.frames)
+        if self.feature_basis is not None:
+            learner = replace(learner, feature_basis=self.feature_basis)
         return with_settings(learner, self.set)
