@@ -1,10 +1,14 @@
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 import clearway as package
 from clearway.view.stage import Stage
@@ -37,3 +41,25 @@ def address(stage: Stage, folder: Path) -> Iterator[str]:
         _, err = process.communicate(timeout=60)
     assert process.returncode == 0
     assert err.splitlines() == ["clearway view, for this machine's user alone (end with Ctrl+C):"]
+
+
+@pytest.fixture
+def full(address: str) -> Iterator[str]:
+    """The address, with as many pages open as may be."""
+    with ExitStack() as pages:
+        for _ in range(16):
+            join(address, pages)
+        yield address
+
+
+def join(address: str, pages: ExitStack) -> None:
+    """Open a page, as soon as the viewer has noticed that another test's is gone."""
+    for _ in range(600):
+        connection = pages.enter_context(connect(address.replace("http", "ws") + "live", open_timeout=60))
+        try:
+            connection.send("{}")
+            connection.recv(timeout=60)
+            return
+        except ConnectionClosed:
+            time.sleep(0.1)
+    raise AssertionError("no page was closed")
