@@ -212,18 +212,6 @@ def test_half_written_files_of_a_killed_process_are_swept(tmp_path: Path) -> Non
         assert {path.name for path in tmp_path.iterdir()} == {".lock", "run.json", "mine.part"}
 
 
-def test_a_folder_made_for_nothing_does_not_stay(tmp_path: Path) -> None:
-    kept = tmp_path / "kept"
-    kept.mkdir()
-    for path in (tmp_path / "new", kept):
-        with pytest.raises(RunError, match="no such target"), RunFolder(path).held():
-            raise RunError("no such target")
-    assert list(tmp_path.iterdir()) == [kept]
-    with RunFolder(tmp_path / "new").held():
-        (tmp_path / "new" / "mine.txt").write_text("")
-    assert (tmp_path / "new" / "mine.txt").exists()
-
-
 def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(RunError, match="out"):

@@ -32,7 +32,6 @@ from clearway.version import __version__
 
 FORMAT_VERSION = 1
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
-LOCK_FILE = ".lock"
 Settings = TypeVar("Settings", Learner, Reward)
 
 
@@ -152,14 +151,14 @@ class RunFolder:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Keep other processes from training in this folder. If it was made for a run that never began, it is removed.
+        """Keep other processes from training in this folder.
 
         Raises:
             RunError: another process trains here, or the folder cannot be made or written to.
         """
         from filelock import FileLock, Timeout
 
-        lock, is_new = FileLock(self.path / LOCK_FILE, timeout=0), not self.path.exists()
+        lock = FileLock(self.path / ".lock", timeout=0)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             lock.acquire()
@@ -173,9 +172,6 @@ class RunFolder:
                     part.unlink()
             yield
         finally:
-            if is_new and [each.name for each in self.path.glob("*")] == [LOCK_FILE]:
-                (self.path / LOCK_FILE).unlink()
-                self.path.rmdir()
             lock.release()
 
     def write_record(self, record: RunRecord) -> None:

@@ -140,9 +140,8 @@ def train(
         RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
         KeyboardInterrupt: the user interrupted; the run can be resumed.
     """
-    folder = RunFolder(out)
+    trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
     with folder.held():
-        trainer = request.trainer()
         seconds = _prepare(folder, request.record(), trainer, resume)
         with (
             closing(trainer),
