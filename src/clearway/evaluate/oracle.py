@@ -22,6 +22,7 @@ import numpy as np
 from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import splu
 
+from clearway.envs.targets import Starts
 from clearway.errors import SceneError
 from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED
@@ -98,7 +99,7 @@ def make_task(graph: np.ndarray, zone: np.ndarray, target: int, reward: Reward) 
     after = next_states(graph)
     blocked = graph == BLOCKED
     steps = distances_to(graph, np.array([target]))[0]
-    starts = np.flatnonzero(steps > 0)
+    starts = Starts.of(steps).state
     if not len(starts):
         raise SceneError("graph", f"no state leads to target {target}", "Choose a target in the largest component")
     reached = (after == target).astype(np.int64)
