@@ -24,6 +24,7 @@ ORDER = (
     {"scenes"},
     {"perception"},
     {"zones"},
+    {"clearance"},
     {"reward"},
     {"envs"},
     {"model"},

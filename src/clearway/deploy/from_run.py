@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +56,7 @@ class SceneAgent:
             encoder={"name": made_by.name, "identity": made_by.identity, "settings": dict(made_by.settings)},
             normalisation=self._normalisation(encoder),
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
-            training={"seed": record.seed, "reward": asdict(record.reward), "versions": dict(record.versions)},
+            training={"seed": record.seed, "reward": record.reward.to_json(), "versions": dict(record.versions)},
         )
 
     def _normalisation(self, encoder: NetworkEncoder | None) -> dict[str, object]:

@@ -17,9 +17,11 @@ import torch
 from torch import Tensor
 
 from clearway.choices import FeatureStore, ZoneLevel
+from clearway.clearance import scene_clearance_m
 from clearway.envs.feature_store import LARGEST_FLOAT16, empty_store
 from clearway.envs.targets import Starts, checked_states, starts_to
 from clearway.errors import SceneError
+from clearway.reward import Moves
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import Scene
@@ -36,6 +38,7 @@ class World:
         next_state: (S, A) int64; a blocked move leads back to its own state.
         blocked: (S, A) bool.
         zone: (S,) int64 (`zones.Zone`).
+        clearance_m: (S,) float64, distance to the nearest obstacle, see `clearance`.
         largest_part: (C,) int64, states of each scene's largest strongly connected component.
         features: (S, F) float32, or as `feature_store` says; None where the scenes have none.
         target_state: (M,) int64, in the numbering of all scenes.
@@ -51,6 +54,7 @@ class World:
     next_state: Tensor
     blocked: Tensor
     zone: Tensor
+    clearance_m: Tensor
     largest_part: Tensor
     features: Tensor | None
     target_state: Tensor
@@ -91,6 +95,11 @@ class World:
         """Steps from states to targets, to be looked up."""
         return DistanceTable(self)
 
+    def moves(self) -> Moves:
+        """What a reward's terms look at."""
+        tables = (self.next_state, self.blocked, self.zone, self.clearance_m)
+        return Moves(*(table.cpu().numpy() for table in tables))
+
     def graph(self, scene: int) -> np.ndarray:
         """Moves of one scene in its own numbering, (S of the scene, A) int64; -1 where one is blocked."""
         first, last = self.scene_offset[scene : scene + 2].tolist()
@@ -118,15 +127,19 @@ class World:
             state += [first + one for one in own]
             scene += [index] * len(own)
         count = np.array([len(one.state) for one in starts], np.int64)
-        tables = {
-            "target_state": np.array(state, np.int64),
-            "target_scene": np.array(scene, np.int64),
-            "start_state": np.concatenate([one.state for one in starts]),
-            "start_steps": np.concatenate([one.steps for one in starts]),
-            "start_offset": np.cumsum(count) - count,
-            "start_count": count,
-        }
-        return replace(self, **{name: torch.from_numpy(table).to(self.device) for name, table in tables.items()})
+
+        def table(values: np.ndarray) -> Tensor:
+            return torch.from_numpy(values).to(self.device)
+
+        return replace(
+            self,
+            target_state=table(np.array(state, np.int64)),
+            target_scene=table(np.array(scene, np.int64)),
+            start_state=table(np.concatenate([one.state for one in starts])),
+            start_steps=table(np.concatenate([one.steps for one in starts])),
+            start_offset=table(np.cumsum(count) - count),
+            start_count=table(count),
+        )
 
     def scene_state(self, target: int) -> int:
         """The target's state in its own scene's numbering."""
@@ -206,6 +219,7 @@ def scene_tables(
         next_state=torch.from_numpy(next_states(graph)),
         blocked=torch.from_numpy(graph == BLOCKED),
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
+        clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
         largest_part=torch.tensor([np.count_nonzero(scene.components == 0) for scene in scenes]),
         features=_joined_features(scenes, feature_store),
         target_state=none,

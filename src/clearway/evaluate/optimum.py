@@ -55,11 +55,12 @@ def world_yardsticks(
         entropy_weight: see there.
         starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
     """
-    zone = world.zone.cpu().numpy()
+    zone, clearance_m = world.zone.cpu().numpy(), world.clearance_m.cpu().numpy()
     found = []
     for target, scene in enumerate(world.target_scene.tolist()):
         first, last = world.scene_offset[scene : scene + 2].tolist()
-        task = make_task(world.graph(scene), zone[first:last], world.scene_state(target), reward)
+        tables = zone[first:last], world.scene_state(target), reward, clearance_m[first:last]
+        task = make_task(world.graph(scene), *tables)
         exact = yardstick(task, discount, entropy_weight, None if starts is None else starts[target] - first)
         found.append(TargetYardstick(world.scene_names[scene], task.target, exact))
     return found
