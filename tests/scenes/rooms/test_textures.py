@@ -120,6 +120,12 @@ def test_a_wallpaper_repeats_as_often_as_asked(pattern):
     assert np.abs(share - np.roll(share, 8, 1)).mean() > 0.06
 
 
+def test_strands_of_wicker_go_over_and_under_in_turn():
+    strands = made("wicker")[..., 0].reshape(12, 8, 6, 16).mean(axis=(1, 3))  # 12 across, each over 2 of 12
+    over = np.indices(strands.shape).sum(axis=0) % 2 == 1
+    assert strands[over].min() > strands[~over].max()
+
+
 def test_a_clock_has_twelve_marks_and_its_hands():
     face = pictures.clock(np.random.default_rng(3), 192)[..., 0]
     angle = np.linspace(0, 2 * np.pi, 720, endpoint=False) + 0.01
@@ -157,6 +163,7 @@ def test_the_window_shows_sky_above_and_a_lawn_below():
         red, green, blue = np.moveaxis(made("outdoor", seed), 2, 0)
         assert (blue[:10] >= red[:10]).all() and blue[:10].mean() > 0.8
         assert (green[-10:] > red[-10:]).all() and (green[-10:] > blue[-10:]).all()
+        assert green[-10:].mean() > 0.4  # lighter than trees
 
 
 def test_a_screen_is_dark_with_its_reflection_above():
