@@ -162,6 +162,7 @@ def test_a_term_of_one_s_own_is_told_in_json_and_not_loaded_from_it() -> None:
     assert kept["terms"] == {f"{__name__}:Doubled": {"factor": 3.0}}
     read = reward_from_json(kept)
     assert (read.to_json(), read.is_known, MINE.is_known) == (kept, False, True)
+    assert str(read) == str(MINE)
     with pytest.raises(RewardError, match="Doubled, which is not loaded"):
         read.table(MOVES)
 

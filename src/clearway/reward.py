@@ -261,7 +261,8 @@ class Reward:
     def __str__(self) -> str:
         """Its parameters, as tables print them."""
         told = [f"{name} {value:g}" for name, value in self.parameters.items()]
-        told += [type(term).__name__ for term in self.terms if type(term) not in TERMS.values()]
+        others = [term for term in self.terms if type(term) not in TERMS.values()]
+        told += [term.path.rpartition(":")[2] if isinstance(term, _Unknown) else type(term).__name__ for term in others]
         return ", ".join(told) + (", clipped to [-1, 1]" if self.clip else "")
 
 
