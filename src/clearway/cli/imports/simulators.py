@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from clearway.choices import SensorName
 from clearway.cli.arguments import check_at_least, check_finite, check_named, check_positive, check_seeds
 from clearway.cli.imports.writing import Encoding, encode_and_write, place_name
 from clearway.ray_cluster import kept_connected
@@ -81,6 +82,8 @@ class ImportMjcf:
     """Of the pictures, pixels."""
     height: int = 300
     """Of the pictures, pixels."""
+    sensors: tuple[SensorName, ...] = ("rgb",)
+    """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
@@ -104,6 +107,7 @@ class ImportMjcf:
                 name=self.name or place_name(self.file),
                 height_px=self.height,
                 width_px=self.width,
+                sensors=self.sensors,
                 workers=workers,
                 ray=ray,
                 progress=True,
