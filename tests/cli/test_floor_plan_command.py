@@ -37,6 +37,7 @@ def test_a_plan_too_large_to_render_is_refused_before_any_is_rendered(clearway, 
     ("words", "said"),
     [
         (("--sensors", "depth"), ("'depth' leaves out rgb", "Name each once")),
+        (("--encoder", "depth-grid"), ("depth-grid sees depth", "Add --sensors rgb depth")),
         (("--sensors", "rgb", "depth", "--features", 8), ("--features renders nothing", "Leave out one of them")),
     ],
 )

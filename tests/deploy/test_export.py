@@ -1,5 +1,6 @@
 """Exported files compute what the trained network computes."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,12 @@ import pytest
 import torch
 from torch.nn.functional import interpolate
 
-from clearway.deploy.from_run import load_scene_agent
+from clearway.deploy.from_run import load_scene_agent, loaded_encoder
 from clearway.deploy.graph import resize_weights
 from clearway.deploy.onnx_file import OnnxModel
-from clearway.errors import DeployError, RunError
+from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
-from clearway.perception import encoder_from_record
+from clearway.perception import depth_grid, encoder_from_record
 
 CLOSE = {"rtol": 0, "atol": 1e-5}
 
@@ -128,3 +129,9 @@ def test_the_scene_is_chosen_by_name_and_is_the_first_otherwise(deployed) -> Non
         load_scene_agent(deployed.run, "den")
     with pytest.raises(RunError, match="no run here"):
         load_scene_agent(deployed.run.parent)
+
+
+def test_an_encoder_of_depth_is_not_deployed(deployed) -> None:
+    scene = replace(deployed.chosen.scene, encoder=depth_grid.find_record())
+    with pytest.raises(EncoderError, match="depth-grid sees depth, and deployed agents take colour pictures"):
+        loaded_encoder(replace(deployed.chosen, scene=scene))

@@ -32,7 +32,8 @@ class Build:
     sensors: tuple[SensorName, ...] = ("rgb",)
     """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), depth-grid (needs --sensors rgb
+    depth), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None
@@ -43,7 +44,7 @@ class Build:
 
     def run(self) -> None:
         """Build and write."""
-        from clearway.perception import encode_scenes
+        from clearway.perception import check_sees, encode_scenes
         from clearway.scenes.library import cached_room_scene
         from clearway.scenes.rooms import ROOM_NAMES
         from clearway.scenes.sensors import check_names
@@ -51,6 +52,7 @@ class Build:
         check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)
         check_at_least(1, workers=self.workers)
         check_names(self.sensors)
+        check_sees(self.encoder, self.sensors)
         in_folder = self.out.is_dir() or self.out.suffix.lower() not in SCENE_SUFFIXES
         if self.room == "all" and not in_folder:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
