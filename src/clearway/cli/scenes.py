@@ -144,6 +144,13 @@ def _print_table(content: dict[str, object]) -> None:
 
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for key, value in content.items():
-        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else str(value)
-        table.add_row(key.replace("_", " "), Text(printable(text)))
+        table.add_row(key.replace("_", " "), Text(printable(_cell(value))))
     stdout_console().print(table)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{k} {v}" for k, v in value.items())
+    if isinstance(value, tuple) and all(isinstance(one, str) for one in value):
+        return ", ".join(value)
+    return str(value)
