@@ -153,7 +153,7 @@ def _keys(sensor: str) -> tuple[str, str]:
 
 def observation_space(sources: Sources, history_length: int) -> spaces.Dict:
     """Space of one environment's observations: of the poses (K, ...), newest last, and of the target (...)."""
-    boxes: dict[str, spaces.Box] = {}
+    boxes: dict[str, spaces.Space] = {}
     for (poses, target), source in sources.items():
         boxes |= {poses: source.space(history_length), target: source.space()}
     return spaces.Dict(boxes)
