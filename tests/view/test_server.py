@@ -99,7 +99,8 @@ def test_the_stage_and_its_maps(address: str, stage: Stage) -> None:
     assert corridor["extent_m"] == [-0.25, 0.25, -0.25, 2.25]
     assert corridor["zones"][:4] == [2, 2, 2, 2] and corridor["zones"][8] == 0
     assert (corridor["has_pictures"], corridor["picture_shape"], corridor["has_above"]) == (True, [12, 16], True)
-    assert corridor["sensors"] == [{"name": "depth", "unit": "m", "low": 0, "high": 20}]
+    depth = {"name": "depth", "shape": [12, 16], "dtype": "float32", "unit": "m", "low": 0, "high": 20}
+    assert corridor["sensors"] == [depth]
     bare = json.loads(get(address, "scenes/2/map.json")[1])
     assert (bare["turn_deg"], bare["has_pictures"], bare["has_above"]) == (30, False, False)
     assert bare["extent_m"] == pytest.approx([-0.35, 1.35, -0.35, 1.35])

@@ -48,6 +48,7 @@ class SceneAgent:
         """The agent's card; with or without its encoder inside."""
         record, made_by, shape = self.agent.record, self.encoder_record, self.agent.network.shape
         pictures = self.scene.observations
+        seen = next((one for one in self.scene.sensors if one.name == sensor_of(made_by)), None)
         return Card(
             scene=self.scene.name,
             actions=ACTION_NAMES,
@@ -58,6 +59,7 @@ class SceneAgent:
             normalisation=self._normalisation(encoder),
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
             training={"seed": record.seed, "reward": asdict(record.reward), "versions": dict(record.versions)},
+            observation=None if seen is None else seen.to_json(),
         )
 
     def _normalisation(self, encoder: NetworkEncoder | None) -> dict[str, object]:

@@ -66,6 +66,11 @@ class Sensor:
         """The values that were kept."""
         return kept if self.step is None else (kept * self.step).astype(self.dtype)
 
+    def to_json(self) -> dict[str, object]:
+        """As JSON values: what an observation is."""
+        shown = ("name", "shape", "dtype", "unit", "low", "high")
+        return {key: list(self.shape) if key == "shape" else getattr(self, key) for key in shown}
+
     def described(self) -> str:
         """In one line, for people."""
         size = " x ".join(map(str, self.shape))

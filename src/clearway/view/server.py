@@ -177,10 +177,7 @@ def _map_json(stage: Stage, index: int) -> dict[str, Any]:
         "has_pictures": scene.observations is not None,
         "picture_shape": None if scene.observations is None else list(scene.observations.shape[1:3]),
         "has_above": scene.top_view is not None,
-        "sensors": [
-            {"name": sensor.name, "unit": sensor.unit, "low": sensor.low, "high": sensor.high}
-            for sensor in _shades(scene)
-        ],
+        "sensors": [sensor.to_json() for sensor in _shades(scene)],
     }
 
 
