@@ -13,12 +13,13 @@ from clearway.deploy.card import Card
 from clearway.deploy.graph import PolicyGraph
 from clearway.deploy.model import Step
 from clearway.deploy.onnx_file import shifted
-from clearway.errors import DeployError
+from clearway.errors import DeployError, EncoderError
 from clearway.learn.load import Agent, load_agent, run_scenes
 from clearway.perception import encoder_from_record
-from clearway.perception.encoder import NetworkEncoder
+from clearway.perception.encoder import NetworkEncoder, sensor_of
 from clearway.scenes.actions import ACTION_NAMES
 from clearway.scenes.scene import EncoderRecord, Scene
+from clearway.scenes.sensors import RGB
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class SceneAgent:
         """The agent's card; with or without its encoder inside."""
         record, made_by, shape = self.agent.record, self.encoder_record, self.agent.network.shape
         pictures = self.scene.observations
+        seen = next((one for one in self.scene.sensors if one.name == sensor_of(made_by)), None)
         return Card(
             scene=self.scene.name,
             actions=ACTION_NAMES,
@@ -57,6 +59,7 @@ class SceneAgent:
             normalisation=self._normalisation(encoder),
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
             training={"seed": record.seed, "reward": record.reward.to_json(), "versions": dict(record.versions)},
+            observation=None if seen is None else seen.to_json(),
         )
 
     def _normalisation(self, encoder: NetworkEncoder | None) -> dict[str, object]:
@@ -98,7 +101,15 @@ def load_scene_agent(
 
 
 def loaded_encoder(chosen: SceneAgent) -> NetworkEncoder:
-    """The encoder that made the features of an agent's scene; see `encoder_from_record` for its errors."""
+    """The encoder that made the features of an agent's scene.
+
+    Raises:
+        EncoderError: as of `encoder_from_record`, or it takes no colour pictures.
+    """
+    seen = sensor_of(chosen.encoder_record)
+    if seen != RGB:
+        problem = f"encoder {chosen.encoder_record.name} sees {seen}, and deployed agents take colour pictures"
+        raise EncoderError(f"{problem}. Train on features of another encoder")
     encoder = encoder_from_record(chosen.encoder_record)
     assert isinstance(encoder, NetworkEncoder)
     return encoder

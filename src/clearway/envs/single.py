@@ -18,6 +18,7 @@ from clearway.envs.spaces import ObservationKind
 from clearway.envs.vector import ImageGoalVectorEnv, Info, Observation
 from clearway.errors import EnvError
 from clearway.reward import Reward
+from clearway.scenes.sensors import RGB
 
 
 class ImageGoalEnv(gymnasium.Env[Observation, int]):
@@ -52,7 +53,9 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | `observation` | `(K, F)` | `(K, H, W, 3)` | the last K poses, newest last; a blocked move repeats one   |
     | `target`      | `(F,)`   | `(H, W, 3)`    | the picture to find the place of                            |
 
-    Features are bounded by the power of two above the largest of the scenes.
+    Features are bounded by the power of two above the largest of the scenes. Further sensors that `sensors` names,
+    where the scenes have them, add two boxes each, of the sensor's dtype, unit and range: with
+    `observations="pictures", sensors=("rgb", "depth")` `depth` `(K, H, W)` and `target_depth` `(H, W)`, float32 metres.
 
     ## Rewards
 
@@ -89,6 +92,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | `targets`           | `None`              | state ids by scene name; None: `scenes.targets.default_targets`    |
     | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name |
     | `observations`      | `"features"`        | or `"pictures"`                                                    |
+    | `sensors`           | `("rgb",)`          | whose pictures, for example `("rgb", "depth")`                     |
     | `zone_level`        | `"pose"`            | or `"cell"`: a cell is in a zone where any of its headings is      |
     | `max_episode_steps` | `None`              | steps until truncation; None for no limit (`make` sets 500)        |
     | `history_length`    | `4`                 | K                                                                  |
@@ -115,6 +119,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         targets: Mapping[str, Sequence[int]] | None = None,
         reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
+        sensors: Sequence[str] = (RGB,),
         zone_level: ZoneLevel = "pose",
         max_episode_steps: int | None = None,
         history_length: int = HISTORY_LENGTH,
@@ -125,6 +130,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
             targets=targets,
             reward=reward,
             observations=observations,
+            sensors=sensors,
             zone_level=zone_level,
             max_episode_steps=max_episode_steps,
             history_length=history_length,
