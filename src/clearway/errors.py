@@ -20,6 +20,10 @@ class ClearwayError(Exception):
         super().__init__(printable(message))
 
 
+class ArgumentError(ClearwayError, TypeError, ValueError):
+    """An argument of a function of `clearway` that is of the wrong kind, or out of range."""
+
+
 class SceneError(ClearwayError):
     """A scene that cannot be used.
 

@@ -44,7 +44,7 @@ def chosen_reward(reward: RewardName | Reward) -> Reward:
         if not np.isfinite(reward.table()).all():
             raise EnvError(f"reward={reward} holds NaN or Inf. Give finite values")
         return reward
-    if reward not in REWARDS:
+    if not isinstance(reward, str) or reward not in REWARDS:
         raise EnvError(f"reward={reward!r} is unknown. Use a Reward or one of {', '.join(map(repr, REWARDS))}")
     return REWARDS[reward]
 
