@@ -62,3 +62,7 @@ class RunError(ClearwayError):
 
 class DeployError(ClearwayError, ValueError):
     """An exported agent that cannot be used, or a picture that an agent cannot take."""
+
+
+class PluginError(ClearwayError):
+    """Something that another package offers and that cannot be used."""

@@ -13,9 +13,9 @@ from clearway.deploy.card import Card
 from clearway.deploy.graph import PolicyGraph
 from clearway.deploy.model import Step
 from clearway.deploy.onnx_file import shifted
-from clearway.errors import DeployError
+from clearway.errors import DeployError, EncoderError
 from clearway.learn.load import Agent, load_agent, run_scenes
-from clearway.perception import encoder_from_record
+from clearway.perception import Encoder, encoder_from_record
 from clearway.perception.encoder import NetworkEncoder
 from clearway.scenes.actions import ACTION_NAMES
 from clearway.scenes.scene import EncoderRecord, Scene
@@ -43,7 +43,7 @@ class SceneAgent:
         assert self.scene.encoder is not None, "a run's scene has features and their record"
         return self.scene.encoder
 
-    def card(self, encoder: NetworkEncoder | None) -> Card:
+    def card(self, encoder: Encoder | None) -> Card:
         """The agent's card; with or without its encoder inside."""
         record, made_by, shape = self.agent.record, self.encoder_record, self.agent.network.shape
         pictures = self.scene.observations
@@ -59,14 +59,15 @@ class SceneAgent:
             training={"seed": record.seed, "reward": asdict(record.reward), "versions": dict(record.versions)},
         )
 
-    def _normalisation(self, encoder: NetworkEncoder | None) -> dict[str, object]:
+    def _normalisation(self, encoder: Encoder | None) -> dict[str, object]:
         """What the agent itself does to what it is given."""
         learner = self.agent.record.learner
-        pixels = encoder and {"resize": "bilinear, antialiased, the whole picture", **encoder.preprocessing.to_json()}
+        network = encoder if isinstance(encoder, NetworkEncoder) else None  # another package's says nothing of itself
+        pixels = network and {"resize": "bilinear, antialiased, the whole picture", **network.preprocessing.to_json()}
         return {
             "pixels": pixels,
             "features": {
-                "standardised": encoder is not None and encoder.mean is not None,
+                "standardised": network is not None and network.mean is not None,
                 "centred": learner.centre_features,
                 "whitened": learner.whiten_features,
                 "directions": self.agent.feature_map.input_count,
@@ -97,10 +98,16 @@ def load_scene_agent(
     return SceneAgent(agent, run_scenes(agent.record, files)[index], index, names)
 
 
-def loaded_encoder(chosen: SceneAgent) -> NetworkEncoder:
-    """The encoder that made the features of an agent's scene; see `encoder_from_record` for its errors."""
+def exportable_encoder(chosen: SceneAgent) -> NetworkEncoder:
+    """The encoder that made the features of an agent's scene, as a network; see `encoder_from_record` for its errors.
+
+    Raises:
+        EncoderError: it is one of another package, which may be no network.
+    """
     encoder = encoder_from_record(chosen.encoder_record)
-    assert isinstance(encoder, NetworkEncoder)
+    if not isinstance(encoder, NetworkEncoder):
+        problem = f"encoder {encoder.record.name}: is another package's, which a file cannot hold"
+        raise EncoderError(f"{problem}. Use the run folder itself")
     return encoder
 
 
@@ -115,7 +122,7 @@ class RunModel:
     """
 
     def __init__(self, chosen: SceneAgent) -> None:
-        self._encoder = loaded_encoder(chosen)
+        self._encoder = encoder_from_record(chosen.encoder_record)
         self._policy = PolicyGraph(chosen.agent, chosen.index)
         self.card: Card = chosen.card(self._encoder)
 
