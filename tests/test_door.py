@@ -20,6 +20,7 @@ OFFERED = {
     "load_scene",
     "load_scenes",
     "build_room",
+    "encode_scenes",
     "make_env",
     "train",
     "evaluate",

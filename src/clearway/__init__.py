@@ -13,7 +13,7 @@ TYPE_CHECKING = False  # typing itself would be half of what this module costs
 if TYPE_CHECKING:
     from clearway.api.environments import make_env
     from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
-    from clearway.api.scenes import build_room, load_scene, load_scenes
+    from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
     from clearway.api.training import TrainResult, train
     from clearway.deploy.navigator import Navigator
     from clearway.errors import ClearwayError
@@ -26,6 +26,7 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "load_scene": "clearway.api.scenes",
     "load_scenes": "clearway.api.scenes",
     "build_room": "clearway.api.scenes",
+    "encode_scenes": "clearway.api.scenes",
     "Reward": "clearway.reward",
     "make_env": "clearway.api.environments",
     "Learner": "clearway.learn.config",
@@ -52,6 +53,7 @@ __all__ = [
     "TrainResult",
     "__version__",
     "build_room",
+    "encode_scenes",
     "evaluate",
     "load_agent",
     "load_scene",

@@ -5,7 +5,7 @@ A package offers one in its `pyproject.toml`, by a name of its own:
     [project.entry-points."clearway.encoders"]
     mean-colour = "my_package.encoders:MeanColour"
 
-Looking names up imports none of them. What each kind has to be: `docs/plugins.md`.
+Looking names up imports none of them. What each kind has to be: `docs/python.md`.
 """
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,9 +82,45 @@ def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
         ({"name": "bathroom", "seed": -1}, "seed=-1: expected a whole number from 0"),
         ({"name": "bathroom", "seed": 1.5}, r"seed=1\.5: expected a whole number"),
         ({"name": "bathroom", "out": "room.txt"}, r"ends in \.h5 or \.hdf5"),
-        ({"name": "bathroom", "encoder": 3}, "encoder=3: expected a word"),
+        ({"name": "bathroom", "encoder_seed": -3}, "encoder_seed=-3"),
     ],
 )
 def test_build_room_refuses_before_it_builds(arguments, part) -> None:
     with pytest.raises(ArgumentError, match=part):
         clearway.build_room(**arguments)
+
+
+class Brightness:
+    identity = "brightness-1"
+    feature_count = 2
+
+    def encode(self, pictures):
+        return np.stack([pictures.mean((1, 2, 3)), pictures.std((1, 2, 3))], axis=1)
+
+
+def test_an_encoder_of_one_s_own_encodes_and_its_features_can_be_trained_on(tmp_path) -> None:
+    (scene,) = clearway.encode_scenes(grid_scene(1), Brightness())
+    np.testing.assert_allclose(scene.features[:, 0], scene.observations.mean((1, 2, 3)), rtol=1e-6)
+    assert (scene.encoder_name, scene.features.dtype) == ("Brightness", np.float32)
+    assert scene.encoder.identity != clearway.encode_scenes(grid_scene(1), Other())[0].encoder.identity
+    write_scene(scene, tmp_path / "grid.h5")
+    run = clearway.train(tmp_path / "grid.h5", [5], frames=400, envs=10, rollout_steps=8, width=16, out=tmp_path / "r")
+    with pytest.raises(clearway.ClearwayError, match="Brightness: a program of its own made the features"):
+        clearway.Navigator(run.folder)
+
+
+class Other(Brightness):
+    identity = "brightness-2"
+
+
+def test_an_encoder_of_one_s_own_without_a_part_is_refused_before_a_room_is_built() -> None:
+    class Empty:
+        pass
+
+    for call in (clearway.encode_scenes, clearway.build_room):
+        with pytest.raises(clearway.ClearwayError, match=r"encoder Empty: its identity is None, .*Give it one"):
+            call(grid_scene(1) if call is clearway.encode_scenes else "bathroom", encoder=Empty())
+    with pytest.raises(ArgumentError, match="workers=2: an encoder of your own runs in this process"):
+        clearway.encode_scenes(grid_scene(1), Brightness(), workers=2)
+    with pytest.raises(clearway.ClearwayError, match="has no pictures to encode"):
+        clearway.encode_scenes(replace(grid_scene(1), observations=None), Brightness())

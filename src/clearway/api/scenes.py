@@ -1,14 +1,18 @@
-"""`load_scene`, `load_scenes`, `build_room`."""
+"""`load_scene`, `load_scenes`, `build_room`, `encode_scenes`."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
-from clearway.api.arguments import as_choice, as_path, as_seed, as_whole, as_word
-from clearway.errors import ArgumentError
+import numpy as np
+
+from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
+from clearway.errors import ArgumentError, EncoderError
+from clearway.perception.encoder import Encoder
+from clearway.perception.plugged import own_encoder
 from clearway.scenes.rooms import ROOM_NAMES
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
@@ -17,6 +21,19 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 SceneSource: TypeAlias = Scene | str | os.PathLike[str]
 Scenes: TypeAlias = SceneSource | Iterable[SceneSource]
 """A scene, a scene file, a folder of them, or several of these."""
+BATCH_PICTURES = 32  # that an encoder of the user's own is given together
+
+
+class OwnEncoder(Protocol):
+    """An encoder of your own; a `name` beside these is what tables call it."""
+
+    identity: str
+    """Another one whenever the features change; scenes trained together must agree in it."""
+    feature_count: int
+    """F."""
+
+    def encode(self, pictures: np.ndarray) -> np.ndarray:
+        """Features (B, F) of pictures (B, height, width, 3) uint8; equal for equal pictures."""
 
 
 def load_scene(source: SceneSource) -> Scene:
@@ -72,11 +89,57 @@ def _each(sources: Scenes) -> Iterator[SceneSource]:
         raise ArgumentError(f"{problem}. Give one of these")
 
 
+def encode_scenes(
+    scenes: Scenes,
+    encoder: str | OwnEncoder = "auto",
+    *,
+    encoder_seed: int = 0,
+    workers: int | None = None,
+    show_progress: bool = False,
+) -> list[Scene]:
+    """The scenes with features of their pictures, all by one encoder.
+
+    Args:
+        scenes: with pictures; those to be trained together are encoded together.
+        encoder: "resnet50", "random-resnet50" (calibrated on the scenes), "auto" (the first if it can be had, else the
+            second), a plugin's or a Hugging Face model's name; or an encoder of your own (`OwnEncoder`).
+        encoder_seed: of "random-resnet50".
+        workers: processes that share the encoding; None: this process alone. An encoder of your own takes none.
+        show_progress: draw a progress bar, if standard error is a terminal.
+
+    Raises:
+        ArgumentError: an argument is of the wrong kind or out of range.
+        ClearwayError: a scene has no pictures, or the encoder cannot be had or used.
+
+    Warns:
+        EncoderWarning: "auto" fell back to random weights.
+    """
+    from clearway.perception import encode
+
+    loaded, seed = load_scenes(scenes), as_seed("encoder_seed", encoder_seed)
+    count = None if workers is None else as_whole("workers", workers, 1)
+    if isinstance(encoder, str):
+        return encode.encode_scenes(loaded, encoder, seed=seed, workers=count, progress=show_progress)
+    if count is not None:
+        raise ArgumentError(f"workers={count}: an encoder of your own runs in this process. Leave workers out")
+    own = own_encoder(encoder)
+    return [scene.with_features(_features(scene, own), own.record) for scene in loaded]
+
+
+def _features(scene: Scene, encoder: Encoder) -> np.ndarray:
+    """Features (S, F) float32 of a scene's pictures."""
+    pictures = scene.observations
+    if pictures is None:
+        raise EncoderError(f"scene {scene.name} has no pictures to encode. Use the features that its file holds")
+    starts = range(0, scene.state_count, BATCH_PICTURES)
+    return np.concatenate([encoder.encode(pictures[start : start + BATCH_PICTURES]) for start in starts])
+
+
 def build_room(
     name: str,
     seed: int = 0,
     *,
-    encoder: str = "auto",
+    encoder: str | OwnEncoder = "auto",
     encoder_seed: int = 0,
     out: str | os.PathLike[str] | None = None,
     workers: int | None = None,
@@ -89,9 +152,8 @@ def build_room(
     Args:
         name: "bathroom", "bedroom", "living_room" or "kitchen".
         seed: 0 gives the default room, another one other colours, textures, pictures and small furniture.
-        encoder: "resnet50", "random-resnet50", "auto" (the first if it can be had, else the second), a plugin's, or a
-            Hugging Face model. "random-resnet50" is calibrated on this room: rooms to be trained together are built
-            with `clearway scenes build`, which encodes them together.
+        encoder: see `encode_scenes`. "random-resnet50" is calibrated on this room alone: encode rooms that are to be
+            trained together once more, together.
         encoder_seed: of "random-resnet50".
         out: scene file to write as well, .h5 or .hdf5.
         workers: processes that render; None: one a core.
@@ -104,7 +166,6 @@ def build_room(
     Warns:
         EncoderWarning: "auto" fell back to random weights.
     """
-    from clearway.perception import encode_scenes
     from clearway.scenes.library import cached_room_scene
 
     room, room_seed = as_choice("name", name, ROOM_NAMES), as_seed("seed", seed)
@@ -112,9 +173,11 @@ def build_room(
     if path is not None and path.suffix.lower() not in SCENE_SUFFIXES:
         raise ArgumentError(f"out={str(path)!r}: expected a name that ends in {' or '.join(SCENE_SUFFIXES)}. Rename it")
     count = None if workers is None else as_whole("workers", workers, 1)
-    kind, kind_seed = as_word("encoder", encoder), as_seed("encoder_seed", encoder_seed)
+    as_seed("encoder_seed", encoder_seed)  # before the minute that building takes
+    if not isinstance(encoder, str):
+        own_encoder(encoder)
     scene = cached_room_scene(room, room_seed, workers=count, progress=show_progress)
-    (encoded,) = encode_scenes([scene], kind, seed=kind_seed, progress=show_progress)
+    (encoded,) = encode_scenes(scene, encoder, encoder_seed=encoder_seed, show_progress=show_progress)
     if path is None:
         return encoded
     write_scene(encoded, path)

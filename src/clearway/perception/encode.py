@@ -82,6 +82,9 @@ def encoder_from_record(record: EncoderRecord) -> Encoder:
         return pretrained.from_record(record)
     if kind == plugged.KIND:
         return plugged.from_record(record)
+    if kind == plugged.OWN_KIND:
+        problem = f"encoder {record.name}: a program of its own made the features, and no package offers it"
+        raise EncoderError(f"{problem}. Offer it as a plugin (docs/python.md), or encode the scene again")
     problem = f"encoder {record.name}: the features came with the scene's file, which does not say how they were made"
     raise EncoderError(f"{problem}. Encode the scene again")
 
