@@ -8,11 +8,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clearway.errors import ClearwayError
+from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 
 if TYPE_CHECKING:
     from clearway.scenes.scene import Scene
 
-SCENE_SUFFIXES = (".h5", ".hdf5")
+__all__ = [
+    "SCENE_SUFFIXES",
+    "check_at_least",
+    "check_ending",
+    "check_finite",
+    "check_named",
+    "check_positive",
+    "check_seeds",
+    "chosen_targets",
+    "scene_files",
+]
 
 
 def check_at_least(lowest: int, **values: int | None) -> None:
@@ -61,28 +72,6 @@ def check_ending(*endings: str, **paths: Path | None) -> None:
 
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
-
-
-def scene_files(paths: Sequence[Path]) -> list[Path]:
-    """The scene files that some paths name: files as they are, folders by the scene files in them.
-
-    Raises:
-        ClearwayError: a path does not exist, or a folder holds no scene file.
-    """
-    files: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
-            if not found:
-                raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
-            files += found
-        elif path.exists():
-            files.append(path)
-        else:
-            raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
-    if not files:
-        raise ClearwayError("no scene file given. Name at least one, or make one with clearway scenes build")
-    return files
 
 
 def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> dict[str, tuple[int, ...]]:

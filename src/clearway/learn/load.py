@@ -99,13 +99,14 @@ def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tenso
     return network
 
 
-def run_scenes(record: RunRecord, files: Sequence[Path] | None = None) -> list[Scene]:
-    """The scenes of a run, in its order, from the files it names or from those given.
+def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -> list[Scene]:
+    """The scenes of a run, in its order, from the files it names or from what is given: files, or scenes themselves.
 
     Raises:
         RunError: a scene is missing or is not the one the run was trained on.
     """
-    by_name = {scene.name: scene for scene in (read_scene(path) for path in files)} if files else None
+    loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given or ()]
+    by_name = {scene.name: scene for scene in loaded} if given else None
     scenes = []
     for wanted in record.scenes:
         scene = _found(wanted.name, wanted.path, by_name)
