@@ -18,6 +18,7 @@ ORDER = (
         "progress",
         "children",
         "ray_cluster",
+        "spread",
         "terminal",
         "torch_threads",
     },

@@ -38,7 +38,7 @@ def build_scene(
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.navigation import find_grid
     from clearway.scenes.rooms.obstacles import AgentShape
-    from clearway.scenes.rooms.render_cluster import render_at
+    from clearway.scenes.rooms.render import render
     from clearway.scenes.rooms.topview import render_top_view
 
     title, agent = scene_name(name, seed), AgentShape()
@@ -48,7 +48,7 @@ def build_scene(
         model = room.spec.compile()
     top_view = render_top_view(model, room.width_m, room.depth_m)
     view = first_person_view(grid.state_locations_m, grid.state_headings_deg)
-    pictures = render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {title}")
+    pictures = render(model, view, workers=workers, ray=ray, progress=progress, label=f"rendering {title}")
     return Scene(
         name=title,
         observations=pictures,
@@ -83,7 +83,7 @@ def build_floor_plan(
     check_mujoco()
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.plans.plan_room import build_plan_room
-    from clearway.scenes.rooms.render_cluster import render_at
+    from clearway.scenes.rooms.render import render
     from clearway.scenes.rooms.topview import render_top_view
 
     locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
@@ -94,7 +94,7 @@ def build_floor_plan(
     top_view = render_top_view(model, room.width_m, room.depth_m)
     x_m, z_m = layout.origin_m
     view = first_person_view(locations_m - np.array(layout.origin_m), headings_deg)
-    pictures = render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {plan.name}")
+    pictures = render(model, view, workers=workers, ray=ray, progress=progress, label=f"rendering {plan.name}")
     return Scene(
         name=plan.name,
         observations=pictures,
@@ -129,7 +129,7 @@ def check_mujoco() -> None:
     try:
         import_module("mujoco")
     except (ImportError, AttributeError, RuntimeError, OSError) as error:
-        from clearway.scenes.rooms.render import cannot_draw
+        from clearway.scenes.rooms.render_worker import cannot_draw
 
         raise cannot_draw(f"{type(error).__name__}: {error}") from error
 

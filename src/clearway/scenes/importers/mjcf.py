@@ -20,7 +20,7 @@ from clearway.scenes.importers.mjcf_floor import World, find_cells, floor_of, sp
 from clearway.scenes.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, first_person_view
 from clearway.scenes.rooms.navigation import Floor
 from clearway.scenes.rooms.obstacles import AgentShape, bounding_boxes
-from clearway.scenes.rooms.render_cluster import render_at
+from clearway.scenes.rooms.render import render
 from clearway.scenes.rooms.topview import PIXELS_PER_M, render_from_above
 from clearway.scenes.scene import Provenance, Scene, TopView
 from clearway.scenes.validate import check_moves, check_scene
@@ -85,7 +85,7 @@ def read_mjcf(
     )
     scene = Scene(
         name=title,
-        observations=render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {title}"),
+        observations=render(model, view, workers=workers, ray=ray, progress=progress, label=f"rendering {title}"),
         features=None,
         locations_m=grid.state_locations_m,
         headings_deg=grid.state_headings_deg,
