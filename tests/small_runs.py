@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor
 
 from clearway.envs.world import World, make_world
-from clearway.learn.config import DEFAULT, Learner
+from clearway.learn.learner import Learner
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -48,13 +50,16 @@ def small_network(world: World, width: int = 16, seed: int = 0) -> SiameseActorC
     return SiameseActorCritic(NetworkShape(world.scene_count, world.features.shape[1], width), seed)
 
 
-def small_learner(learner: Learner = DEFAULT, **changes: Any) -> Learner:
+Kind = TypeVar("Kind", bound=Learner)
+
+
+def small_learner(learner: Kind = DEFAULT, **changes: Any) -> Kind:
     """Settings for 10 environments, 8 steps, 10 updates, where `changes` do not say otherwise."""
     small: dict[str, Any] = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
-    return replace(learner, **(small | changes))
+    return replace(learner, **({name: small[name] for name in small if hasattr(learner, name)} | changes))
 
 
-def small_trainer(learner: Learner, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
+def small_trainer(learner: OnPolicy, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
     """A trainer on the two small scenes."""
     return Trainer(small_world(), learner, reward, seed)
 

@@ -9,8 +9,9 @@ from torch import Tensor
 
 from clearway.envs.navigation import Navigation
 from clearway.learn import trainer as trainer_module
-from clearway.learn.config import DEFAULT, Learner
 from clearway.learn.losses import Batch, LossSettings, loss_gradient
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT
 from clearway.learn.rollout import sample_actions
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
@@ -39,7 +40,7 @@ def reached_from_everywhere(trainer: Trainer) -> Tensor:
     return share / world.start_count
 
 
-def trained(learner: Learner) -> Trainer:
+def trained(learner: OnPolicy) -> Trainer:
     trainer = Trainer(small_world(), learner, COLLISION_AWARE, seed=0)
     while not trainer.finished:
         trainer.update()
@@ -51,7 +52,7 @@ def flipped(output: Tensor, batch: Batch, settings: LossSettings) -> Any:
     return loss_gradient(output, replace(batch, advantage=-batch.advantage), settings)
 
 
-def solves_everything(learner: Learner) -> bool:
+def solves_everything(learner: OnPolicy) -> bool:
     """After training nearly all episodes reach their target without great detours."""
     return bool(reached_from_everywhere(trained(learner)).min() > 0.94)
 

@@ -1,6 +1,7 @@
 """A run folder: what was asked for, how it went, and its checkpoints.
 
-run.json         learner, reward, seed, zone level, scenes with their targets and digests, versions, hardware, command
+run.json         the learner (algorithm and its own settings), reward, seed, zone level, scenes with their targets and
+                 digests, versions, hardware, command
 metrics.jsonl    one row of figures a line (docs/metrics.md)
 checkpoints/     see `checkpoint`
 milestones/N/    the agent after N frames, where it was asked for: a checkpoint to act from, not to train on from
@@ -24,15 +25,17 @@ import numpy as np
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.files import parse_json, read_json, written_whole
-from clearway.learn.config import ADDED_LATER, Learner
+from clearway.learn.algorithms import algorithm
+from clearway.learn.learner import Learner
+from clearway.learn.old_runs import own_settings
 from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
-Settings = TypeVar("Settings", Learner, Reward)
+Settings = TypeVar("Settings", bound=Learner | Reward)
 
 
 @dataclass(frozen=True)
@@ -177,6 +180,7 @@ class RunFolder:
     def write_record(self, record: RunRecord) -> None:
         """Write run.json."""
         content = {"format_version": FORMAT_VERSION, **asdict(record)}
+        content["learner"] = {"algorithm": record.learner.algorithm, **content["learner"]}
         with written_whole(self.path / RUN_FILE) as part:
             part.write_text(json.dumps(content, indent=2) + "\n")
 
@@ -199,7 +203,7 @@ class RunFolder:
         if found > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
-            return _record_from(content)
+            return _record_from(content, found)
         except (KeyError, TypeError, AttributeError, OverflowError, RunError) as error:
             reason, remedy = str(error).rstrip(".")[:300], "Restore it or train again"
             by = _maker(content)
@@ -240,13 +244,13 @@ class RunFolder:
                 part.write_text(text)
 
 
-def _record_from(content: Mapping[str, Any]) -> RunRecord:
+def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
     wanted = {"seed": int, "zone_level": ZoneLevel, "versions": dict, "hardware": dict, "command": list}
     for name, kind in wanted.items():
         if not _fits(content[name], kind):
             raise TypeError(f"{name} is {content[name]!r:.40}")
     return RunRecord(
-        learner=_settings(Learner, {**ADDED_LATER, **content["learner"]}),
+        learner=_learner(content["learner"], version),
         reward=_settings(Reward, content["reward"]),
         seed=content["seed"],
         zone_level=content["zone_level"],
@@ -255,6 +259,12 @@ def _record_from(content: Mapping[str, Any]) -> RunRecord:
         hardware=content["hardware"],
         command=tuple(content["command"]),
     )
+
+
+def _learner(content: Mapping[str, Any], version: int) -> Learner:
+    kind = algorithm(content["algorithm"])
+    settings = {name: value for name, value in content.items() if name != "algorithm"}
+    return _settings(kind, own_settings(kind, settings) if version == 1 else settings)
 
 
 def _maker(content: Mapping[str, Any]) -> str:
@@ -268,8 +278,9 @@ def _settings(kind: type[Settings], content: Mapping[str, Any]) -> Settings:
     expected = {field.name for field in fields(kind)}
     if set(content) != expected:
         raise KeyError(", ".join(sorted(set(content) ^ expected)))
-    for name, wanted in get_type_hints(kind).items():
-        if not _fits(content[name], wanted):
+    types = get_type_hints(kind)
+    for name in expected:
+        if not _fits(content[name], types[name]):
             raise TypeError(f"{name} is {content[name]!r:.40}")
     return kind(**content)
 

@@ -7,7 +7,8 @@ from torch import Tensor
 from clearway.envs.feature_store import all_finite, evenly_spaced
 from clearway.envs.world import World
 from clearway.errors import RunError
-from clearway.learn.config import Learner
+from clearway.learn.learner import OnFeatures
+from clearway.learn.on_policy import OnPolicy
 from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp
 from clearway.model.feature_map import FeatureMap
 from clearway.model.network import SiameseActorCritic
@@ -39,7 +40,7 @@ def checked_features(world: World) -> Tensor:
     return world.features
 
 
-def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
+def fitted_features(features: Tensor, learner: OnFeatures) -> FeatureMap:
     """The network's input for the features (S, F), as the settings have it; fitted to `FITTED_STATES` at most."""
     sample = evenly_spaced(features, FITTED_STATES)
     return FeatureMap.fitted(
@@ -47,7 +48,7 @@ def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
     )
 
 
-def optimisers(network: SiameseActorCritic, learner: Learner) -> tuple[Optimiser, Optimiser]:
+def optimisers(network: SiameseActorCritic, learner: OnPolicy) -> tuple[Optimiser, Optimiser]:
     """Of the first layer's weight, and of all other parameters."""
     kind = Adam if learner.optimiser == "adam" else SharedRMSProp
     named = dict(network.named_parameters())

@@ -1,0 +1,35 @@
+"""The algorithms by name. Another one is a file with a config class, see `learner`, and a line here."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from clearway.errors import RunError
+from clearway.learn.a2c import A2C
+from clearway.learn.a3c.config import A3C
+from clearway.learn.learner import Learner, setting_names
+from clearway.learn.ppo import PPO
+
+ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C)}
+Kind = TypeVar("Kind", bound=Learner)
+
+
+def algorithm(name: str) -> type[Learner]:
+    """The config class of that name.
+
+    Raises:
+        RunError: there is none.
+    """
+    if name not in ALGORITHMS:
+        raise RunError(f"algorithm {name!r:.40}: expected one of {', '.join(ALGORITHMS)}. Name one of these")
+    return ALGORITHMS[name]
+
+
+def carried_over(learner: Learner, kind: type[Kind]) -> Kind:
+    """The settings of another algorithm: this learner's where both have a setting of that name, else its own defaults.
+
+    Raises:
+        RunError: they cannot work together.
+    """
+    shared = set(setting_names(type(learner))) & set(setting_names(kind))
+    return kind(**{name: getattr(learner, name) for name in shared})
