@@ -68,11 +68,11 @@ class Evaluate:
     def _on_grid(self, episodes: int, step_cap: int) -> None:
         from clearway.evaluate.files import write_evaluations
         from clearway.evaluate.run import evaluate_run
-        from clearway.learn.load import load_agent, run_scenes
+        from clearway.learn.load import load_acting, run_scenes
 
         check_at_least(1, episodes=episodes, step_cap=step_cap)
         check_seeds(seed=self.seed)
-        agent = load_agent(self.folder, self.checkpoint)
+        agent = load_acting(self.folder, self.checkpoint)
         scenes = run_scenes(agent.record, scene_files(self.scenes) if self.scenes else None)
         evaluations = evaluate_run(agent, scenes, episodes_per_target=episodes, step_cap=step_cap, seed=self.seed)
         first, *others = (evaluation.to_json() for evaluation in evaluations)

@@ -7,10 +7,12 @@ from typing import TypeVar
 from clearway.errors import RunError
 from clearway.learn.a2c import A2C
 from clearway.learn.a3c.config import A3C
+from clearway.learn.bc import BC
 from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
+from clearway.learn.q_learning import QLearning
 
-ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C)}
+ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C, BC, QLearning)}
 Kind = TypeVar("Kind", bound=Learner)
 
 

@@ -43,7 +43,7 @@ AT_LEAST_ZERO = {
     "value_weight",
     "feature_basis",
 }
-ZERO_TO_ONE = {"discount", "gae_lambda"}
+ZERO_TO_ONE = {"discount", "gae_lambda", "step_size", "explore_start", "explore_end"}
 BELOW_ONE = {"settle"}
 
 
@@ -61,8 +61,6 @@ class Learner:
 
     frames: int = 3_000_000
     """Training frames over all environments; schedules end here."""
-    clip_rewards: bool = False
-    """Clip rewards to [-1, 1] (before scaling), as Zhu's training loop does."""
 
     def __post_init__(self) -> None:
         """Refuse settings that cannot work.
@@ -72,6 +70,11 @@ class Learner:
         """
         for name, value in asdict(self).items():
             _check_range(name, value)
+
+    @property
+    def clip_rewards(self) -> bool:
+        """Whether rewards are clipped to [-1, 1]."""
+        return False
 
     @property
     def reward_scale(self) -> float:

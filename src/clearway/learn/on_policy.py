@@ -37,6 +37,8 @@ class OnPolicy(OnFeatures, Learner):
     """Add the value of the pose where an episode was cut; False treats the cut as an end, as Zhu's code does."""
 
     # What is learnt from
+    clip_rewards: bool = False
+    """Clip rewards to [-1, 1] (before scaling), as Zhu's training loop does."""
     reward_scale: float = 0.1
     """Rewards are multiplied by this, so that the target is worth 1 without clipping."""
     discount: float = 0.97
