@@ -27,9 +27,8 @@ from clearway.learn.learner import Learner, OnFeatures, linear
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import Adam, clip_gradients
 from clearway.learn.rollout import ACTION_STREAM, Collector, as_rows
-from clearway.learn.setup import check_seed, checked_features, fitted_features
+from clearway.learn.setup import check_seed, network_input
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import shortest_path_actions
@@ -79,9 +78,9 @@ class Cloning:
 
     def __init__(self, world: World, learner: BC, reward: Reward, seed: int) -> None:
         check_seed(seed)
-        self.feature_map = fitted_features(checked_features(world), learner)
         if learner.envs < world.scene_count:
             raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments (envs)")
+        self.feature_map, features = network_input(world, learner)
         self.world, self.learner = world, learner
         self.frames, self.updates = 0, 0
         scene = torch.arange(learner.envs, device=world.device) * world.scene_count // learner.envs
@@ -91,7 +90,6 @@ class Cloning:
         shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(world.device)
         most_seen = learner.envs * (learner.history_length + learner.rollout_steps)
-        features = prepared_features(world, self.feature_map)
         self.lookup = LookupNetwork(self.network, features, world.target_state, most_seen=most_seen)
         self.optimiser = Adam(dict(self.network.named_parameters()))
         seeds = torch.arange(learner.envs, dtype=torch.int64, device=world.device) + (seed << 32)

@@ -26,9 +26,8 @@ from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.rotation import Rotation, check_division, divided_envs
-from clearway.learn.setup import check_seed, checked_features, fitted_features, optimisers
+from clearway.learn.setup import check_seed, network_input, optimisers
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
@@ -65,7 +64,7 @@ class Trainer:
 
     def __init__(self, world: World, learner: OnPolicy, reward: Reward, seed: int) -> None:
         check_seed(seed)
-        self.feature_map = fitted_features(checked_features(world), learner)
+        self.feature_map, features = network_input(world, learner)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
         self.rotation = Rotation(world.scene_count, learner.scenes_at_once, learner.scene_updates, seed)
@@ -79,7 +78,7 @@ class Trainer:
         dtype = factor_dtype(learner.matmul_precision, device)
         self.lookup = LookupNetwork(
             self.network,
-            prepared_features(world, self.feature_map),
+            features,
             world.target_state,
             dtype,
             most_seen=self.env_count * (learner.history_length + learner.rollout_steps),

@@ -27,9 +27,8 @@ from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import EPSILON
-from clearway.learn.setup import check_seed, checked_features, fitted_features
+from clearway.learn.setup import check_seed, network_input
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.feature_map import prepared_features
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
@@ -55,7 +54,6 @@ class AsyncTrainer:
 
     def __init__(self, world: World, learner: A3C, reward: Reward, seed: int, processes: int = 1) -> None:
         check_seed(seed)
-        features = checked_features(world)
         if world.device.type != "cpu":
             raise RunError(f"a3c on the device {world.device}, expected cpu. Leave out --device")
         if learner.envs < world.target_count:
@@ -64,18 +62,18 @@ class AsyncTrainer:
             )
         self.world, self.learner, self.reward, self.seed = world, learner, reward, seed
         self.frames, self.updates = 0, 0
-        self.feature_map = fitted_features(features, learner)
+        self.feature_map, features = network_input(world, learner)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
         self.process_count = min(processes, learner.envs)
-        self.shared = self._new_shared()
+        self.shared = self._new_shared(features)
         self._processes: list[SpawnProcess] = []
         self._connections: list[Connection] = []
         self._paused = False
         self._figures: list[Figures] = []
 
-    def _new_shared(self) -> SharedTensors:
-        """Shared memory with everything at its start."""
-        learner, world = self.learner, replace(self.world, features=prepared_features(self.world, self.feature_map))
+    def _new_shared(self, features: Tensor) -> SharedTensors:
+        """Shared memory with everything at its start; features (S, F) as the network takes them."""
+        learner, world = self.learner, replace(self.world, features=features)
         shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
         parameters = {name: p.data for name, p in SiameseActorCritic(shape, self.seed).named_parameters()}
         squares = {name: torch.full_like(tensor, 1 + EPSILON) for name, tensor in parameters.items()}
