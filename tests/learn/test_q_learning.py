@@ -75,6 +75,17 @@ def test_the_table_becomes_that_of_the_exact_optimum(step_limit: int) -> None:
         assert ((best_actions(rows).numpy() > 0) <= (optimal > 0)).all()
 
 
+def test_the_target_s_own_values_stay_0_and_cut_episodes_begin_anew() -> None:
+    trainer = TableTrainer(small_world(), replace(SMALL, step_limit=3), COLLISION_AWARE, 0)
+    for _ in range(20):
+        trainer.update()
+        assert trainer.navigation.elapsed.max() < 3
+    world = trainer.world
+    assert not trainer.values[trainer.first_row + world.target_state].any()
+    totals = trainer.statistics.take().sum(0)
+    assert totals[2] / totals[0] <= 3  # steps an episode
+
+
 def test_a_run_evaluates_at_the_shortest_paths_and_has_no_network(tmp_path: Path) -> None:
     request = small_request(learner=replace(SMALL, frames=40_000, envs=20), reward=SHORTEST)
     folder = train(request, tmp_path)

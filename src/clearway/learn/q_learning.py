@@ -120,7 +120,7 @@ class TableTrainer:
             probabilities = explore / ACTION_COUNT + (1 - explore) * best_actions(self.values[row])
             action = sampled(probabilities, self.action_stream.uniform())
             step = nav.step(action)
-            onward = self.values[self.first_row[target] + step.state].max(1).values * ~step.reached
+            onward = self.values[self.first_row[target] + step.state].max(1).values  # at the target, never left, 0
             errors.append(self._learn(row * ACTION_COUNT + action, step.reward + learner.discount * onward))
             walked.append((target, step.reached, step.truncated, step.blocked))
             nav.restart(step.ended)
