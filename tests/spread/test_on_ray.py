@@ -44,7 +44,7 @@ def test_errors_are_told_as_here() -> None:
 
 def test_a_part_whose_worker_dies_every_time_is_given_up_in_one_line(tmp_path: Path) -> None:
     with workers_for(Work(partial(noted, tmp_path), parts.die, died, attempts=2), ray="local") as crew:
-        with pytest.raises(RunError, match="^part killed: its worker died ") as error:
+        with pytest.raises(RunError, match=r"^part killed: its worker died ") as error:
             list(crew.results(["killed"]))
     assert "\n" not in str(error.value)
     assert len(list(tmp_path.glob("died-*"))) == 2

@@ -95,7 +95,7 @@ class _Crew:
                 raise CancelledError
             messages = None
             if self.work.keeps_messages:
-                messages = self.files.enter_context(tempfile.TemporaryFile())
+                messages = self.files.enter_context(tempfile.TemporaryFile())  # noqa: SIM115 - closed by `close`
             process = _Process({**self.work.environment, **os.environ}, messages)
             self.started.append(process)
         process.send(self.message)
