@@ -160,7 +160,7 @@ def chosen_learner(wanted: str | Learner, frames: int | None, settings: Mapping[
     if isinstance(wanted, Learner):
         learner = wanted
     elif isinstance(wanted, str) and wanted in PRESETS:
-        learner = PRESETS[wanted]  # type: ignore[index]
+        learner = PRESETS[wanted]
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
         learner = algorithm(wanted)()
     else:
