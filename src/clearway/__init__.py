@@ -1,19 +1,99 @@
-"""clearway: agents that walk to where a picture was taken and anticipate collisions on the way."""
+"""clearway: agents that walk to where a picture was taken and anticipate collisions on the way.
 
-from typing import TYPE_CHECKING
+A program of one's own needs no more than this module: `docs/python.md` shows it in use. Importing it loads nothing
+heavy; each name brings what it needs when it is first asked for.
+"""
 
+import sys
+
+from clearway.gymnasium_hook import register_with_gymnasium
 from clearway.version import __version__
 
+TYPE_CHECKING = False  # typing itself would be half of what this module costs
 if TYPE_CHECKING:
+    from clearway.api.environments import make_env
+    from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
+    from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
+    from clearway.api.training import TrainResult, train
     from clearway.deploy.navigator import Navigator
+    from clearway.errors import ClearwayError
+    from clearway.learn.config import PAPER_A2C, PAPER_A3C, Learner
+    from clearway.reward import Reward
+    from clearway.scenes.scene import Scene
 
-__all__ = ["Navigator", "__version__"]
+_HOME = {  # of each name, in the order in which a reader meets them
+    "Scene": "clearway.scenes.scene",
+    "load_scene": "clearway.api.scenes",
+    "load_scenes": "clearway.api.scenes",
+    "build_room": "clearway.api.scenes",
+    "encode_scenes": "clearway.api.scenes",
+    "Reward": "clearway.reward",
+    "make_env": "clearway.api.environments",
+    "Learner": "clearway.learn.config",
+    "PAPER_A2C": "clearway.learn.config",
+    "PAPER_A3C": "clearway.learn.config",
+    "train": "clearway.api.training",
+    "TrainResult": "clearway.api.training",
+    "evaluate": "clearway.api.evaluation",
+    "EvaluateResult": "clearway.api.evaluation",
+    "load_agent": "clearway.api.evaluation",
+    "Navigator": "clearway.deploy.navigator",
+    "ClearwayError": "clearway.errors",
+}
+
+__all__ = [
+    "PAPER_A2C",
+    "PAPER_A3C",
+    "ClearwayError",
+    "EvaluateResult",
+    "Learner",
+    "Navigator",
+    "Reward",
+    "Scene",
+    "TrainResult",
+    "__version__",
+    "build_room",
+    "encode_scenes",
+    "evaluate",
+    "load_agent",
+    "load_scene",
+    "load_scenes",
+    "make_env",
+    "train",
+]
 
 
 def __getattr__(name: str) -> object:
-    """`Navigator`, imported when it is asked for: `import clearway` alone loads nothing."""
-    if name == "Navigator":
-        from clearway.deploy.navigator import Navigator
+    """A name of `_HOME`, imported when it is first asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'clearway' has no attribute {name!r}")
+    value = globals()[name] = _from_home(name)
+    return value
 
-        return Navigator
-    raise AttributeError(f"module 'clearway' has no attribute {name!r}")
+
+def _from_home(name: str) -> object:
+    from importlib import import_module
+
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    """What is loaded, and what can be asked for."""
+    return sorted({*globals(), *_HOME})
+
+
+class _Door(type(sys)):  # type: ignore[misc]
+    """This module, whose `evaluate` is the function and stays it when the folder of that name is imported."""
+
+    @property
+    def evaluate(self) -> object:
+        """The function."""
+        return _from_home("evaluate")
+
+    @evaluate.setter
+    def evaluate(self, folder: object) -> None:
+        """What Python binds once it has imported the folder; `from clearway.evaluate.run import ...` does without."""
+
+
+sys.modules[__name__].__class__ = _Door
+register_with_gymnasium()

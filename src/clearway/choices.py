@@ -2,9 +2,6 @@
 
 from typing import Literal
 
-RewardName = Literal["collision-aware", "shortest", "bump"]
-"""See `clearway.reward.REWARDS`."""
-
 ZoneLevel = Literal["pose", "cell"]
 """See `clearway.zones`."""
 

@@ -20,6 +20,10 @@ class ClearwayError(Exception):
         super().__init__(printable(message))
 
 
+class ArgumentError(ClearwayError, TypeError, ValueError):
+    """An argument of a function of `clearway` that is of the wrong kind, or out of range."""
+
+
 class SceneError(ClearwayError):
     """A scene that cannot be used.
 
@@ -58,3 +62,7 @@ class RunError(ClearwayError):
 
 class DeployError(ClearwayError, ValueError):
     """An exported agent that cannot be used, or a picture that an agent cannot take."""
+
+
+class PluginError(ClearwayError):
+    """Something that another package offers and that cannot be used."""

@@ -33,6 +33,7 @@ COMMANDS = {
     "scenes import ai2thor",
     "scenes import mjcf",
     "scenes import miniworld",
+    "scenes import plugin",
     "scenes inspect",
     "scenes export",
     "scenes view",
@@ -44,6 +45,7 @@ COMMANDS = {
     "video",
     "export",
     "serve",
+    "plugins",
     "view",
 }
 

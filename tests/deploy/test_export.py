@@ -12,7 +12,7 @@ import torch
 from torch.nn.functional import interpolate
 
 from clearway.deploy.card import card_from_json
-from clearway.deploy.from_run import load_scene_agent, loaded_encoder
+from clearway.deploy.from_run import load_scene_agent, picture_encoder
 from clearway.deploy.graph import resize_weights
 from clearway.deploy.onnx_file import OnnxModel
 from clearway.errors import DeployError, EncoderError, RunError
@@ -139,7 +139,7 @@ def test_the_scene_is_chosen_by_name_and_is_the_first_otherwise(deployed) -> Non
 def test_an_encoder_of_depth_is_not_deployed(deployed) -> None:
     scene = replace(deployed.chosen.scene, encoder=depth_grid.find_record())
     with pytest.raises(EncoderError, match="depth-grid sees depth, and deployed agents take colour pictures"):
-        loaded_encoder(replace(deployed.chosen, scene=scene))
+        picture_encoder(replace(deployed.chosen, scene=scene))
 
 
 def test_the_card_of_an_agent_that_sees_depth_says_so(deployed) -> None:

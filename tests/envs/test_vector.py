@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import ClearwayError, EnvError, SceneError
-from clearway.reward import Reward
+from clearway.reward import Arrival, Reward, RewardError, Time
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from made import corridor_scene, grid_scene, with_depth
@@ -347,7 +347,7 @@ def test_episodes_that_a_reset_left_out_stay_over() -> None:
 
 BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] = [
     (lambda: {"scenes": []}, EnvError, "scenes is empty"),
-    (lambda: {"reward": "generous"}, EnvError, "'collision-aware', 'shortest', 'bump'"),
+    (lambda: {"reward": "generous"}, RewardError, "'collision-aware', 'shortest', 'bump'"),
     (lambda: {"observations": "sounds"}, EnvError, "'features', 'pictures'"),
     (lambda: {"render_mode": "human"}, EnvError, "rgb_array, ansi"),
     (lambda: {"num_envs": 0}, EnvError, "at least 1 environment"),
@@ -359,7 +359,7 @@ BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] =
     (lambda: {"autoreset_mode": "never"}, EnvError, "autoreset_mode='never' is unknown. Use one of NextStep"),
     (lambda: {"scenes": 5}, EnvError, "scenes: 5 is neither a scene nor"),
     (lambda: {"scenes": [grid_scene(0), None]}, EnvError, "scenes: None is neither a scene nor"),
-    (lambda: {"reward": Reward("mine", alpha=float("nan"))}, EnvError, "holds NaN or Inf"),
+    (lambda: {"reward": Reward("mine", (Time(float("nan")), Arrival()))}, RewardError, "holds NaN or Inf"),
     (lambda: {"targets": [5]}, EnvError, r"targets=\[5\]: expected state ids by scene name"),
     (lambda: {"targets": {"grid": 5}}, EnvError, r"targets\['grid'\]=5: expected state ids"),
     (lambda: {"targets": {"grid": [True]}}, SceneError, "target True is no state id"),

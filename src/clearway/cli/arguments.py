@@ -1,4 +1,4 @@
-"""What several commands read from the command line alike: numbers, scene files, targets, rewards."""
+"""What several commands read from the command line alike: numbers, scene files, targets."""
 
 from __future__ import annotations
 
@@ -7,14 +7,23 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clearway.choices import RewardName
 from clearway.errors import ClearwayError
+from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 
 if TYPE_CHECKING:
-    from clearway.reward import Reward
     from clearway.scenes.scene import Scene
 
-SCENE_SUFFIXES = (".h5", ".hdf5")
+__all__ = [
+    "SCENE_SUFFIXES",
+    "check_at_least",
+    "check_ending",
+    "check_finite",
+    "check_named",
+    "check_positive",
+    "check_seeds",
+    "chosen_targets",
+    "scene_files",
+]
 
 
 def check_at_least(lowest: int, **values: int | None) -> None:
@@ -65,28 +74,6 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def scene_files(paths: Sequence[Path]) -> list[Path]:
-    """The scene files that some paths name: files as they are, folders by the scene files in them.
-
-    Raises:
-        ClearwayError: a path does not exist, or a folder holds no scene file.
-    """
-    files: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
-            if not found:
-                raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
-            files += found
-        elif path.exists():
-            files.append(path)
-        else:
-            raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
-    if not files:
-        raise ClearwayError("no scene file given. Name at least one, or make one with clearway scenes build")
-    return files
-
-
 def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> dict[str, tuple[int, ...]]:
     """Targets by scene name from the command line's words; scenes without any get their default ones.
 
@@ -110,22 +97,3 @@ def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> 
         except ValueError as error:
             raise ClearwayError(f"--targets {word}: expected state numbers such as 26,37,43. Correct it") from error
     return {scene.name: named.get(scene.name) or default_targets(scene, seed) for scene in scenes}
-
-
-def chosen_reward(
-    name: RewardName,
-    alpha: float | None,
-    beta: float | None,
-    gamma: float | None,
-    terminal: float | None,
-    clip: bool | None = None,
-) -> Reward:
-    """The reward of a name with single values changed; None changes nothing.
-
-    Raises:
-        ClearwayError: a value is NaN or infinite.
-    """
-    from clearway.reward import REWARDS
-
-    check_finite(alpha=alpha, beta=beta, gamma=gamma, terminal=terminal)
-    return REWARDS[name].with_changes(alpha, beta, gamma, terminal, clip)

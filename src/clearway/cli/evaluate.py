@@ -66,31 +66,27 @@ class Evaluate:
         )
 
     def _on_grid(self, episodes: int, step_cap: int) -> None:
-        from clearway.evaluate.files import write_evaluations
-        from clearway.evaluate.run import evaluate_run
-        from clearway.learn.load import load_agent, run_scenes
+        from clearway.api.evaluation import evaluate, load_agent
 
         check_at_least(1, episodes=episodes, step_cap=step_cap)
         check_seeds(seed=self.seed)
         agent = load_agent(self.folder, self.checkpoint)
-        scenes = run_scenes(agent.record, scene_files(self.scenes) if self.scenes else None)
-        evaluations = evaluate_run(agent, scenes, episodes_per_target=episodes, step_cap=step_cap, seed=self.seed)
-        first, *others = (evaluation.to_json() for evaluation in evaluations)
-        content = {**first, "others": others}
-        write_evaluations(self.folder, content, evaluations)
+        files = scene_files(self.scenes) if self.scenes else None
+        result = evaluate(agent, files, episodes=episodes, step_cap=step_cap, seed=self.seed)
+        result.save(self.folder)
         if self.pictures:
             from clearway.viz.run_pictures import draw_run_pictures
 
-            draw_run_pictures(self.folder, agent, scenes, self.pictures, seed=self.seed)
+            draw_run_pictures(self.folder, agent, result.scenes, self.pictures, seed=self.seed)
             say(f"pictures: {self.pictures}")
         if self.json:
-            print_json(content)
+            print_json(result.to_json())
             return
         from clearway.evaluate.tables import Level, rich_tables
 
         levels: list[Level] = ["targets"] if self.targets else []
-        levels += ["scenes", "average"] if len(scenes) > 1 else ["average"]
-        stdout_console().print(rich_tables(evaluations, levels))
+        levels += ["scenes", "average"] if len(result.scenes) > 1 else ["average"]
+        stdout_console().print(rich_tables(result.evaluations, levels))
 
 
 def _or(given: int | None, default: int) -> int:

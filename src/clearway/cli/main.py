@@ -22,6 +22,7 @@ from clearway.cli.export import ExportAgent
 from clearway.cli.imports.command import ImportScenes
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
+from clearway.cli.plugins import Plugins
 from clearway.cli.reproduce import Report, Reproduce
 from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.serve import Serve
@@ -68,6 +69,7 @@ Command = (
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[ExportAgent, tyro.conf.subcommand("export")]
     | Annotated[Serve, tyro.conf.subcommand("serve")]
+    | Annotated[Plugins, tyro.conf.subcommand("plugins")]
 )
 
 

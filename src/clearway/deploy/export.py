@@ -11,7 +11,7 @@ from typing import Any
 
 import torch
 
-from clearway.deploy.from_run import SceneAgent, loaded_encoder
+from clearway.deploy.from_run import SceneAgent, exportable_encoder
 from clearway.deploy.graph import AgentGraph, PolicyGraph
 from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
 from clearway.errors import DeployError
@@ -33,7 +33,7 @@ def export_onnx(chosen: SceneAgent, path: Path, *, with_encoder: bool = True) ->
         DeployError: the packages of the extra `onnx` are not installed.
         EncoderError: the encoder that made the scene's features cannot be had.
     """
-    encoder = loaded_encoder(chosen) if with_encoder else None
+    encoder = exportable_encoder(chosen) if with_encoder else None
     policy = PolicyGraph(chosen.agent, chosen.index)
     card = chosen.card(encoder)
     history = torch.zeros(2, card.history_length, card.feature_count)

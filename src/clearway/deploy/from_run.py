@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from clearway.deploy.model import Step
 from clearway.deploy.onnx_file import shifted
 from clearway.errors import DeployError, EncoderError
 from clearway.learn.load import Agent, load_agent, run_scenes
-from clearway.perception import encoder_from_record
+from clearway.perception import Encoder, encoder_from_record
 from clearway.perception.encoder import NetworkEncoder, sensor_of
 from clearway.scenes.actions import ACTION_NAMES
 from clearway.scenes.scene import EncoderRecord, Scene
@@ -44,7 +44,7 @@ class SceneAgent:
         assert self.scene.encoder is not None, "a run's scene has features and their record"
         return self.scene.encoder
 
-    def card(self, encoder: NetworkEncoder | None) -> Card:
+    def card(self, encoder: Encoder | None) -> Card:
         """The agent's card; with or without its encoder inside."""
         record, made_by, shape = self.agent.record, self.encoder_record, self.agent.network.shape
         pictures = self.scene.observations
@@ -58,18 +58,19 @@ class SceneAgent:
             encoder={"name": made_by.name, "identity": made_by.identity, "settings": dict(made_by.settings)},
             normalisation=self._normalisation(encoder),
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
-            training={"seed": record.seed, "reward": asdict(record.reward), "versions": dict(record.versions)},
+            training={"seed": record.seed, "reward": record.reward.to_json(), "versions": dict(record.versions)},
             observation=None if seen is None else seen.to_json(),
         )
 
-    def _normalisation(self, encoder: NetworkEncoder | None) -> dict[str, object]:
+    def _normalisation(self, encoder: Encoder | None) -> dict[str, object]:
         """What the agent itself does to what it is given."""
         learner = self.agent.record.learner
-        pixels = encoder and {"resize": "bilinear, antialiased, the whole picture", **encoder.preprocessing.to_json()}
+        network = encoder if isinstance(encoder, NetworkEncoder) else None  # another package's says nothing of itself
+        pixels = network and {"resize": "bilinear, antialiased, the whole picture", **network.preprocessing.to_json()}
         return {
             "pixels": pixels,
             "features": {
-                "standardised": encoder is not None and encoder.mean is not None,
+                "standardised": network is not None and network.mean is not None,
                 "centred": learner.centre_features,
                 "whitened": learner.whiten_features,
                 "directions": self.agent.feature_map.input_count,
@@ -100,7 +101,7 @@ def load_scene_agent(
     return SceneAgent(agent, run_scenes(agent.record, files)[index], index, names)
 
 
-def loaded_encoder(chosen: SceneAgent) -> NetworkEncoder:
+def picture_encoder(chosen: SceneAgent) -> Encoder:
     """The encoder that made the features of an agent's scene.
 
     Raises:
@@ -110,8 +111,19 @@ def loaded_encoder(chosen: SceneAgent) -> NetworkEncoder:
     if seen != RGB:
         problem = f"encoder {chosen.encoder_record.name} sees {seen}, and deployed agents take colour pictures"
         raise EncoderError(f"{problem}. Train on features of another encoder")
-    encoder = encoder_from_record(chosen.encoder_record)
-    assert isinstance(encoder, NetworkEncoder)
+    return encoder_from_record(chosen.encoder_record)
+
+
+def exportable_encoder(chosen: SceneAgent) -> NetworkEncoder:
+    """The encoder that made the features of an agent's scene, as a network.
+
+    Raises:
+        EncoderError: as of `picture_encoder`, or it is one of another package, which may be no network.
+    """
+    encoder = picture_encoder(chosen)
+    if not isinstance(encoder, NetworkEncoder):
+        problem = f"encoder {encoder.record.name}: is another package's, which a file cannot hold"
+        raise EncoderError(f"{problem}. Use the run folder itself")
     return encoder
 
 
@@ -126,7 +138,7 @@ class RunModel:
     """
 
     def __init__(self, chosen: SceneAgent) -> None:
-        self._encoder = loaded_encoder(chosen)
+        self._encoder = picture_encoder(chosen)
         self._policy = PolicyGraph(chosen.agent, chosen.index)
         self.card: Card = chosen.card(self._encoder)
 

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from clearway.choices import RewardName, ZoneLevel
+from clearway.choices import ZoneLevel
 from clearway.envs.arguments import SceneSource, seed_words
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.options import RESET_MASK
@@ -62,7 +62,8 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     By the pose the agent arrives in: 10 at the target, -0.02 in the collision zone (moving forward or backward is
     blocked there), -0.011 in the precollision zone (one such move leads into the collision zone), -0.01 elsewhere. A
     blocked move arrives in the pose it left. With `reward="shortest"` every step costs 0.01, with `"bump"` a blocked
-    move 0.1; a `clearway.reward.Reward` sets each number, and clipping to [-1, 1].
+    move 0.1, with `"clearance"` the more the closer to an obstacle a step ends; a `clearway.reward.Reward` is made of
+    terms with parameters of their own, and can clip to [-1, 1].
 
     `info["cost"]` is 1.0 on a blocked move and 0.0 otherwise, for algorithms with constraints.
 
@@ -89,7 +90,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     |---------------------|---------------------|--------------------------------------------------------------------|
     | `scenes`            | required            | a `Scene` or scene file, or several of one encoder                 |
     | `targets`           | `None`              | state ids by scene name; None: `scenes.targets.default_targets`    |
-    | `reward`            | `"collision-aware"` | or `"shortest"`, `"bump"`, or a `Reward`                           |
+    | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name |
     | `observations`      | `"features"`        | or `"pictures"`                                                    |
     | `sensors`           | `("rgb",)`          | whose pictures, for example `("rgb", "depth")`                     |
     | `zone_level`        | `"pose"`            | or `"cell"`: a cell is in a zone where any of its headings is      |
@@ -116,7 +117,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         scenes: SceneSource | Sequence[SceneSource],
         *,
         targets: Mapping[str, Sequence[int]] | None = None,
-        reward: RewardName | Reward = "collision-aware",
+        reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
         sensors: Sequence[str] = (RGB,),
         zone_level: ZoneLevel = "pose",

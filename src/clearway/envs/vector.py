@@ -14,7 +14,7 @@ from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from clearway.choices import RewardName, ZoneLevel
+from clearway.choices import ZoneLevel
 from clearway.envs.arguments import (
     NO_LIMIT,
     SceneSource,
@@ -22,7 +22,6 @@ from clearway.envs.arguments import (
     check_numbers,
     checked_actions,
     chosen_autoreset,
-    chosen_reward,
     chosen_targets,
     loaded_scenes,
     seed_words,
@@ -33,7 +32,7 @@ from clearway.envs.record import EpisodeRecord
 from clearway.envs.render import RENDER_MODES, Renderer
 from clearway.envs.spaces import ObservationKind, observation_sources, observation_space
 from clearway.envs.world import make_world
-from clearway.reward import Reward
+from clearway.reward import Reward, reward_named
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.sensors import RGB
 
@@ -93,7 +92,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         scenes: SceneSource | Sequence[SceneSource],
         *,
         targets: Mapping[str, Sequence[int]] | None = None,
-        reward: RewardName | Reward = "collision-aware",
+        reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
         sensors: Sequence[str] = (RGB,),
         zone_level: ZoneLevel = "pose",
@@ -121,7 +120,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
         self._navigation = Navigation(
             self._world,
-            chosen_reward(reward),
+            reward_named(reward),
             torch.from_numpy(np.random.default_rng().integers(2**63, size=num_envs)),
             step_limit=None if max_episode_steps == NO_LIMIT else max_episode_steps,
             history_length=history_length,

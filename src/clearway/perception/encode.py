@@ -12,11 +12,12 @@ from functools import partial
 import numpy as np
 
 from clearway.errors import EncoderError, SceneError
-from clearway.perception import depth_grid, pretrained, random_resnet, spread
+from clearway.perception import depth_grid, plugged, pretrained, random_resnet, spread
 from clearway.perception.cache import Entry, cached, content_key, joint_key
 from clearway.perception.encoder import Encoder, EncoderWarning, sensor_of
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
+from clearway.plugins import find_plugin
 from clearway.progress import picture_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
 from clearway.scenes.sensors import DEPTH, RGB
@@ -38,14 +39,15 @@ def find_record(
 
     Args:
         name: "resnet50" (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto"
-            (the first if it can be had, else the second), "depth-grid" (of depth, without a network), or a vision model
-            on the Hugging Face hub or in a folder.
+            (the first if it can be had, else the second), "depth-grid" (of depth, without a network), one of another
+            package (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
         scenes: what "random-resnet50" calibrates on; their order does not matter.
         seed: of "random-resnet50".
         shape, preprocessing: of "random-resnet50".
 
     Raises:
         EncoderError: there is no such encoder, it cannot be had, or there are no pictures to calibrate on.
+        PluginError: another package's encoder cannot be used.
 
     Warns:
         EncoderWarning: "auto" fell back to random weights; the record's settings then hold "stands_in_for".
@@ -57,7 +59,8 @@ def find_record(
     if name == TRAINED:
         return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
     if name != AUTO:
-        return pretrained.find_record(name)
+        plugin = find_plugin("encoders", name)
+        return plugged.make_encoder(plugin).record if plugin else pretrained.find_record(name)
     try:
         return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
     except EncoderError as fault:
@@ -88,6 +91,11 @@ def encoder_from_record(record: EncoderRecord) -> Encoder:
         return depth_grid.from_record(record)
     if kind == pretrained.KIND:
         return pretrained.from_record(record)
+    if kind == plugged.KIND:
+        return plugged.from_record(record)
+    if kind == plugged.OWN_KIND:
+        problem = f"encoder {record.name}: a program of its own made the features, and no package offers it"
+        raise EncoderError(f"{problem}. Offer it as a plugin (docs/python.md), or encode the scene again")
     problem = f"encoder {record.name}: the features came with the scene's file, which does not say how they were made"
     raise EncoderError(f"{problem}. Encode the scene again")
 

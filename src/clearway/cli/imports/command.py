@@ -9,6 +9,7 @@ import tyro
 
 from clearway.cli.imports.datasets import ImportAvd, ImportDumps, ImportSavn
 from clearway.cli.imports.own import ImportFloorPlan, ImportImages
+from clearway.cli.imports.plugin import ImportPlugin
 from clearway.cli.imports.simulators import ImportAi2Thor, ImportMiniWorld, ImportMjcf
 
 
@@ -28,6 +29,7 @@ class ImportScenes:
         | Annotated[ImportAi2Thor, tyro.conf.subcommand("ai2thor")]
         | Annotated[ImportMjcf, tyro.conf.subcommand("mjcf")]
         | Annotated[ImportMiniWorld, tyro.conf.subcommand("miniworld")]
+        | Annotated[ImportPlugin, tyro.conf.subcommand("plugin")]
     )
 
     def run(self) -> None:

@@ -1,0 +1,90 @@
+"""Checks of what users hand to the functions of `clearway`, and plain Python values of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from clearway.errors import ArgumentError
+from clearway.learn.setup import SEED_LIMIT
+
+
+def as_path(name: str, value: object) -> Path:
+    """A path from text or anything else that is one. Raises ArgumentError."""
+    if isinstance(value, str | os.PathLike):
+        path = os.fspath(value)
+        if isinstance(path, str):
+            return Path(path)
+    raise ArgumentError(f"{name}={value!r:.80}: expected a path, such as 'bathroom.h5'. Give a string or a Path")
+
+
+def as_whole(name: str, value: object, lowest: int = 0, highest: int | None = None) -> int:
+    """A whole number in a range, both ends included; Python's own or NumPy's. Raises ArgumentError."""
+    inside = f"from {lowest} on" if highest is None else f"from {lowest} to {highest}"
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        raise ArgumentError(f"{name}={value!r:.80}: expected a whole number {inside}. Give one")
+    number = int(value)
+    if number < lowest or (highest is not None and number > highest):
+        raise ArgumentError(f"{name}={number}: expected a whole number {inside}. Give one in that range")
+    return number
+
+
+def as_seed(name: str, value: object) -> int:
+    """A seed. Raises ArgumentError."""
+    return as_whole(name, value, 0, SEED_LIMIT - 1)
+
+
+def as_word(name: str, value: object) -> str:
+    """A text. Raises ArgumentError."""
+    if not isinstance(value, str):
+        raise ArgumentError(f"{name}={value!r:.80}: expected a word. Give a string")
+    return value
+
+
+def as_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
+    """One of some words. Raises ArgumentError."""
+    if not isinstance(value, str) or value not in choices:
+        raise ArgumentError(f"{name}={value!r:.80}: expected one of {', '.join(map(repr, choices))}. Choose one")
+    return value
+
+
+def as_settings(kind: type, given: Mapping[str, object]) -> dict[str, Any]:
+    """Settings of a config class, as plain values of its fields' types: a whole number will do for any number.
+
+    Args:
+        kind: a dataclass whose fields are numbers, truth values, words, or choices of words.
+        given: some of its fields by name.
+
+    Raises:
+        ArgumentError: there is no such setting, or its value is of another type.
+    """
+    types = {field.name: get_type_hints(kind)[field.name] for field in fields(kind)}
+    unknown = [name for name in given if name not in types]
+    if unknown:
+        raise ArgumentError(f"{unknown[0]}: no such setting. Use one of {', '.join(types)}")
+    return {name: _as(name, value, types[name]) for name, value in given.items()}
+
+
+def _as(name: str, value: object, wanted: Any) -> object:
+    """The value as a bool, int, float, str or choice of words."""
+    if get_origin(wanted) is Literal:
+        return as_choice(name, value, get_args(wanted))
+    accepted: dict[type, tuple[type, str]] = {
+        int: (Integral, "a whole number"),
+        float: (Real, "a number"),
+        str: (str, "a word"),
+    }
+    if wanted in accepted:
+        base, called = accepted[wanted]
+        if isinstance(value, base) and not isinstance(value, bool):
+            return wanted(value)
+    else:
+        assert wanted is bool, f"{name} is of the type {wanted}"
+        called = "True or False"
+        if isinstance(value, bool) or type(value).__name__ == "bool":  # NumPy's, too
+            return bool(value)
+    raise ArgumentError(f"{name}={value!r:.80}: expected {called}. Correct it")

@@ -1,0 +1,206 @@
+"""`train`."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias, get_args
+
+from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
+from clearway.api.scenes import Scenes, by_name, scenes_and_files
+from clearway.choices import FeatureStore, ZoneLevel
+from clearway.errors import ArgumentError
+from clearway.learn.config import DEFAULT, PAPER_A3C, PRESETS, Learner
+from clearway.learn.load import Agent, load_agent
+from clearway.learn.run_folder import RunRecord
+from clearway.learn.train import RunRequest
+from clearway.learn.train import train as train_run
+from clearway.markdown import table_lines
+from clearway.reward import Reward, reward_named
+from clearway.scenes.scene import Scene
+from clearway.scenes.targets import default_targets
+from clearway.torch_threads import torch_threads
+
+Targets: TypeAlias = Mapping[str, Iterable[int]] | Iterable[int] | None
+
+ALGORITHMS: dict[str, Learner] = {
+    "ppo": DEFAULT,
+    "a2c": DEFAULT.as_a2c(),
+    "a3c": PAPER_A3C,
+    **{str(name): learner for name, learner in PRESETS.items()},
+}
+"""Settings by a word: an algorithm's own, or a preset's."""
+
+FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
+
+
+@dataclass(frozen=True)
+class TrainResult:
+    """What came of a training.
+
+    Attributes:
+        agent: the trained agent.
+        scenes: what it was trained on.
+        metrics: rows of figures by name, some 200 over the training (`docs/metrics.md`).
+        folder: the run folder; None where none was asked for.
+    """
+
+    agent: Agent
+    scenes: tuple[Scene, ...]
+    metrics: tuple[Mapping[str, float], ...]
+    folder: Path | None = None
+
+    def __repr__(self) -> str:
+        count = sum(map(len, self.record.targets.values()))
+        where = "no folder" if self.folder is None else self.folder
+        return f"<TrainResult: {self.agent.frames:,} frames, {self.solved_targets} of {count} targets solved, {where}>"
+
+    @property
+    def record(self) -> RunRecord:
+        """All that determines the run, as its `run.json` holds it."""
+        return self.agent.record
+
+    @property
+    def figures(self) -> Mapping[str, float]:
+        """The last row of metrics; empty where a finished run has lost them."""
+        return self.metrics[-1] if self.metrics else {}
+
+    @property
+    def solved_targets(self) -> int:
+        """Targets that the agent reached in its latest training episodes."""
+        return int(self.figures.get("solved_targets", 0))
+
+    def markdown(self, rows: int = 10) -> str:
+        """The main figures over the training as a table in Markdown, of so many evenly spaced rows at most."""
+        chosen = _evenly(self.metrics, as_whole("rows", rows, 1))
+        names = [name for name in FIGURES if name in self.figures]
+        lines = table_lines(names, [[f"{row[name]:.6g}" if name in row else "" for name in names] for row in chosen])
+        return "\n".join(lines) + "\n"
+
+
+def train(
+    scenes: Scenes,
+    targets: Targets = None,
+    *,
+    reward: str | Reward = "collision-aware",
+    algorithm: str | Learner = "ppo",
+    frames: int | None = None,
+    seed: int = 0,
+    out: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    zone_level: ZoneLevel = "pose",
+    device: str = "cpu",
+    feature_store: FeatureStore = "memory",
+    threads: int | None = None,
+    show_progress: bool = False,
+    **settings: Any,
+) -> TrainResult:
+    """Train an agent, as `clearway train` does, and give it back.
+
+    Args:
+        scenes: a scene, a scene file, a folder of them, or several. All with features of one encoder.
+        targets: state ids by scene name, or state ids alone for a single scene; five seeded ones where there are none.
+        reward: one of `clearway.reward.REWARDS` by its name, a `Reward`, or package.module:name.
+        algorithm: "ppo" (our recipe), "a2c" (our recipe with one update a rollout) or "a3c" (as published); "paper"
+            is the published settings, synchronous; or a `Learner`.
+        frames: training frames, instead of the algorithm's own.
+        seed: of parameters, environments, actions and the choice of targets.
+        out: the run folder, which `clearway evaluate`, `view`, `export` and the others open. None keeps no folder: the
+            run lies in a temporary one until `train` returns, and what there is of it is what `train` returns. Give
+            scene files, not scenes in memory, where the folder is to be opened without naming them again.
+        resume: go on with the run in `out` from its newest checkpoint.
+        zone_level: whether zones are those of poses ("pose") or of whole cells ("cell").
+        device: of torch, "cpu" or "cuda".
+        feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.envs.feature_store`.
+        threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
+        show_progress: draw a progress bar.
+        settings: single settings of the algorithm by name, such as `envs=200`; all are fields of `Learner`.
+
+    Raises:
+        ArgumentError: an argument is of the wrong kind or out of range.
+        ClearwayError: the settings cannot work together, or the scenes, targets or folder cannot be used.
+        KeyboardInterrupt: the user interrupted; a run with a folder can be resumed.
+    """
+    store = as_choice("feature_store", feature_store, get_args(FeatureStore))
+    if resume and out is None:
+        raise ArgumentError("resume=True: expected the run folder to go on with. Give it as out")
+    number = as_seed("seed", seed)
+    learner = chosen_learner(algorithm, frames, settings)
+    pairs = scenes_and_files(scenes, features_in_file=store != "memory")
+    loaded = [scene for scene, _ in pairs]
+    request = RunRequest(
+        scenes=loaded,
+        targets=_chosen_targets(loaded, targets, number),
+        learner=learner,
+        reward=reward_named(reward),
+        seed=number,
+        zone_level=as_choice("zone_level", zone_level, get_args(ZoneLevel)),  # type: ignore[arg-type]
+        paths=by_name(pairs),
+        device=as_word("device", device),
+        feature_store=store,  # type: ignore[arg-type]
+    )
+    with ExitStack() as stack:
+        stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
+        path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
+        folder = train_run(request, path, resume=resume, show_progress=show_progress)
+        return TrainResult(
+            agent=load_agent(path),
+            scenes=tuple(loaded),
+            metrics=tuple(folder.metrics()),
+            folder=None if out is None else path,
+        )
+
+
+def chosen_learner(algorithm: str | Learner, frames: int | None, settings: Mapping[str, object]) -> Learner:
+    """The settings of an algorithm, some of them changed.
+
+    Raises:
+        ArgumentError: there is no such algorithm or setting, or a value is of the wrong type.
+        RunError: the settings cannot work together.
+    """
+    if isinstance(algorithm, Learner):
+        learner = algorithm
+    elif isinstance(algorithm, str) and algorithm in ALGORITHMS:
+        learner = ALGORITHMS[algorithm]
+    else:
+        names = ", ".join(map(repr, ALGORITHMS))
+        raise ArgumentError(f"algorithm={algorithm!r:.80}: no such algorithm. Use one of {names}, or a Learner")
+    given = settings if frames is None else {**settings, "frames": frames}
+    return replace(learner, **as_settings(Learner, given))
+
+
+def _chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict[str, tuple[int, ...]]:
+    """Targets by scene name, default ones where none are given."""
+    expected = "expected state ids by scene name, such as {'bathroom': [26, 37]}"
+    if targets is None:
+        targets = {}
+    if not isinstance(targets, Mapping):
+        if len(scenes) > 1 or isinstance(targets, str) or not isinstance(targets, Iterable):
+            raise ArgumentError(f"targets={targets!r:.80}: {expected}. Name the scene of each")
+        targets = {scenes[0].name: targets}
+    names = [scene.name for scene in scenes]
+    chosen: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
+    for name, states in targets.items():
+        if name not in names:
+            raise ArgumentError(f"targets: no scene {name!r:.80} is given. Name one of {', '.join(names)}")
+        if isinstance(states, str) or not isinstance(states, Iterable):
+            raise ArgumentError(f"targets[{name!r}]={states!r:.80}: {expected}. Give a list of them")
+        chosen[name] = tuple(as_whole(f"targets[{name!r}]", state) for state in states)
+    return {scene.name: chosen[scene.name] or default_targets(scene, seed) for scene in scenes}
+
+
+@contextmanager
+def _temporary() -> Iterator[Path]:
+    """A folder that is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="clearway-") as folder:
+        yield Path(folder) / "run"
+
+
+def _evenly(rows: Sequence[Mapping[str, float]], count: int) -> list[Mapping[str, float]]:
+    """So many of the rows at most, evenly spaced, with the last."""
+    count = min(count, len(rows))
+    return [rows[(number + 1) * len(rows) // count - 1] for number in range(count)]

@@ -1,0 +1,123 @@
+"""Encoders, rewards, agents, importers and algorithms from other packages, by entry points.
+
+A package offers one in its `pyproject.toml`, by a name of its own:
+
+    [project.entry-points."clearway.encoders"]
+    mean-colour = "my_package.encoders:MeanColour"
+
+Looking names up imports none of them. What each kind has to be: `docs/python.md`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from clearway.choices import RewardName
+from clearway.errors import PluginError
+
+Kind = Literal["encoders", "rewards", "agents", "importers", "algorithms"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+BUILT_IN: dict[Kind, tuple[str, ...]] = {
+    "encoders": ("auto", "resnet50", "random-resnet50"),
+    "rewards": get_args(RewardName),
+    "agents": ("random", "shortest path"),
+    "importers": ("thor-v1", "floor-plan", "images", "savn", "avd", "ai2thor", "mjcf", "miniworld"),
+    "algorithms": ("ppo", "a2c", "a3c"),
+}
+"""Names that are ours, which no other package can take."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """Something that another package offers; not imported yet.
+
+    Attributes:
+        kind: what it is.
+        name: by which a user asks for it.
+        package: that offers it, as it is installed.
+        version: of the package.
+        target: module and name in it, such as "my_package.encoders:MeanColour".
+    """
+
+    kind: Kind
+    name: str
+    package: str
+    version: str
+    target: str
+
+    def __str__(self) -> str:
+        return f"{self.kind.removesuffix('s')} {self.name} of the package {self.package} {self.version}"
+
+
+def plugins(kind: Kind) -> list[Plugin]:
+    """What installed packages offer of a kind, by name; names that cannot be used are among them, see `problem`."""
+    from importlib.metadata import entry_points
+
+    found = {
+        Plugin(
+            kind,
+            entry.name,
+            entry.dist.name if entry.dist else "unknown",
+            entry.dist.version if entry.dist else "unknown",
+            entry.value,
+        )
+        for entry in entry_points(group=f"clearway.{kind}")
+    }
+    return sorted(found, key=lambda plugin: (plugin.name, plugin.package))
+
+
+def problem(plugin: Plugin, all_of_kind: list[Plugin]) -> str:
+    """Why a plugin cannot be asked for by its name, with the remedy; empty where it can."""
+    if plugin.name in BUILT_IN[plugin.kind]:
+        return f"{plugin}: clearway has one of this name itself. Rename it, or uninstall {plugin.package}"
+    others = [other for other in all_of_kind if other.name == plugin.name and other != plugin]
+    if others:
+        return f"{plugin}: {others[0].package} offers one of this name too. Uninstall one of the two packages"
+    return ""
+
+
+def find_plugin(kind: Kind, name: str) -> Plugin | None:
+    """The plugin of that name; None where there is none, or the name is built in.
+
+    Raises:
+        PluginError: two packages offer one of this name.
+    """
+    if name in BUILT_IN[kind]:
+        return None
+    offered = plugins(kind)
+    plugin = next((plugin for plugin in offered if plugin.name == name), None)
+    if plugin is not None and (fault := problem(plugin, offered)):
+        raise PluginError(fault)
+    return plugin
+
+
+def load_plugin(plugin: Plugin) -> object:
+    """What a plugin is, imported.
+
+    Raises:
+        PluginError: it cannot be imported, whatever its package raises.
+    """
+    from importlib.metadata import EntryPoint
+
+    try:
+        return EntryPoint(plugin.name, plugin.target, f"clearway.{plugin.kind}").load()
+    except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        remedy = f"Ask its authors, or uninstall {plugin.package}"
+        raise PluginError(f"{plugin}: {plugin.target} cannot be imported ({reason}). {remedy}") from fault
+
+
+def plugin_of(kind: Kind, name: str) -> Plugin:
+    """The plugin of that name.
+
+    Raises:
+        PluginError: no installed package offers one, or two do.
+    """
+    plugin = find_plugin(kind, name)
+    if plugin is None:
+        offered = ", ".join(found.name for found in plugins(kind)) or "none"
+        fault = f"{kind.removesuffix('s')} {name}: no installed package offers one of this name"
+        raise PluginError(f"{fault}. Install one that does, or use one of these: {offered}")
+    return plugin

@@ -1,0 +1,32 @@
+"""Which scene files some paths name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from clearway.errors import ClearwayError
+
+SCENE_SUFFIXES = (".h5", ".hdf5")
+
+
+def scene_files(paths: Sequence[Path]) -> list[Path]:
+    """The scene files that some paths name: files as they are, folders by the scene files in them.
+
+    Raises:
+        ClearwayError: a path does not exist, or a folder holds no scene file.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
+            if not found:
+                raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
+            files += found
+        elif path.exists():
+            files.append(path)
+        else:
+            raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
+    if not files:
+        raise ClearwayError("no scene file given. Name at least one, or make one with clearway scenes build")
+    return files

@@ -1,0 +1,126 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import clearway
+from clearway.errors import ArgumentError
+from clearway.scenes.thor_v1 import write_scene
+from made import corridor_scene, grid_scene
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_scene(grid_scene(1), tmp_path / "grid.h5")
+    write_scene(corridor_scene(feature_count=32), tmp_path / "corridor.h5")
+    return tmp_path
+
+
+def test_scenes_come_from_files_folders_and_memory(folder) -> None:
+    made = corridor_scene(name="made")
+    assert clearway.load_scene(str(folder / "grid.h5")).name == "grid"
+    assert clearway.load_scene(folder / "grid.h5").name == "grid"
+    assert clearway.load_scene(made) is made
+    assert [scene.name for scene in clearway.load_scenes(folder)] == ["corridor", "grid"]
+    assert [scene.name for scene in clearway.load_scenes([folder / "grid.h5", made])] == ["grid", "made"]
+
+
+def test_a_file_system_path_of_any_kind_will_do(folder) -> None:
+    class Place:
+        def __fspath__(self) -> str:
+            return str(folder / "grid.h5")
+
+    assert clearway.load_scene(Place()).name == "grid"
+
+
+@pytest.mark.parametrize(
+    ("source", "part"),
+    [
+        (3, "expected a scene, a scene file, a folder of them, or several"),
+        ([3], "expected a path"),
+        (b"grid.h5", "expected a path"),
+        (None, "Give one of these"),
+        ([], "none given"),
+    ],
+)
+def test_what_is_no_scene_is_refused(source, part) -> None:
+    with pytest.raises(ArgumentError, match=part) as caught:
+        clearway.load_scenes(source)
+    assert isinstance(caught.value, TypeError | ValueError)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_and_one_too_many_are_refused(folder) -> None:
+    with pytest.raises(clearway.ClearwayError, match="no such file"):
+        clearway.load_scene(folder / "cellar.h5")
+    with pytest.raises(ArgumentError, match=r"2 scenes\. Name one"):
+        clearway.load_scene(folder)
+
+
+def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
+    from clearway.scenes import library
+
+    calls = []
+
+    def stand_in(name, seed, *, workers, progress):
+        calls.append((name, seed, workers, progress))
+        return grid_scene(seed, name=name, picture_size=(32, 32))
+
+    monkeypatch.setattr(library, "cached_room_scene", stand_in)
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    out = tmp_path / "rooms/bathroom.h5"
+    scene = clearway.build_room("bathroom", np.int64(2), encoder="random-resnet50", out=str(out))
+    assert calls == [("bathroom", 2, None, False)]
+    assert scene.encoder_name == "random-resnet50"
+    assert np.array_equal(clearway.load_scene(out).features, scene.features)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        ({"name": "cellar"}, "expected one of 'bathroom'"),
+        ({"name": "bathroom", "seed": -1}, "seed=-1: expected a whole number from 0"),
+        ({"name": "bathroom", "seed": 1.5}, r"seed=1\.5: expected a whole number"),
+        ({"name": "bathroom", "out": "room.txt"}, r"ends in \.h5 or \.hdf5"),
+        ({"name": "bathroom", "encoder_seed": -3}, "encoder_seed=-3"),
+    ],
+)
+def test_build_room_refuses_before_it_builds(arguments, part) -> None:
+    with pytest.raises(ArgumentError, match=part):
+        clearway.build_room(**arguments)
+
+
+class Brightness:
+    identity = "brightness-1"
+    feature_count = 2
+
+    def encode(self, pictures):
+        return np.stack([pictures.mean((1, 2, 3)), pictures.std((1, 2, 3))], axis=1)
+
+
+def test_an_encoder_of_one_s_own_encodes_and_its_features_can_be_trained_on(tmp_path) -> None:
+    (scene,) = clearway.encode_scenes(grid_scene(1), Brightness())
+    np.testing.assert_allclose(scene.features[:, 0], scene.observations.mean((1, 2, 3)), rtol=1e-6)
+    assert (scene.encoder_name, scene.features.dtype) == ("Brightness", np.float32)
+    assert scene.encoder.identity != clearway.encode_scenes(grid_scene(1), Other())[0].encoder.identity
+    write_scene(scene, tmp_path / "grid.h5")
+    run = clearway.train(tmp_path / "grid.h5", [5], frames=400, envs=10, rollout_steps=8, width=16, out=tmp_path / "r")
+    with pytest.raises(clearway.ClearwayError, match="Brightness: a program of its own made the features"):
+        clearway.Navigator(run.folder)
+
+
+class Other(Brightness):
+    identity = "brightness-2"
+
+
+def test_an_encoder_of_one_s_own_without_a_part_is_refused_before_a_room_is_built() -> None:
+    class Empty:
+        pass
+
+    for call in (clearway.encode_scenes, clearway.build_room):
+        with pytest.raises(clearway.ClearwayError, match=r"encoder Empty: its identity is None, .*Give it one"):
+            call(grid_scene(1) if call is clearway.encode_scenes else "bathroom", encoder=Empty())
+    with pytest.raises(ArgumentError, match="workers=2: an encoder of your own runs in this process"):
+        clearway.encode_scenes(grid_scene(1), Brightness(), workers=2)
+    with pytest.raises(clearway.ClearwayError, match="has no pictures to encode"):
+        clearway.encode_scenes(replace(grid_scene(1), observations=None), Brightness())

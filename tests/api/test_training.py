@@ -1,0 +1,139 @@
+from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import clearway
+from clearway.errors import ArgumentError
+from clearway.learn.config import DEFAULT, PAPER_A3C
+from clearway.learn.train import RunRequest
+from clearway.learn.train import train as train_run
+from clearway.reward import SHORTEST
+from clearway.scenes.thor_v1 import write_scene
+from made import corridor_scene, grid_scene
+from small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
+
+SMALL = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
+
+
+@pytest.fixture(scope="module")
+def corridor():
+    return corridor_scene(5, feature_count=FEATURES)
+
+
+def test_it_trains_what_a_request_would(tmp_path) -> None:
+    """The same bits as by way of the deep imports."""
+    learner = small_learner(DEFAULT, **SMALL)
+    train_run(RunRequest(small_scenes(), small_targets(), learner, SHORTEST, seed=3), tmp_path / "run")
+    expected = clearway.load_agent(tmp_path / "run")
+    found = clearway.train(small_scenes(), small_targets(), reward="shortest", seed=3, **SMALL)
+    assert found.folder is None
+    assert found.record.same_experiment(expected.record)
+    assert found.agent.frames == 800
+    for name, tensor in expected.network.state_dict().items():
+        assert torch.equal(tensor, found.agent.network.state_dict()[name]), name
+
+
+def test_nothing_is_printed_or_left_behind(corridor, tmp_path, monkeypatch, capfd) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    clearway.train(corridor, **SMALL)
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_run_folder_is_one_like_any_other_and_goes_on(corridor, tmp_path) -> None:
+    write_scene(corridor, tmp_path / "corridor.h5")
+    out = str(tmp_path / "run")
+    first = clearway.train(tmp_path / "corridor.h5", list(CORRIDOR_TARGETS), out=out, **SMALL)
+    assert first.folder == Path(out)
+    assert first.record.scenes[0].path == str(tmp_path / "corridor.h5")
+    assert first.figures == first.metrics[-1] and first.figures["frames"] == 800
+    again = clearway.train(tmp_path / "corridor.h5", list(CORRIDOR_TARGETS), out=out, resume=True, **SMALL)
+    assert again.metrics == first.metrics
+    with pytest.raises(clearway.ClearwayError, match="holds a run already"):
+        clearway.train(tmp_path / "corridor.h5", out=out, **SMALL)
+
+
+def test_what_it_returns_cannot_be_changed_and_shows_itself(corridor) -> None:
+    result = clearway.train(corridor, [16], **SMALL)
+    with pytest.raises(FrozenInstanceError):
+        result.folder = Path("elsewhere")
+    assert repr(result) == f"<TrainResult: 800 frames, {result.solved_targets} of 1 targets solved, no folder>"
+    head, _, *rows = result.markdown(3).splitlines()
+    assert head.startswith("| frames | seconds | solved_targets |")
+    assert len(rows) == 3 and rows[-1].startswith("| 800 |")
+
+
+def test_numbers_may_be_numpy_s_and_the_record_is_plain(corridor, tmp_path) -> None:
+    settings = {name: np.int64(value) for name, value in SMALL.items()}
+    result = clearway.train(
+        corridor,
+        np.array([16, 8]),
+        seed=np.int32(2),
+        lr_start=np.float32(0.25),
+        discount=1,
+        hindsight=np.bool_(False),
+        out=tmp_path / "run",
+        **settings,
+    )
+    learner = result.record.learner
+    assert (learner.frames, learner.lr_start, learner.discount, learner.hindsight) == (800, 0.25, 1.0, False)
+    assert {type(value) for value in vars(learner).values()} <= {int, float, bool, str}
+    assert clearway.load_agent(tmp_path / "run").record.targets == {"corridor": (16, 8)}
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "a2c", "paper", replace(DEFAULT, discount=0.5)])
+def test_algorithms_by_name_and_by_settings(corridor, algorithm) -> None:
+    learner = clearway.train(corridor, algorithm=algorithm, **SMALL).record.learner
+    expected = {"ppo": DEFAULT, "a2c": DEFAULT.as_a2c(), "paper": clearway.PAPER_A2C}.get(algorithm, algorithm) \
+        if isinstance(algorithm, str) else algorithm  # fmt: skip
+    assert learner == replace(expected, **SMALL)
+
+
+def test_a3c_by_name(corridor) -> None:
+    settings = {"frames": 300, "envs": 3, "width": 16, "step_limit": 30}
+    learner = clearway.train(corridor, [16, 8, 0], algorithm="a3c", threads=1, **settings).record.learner
+    assert learner == replace(PAPER_A3C, **settings)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        ({"algorithm": "sac"}, "algorithm='sac': no such algorithm. Use one of 'ppo', 'a2c', 'a3c'"),
+        ({"algorithm": 3}, "no such algorithm"),
+        ({"learning_rate": 3}, "learning_rate: no such setting. Use one of frames, envs"),
+        ({"envs": 2.5}, r"envs=2\.5: expected a whole number"),
+        ({"envs": True}, "envs=True: expected a whole number"),
+        ({"discount": "0.9"}, r"discount='0\.9': expected a number"),
+        ({"hindsight": 1}, "hindsight=1: expected True or False"),
+        ({"optimiser": "sgd"}, "optimiser='sgd': expected one of 'adam', 'rmsprop'"),
+        ({"frames": "many"}, "frames='many': expected a whole number"),
+        ({"seed": -1}, "seed=-1"),
+        ({"threads": 0}, "threads=0"),
+        ({"out": 3}, "out=3: expected a path"),
+        ({"resume": True}, "Give it as out"),
+        ({"zone_level": "room"}, "expected one of 'pose', 'cell'"),
+        ({"feature_store": "disk"}, "expected one of 'memory'"),
+        ({"device": 0}, "device=0: expected a word"),
+        ({"reward": 3}, "reward=3 is unknown"),
+        ({"targets": 3}, r"targets=3: expected state ids by scene name, such as \{'bathroom': \[26, 37\]\}"),
+        ({"targets": "16"}, "expected state ids"),
+        ({"targets": [1.5]}, r"targets\['corridor'\]=1\.5: expected a whole number"),
+        ({"targets": {"cellar": [1]}}, "no scene 'cellar' is given. Name one of corridor"),
+        ({"targets": {"corridor": 1}}, "Give a list of them"),
+    ],
+)
+def test_what_does_not_fit_is_told_in_one_line_that_is_also_a_value_error(corridor, arguments, part) -> None:
+    with pytest.raises(clearway.ClearwayError, match=part) as caught:
+        clearway.train(corridor, **arguments)
+    assert isinstance(caught.value, ValueError)
+    assert "\n" not in str(caught.value)
+
+
+def test_targets_without_names_are_for_one_scene(corridor) -> None:
+    with pytest.raises(ArgumentError, match="Name the scene of each"):
+        clearway.train([corridor, grid_scene(1, feature_count=FEATURES)], [1, 2], **SMALL)
