@@ -73,7 +73,7 @@ def make_encoder(plugin: Plugin) -> CheckedEncoder:
     except Exception as fault:  # another's code, as in load_plugin
         reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
         raise PluginError(f"{plugin}: cannot be made ({reason}). {remedy}") from fault
-    fixed = {"kind": KIND, "plugin": plugin.name, "package": plugin.package}
+    fixed: dict[str, object] = {"kind": KIND, "plugin": plugin.name, "package": plugin.package}
     return _checked(made, plugin.name, fixed, {"version": plugin.version}, str(plugin), remedy)
 
 
