@@ -40,7 +40,7 @@ from clearway.envs.navigation import Navigation
 from clearway.envs.streams import Streams
 from clearway.envs.world import World
 from clearway.learn.a3c.trainer import AsyncTrainer
-from clearway.learn.config import PAPER_A3C
+from clearway.learn.presets import PAPER_A3C
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.model.network import OUTPUTS
 from clearway.reward import COLLISION_AWARE

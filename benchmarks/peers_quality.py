@@ -15,7 +15,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from throughput import ENDLESS
 
 from clearway.envs.world import World
-from clearway.learn.config import DEFAULT
+from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import SiameseActorCritic

@@ -16,12 +16,16 @@ from throughput import ENDLESS
 
 from clearway.choices import MatmulPrecision
 from clearway.envs.world import World
-from clearway.learn.config import Learner
+from clearway.learn import algorithms
+from clearway.learn.algorithms import carried_over
+from clearway.learn.on_policy import OnPolicy
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
 
-A2C_LIKE = replace(ON_PREPARED.as_a2c(), frames=ENDLESS, hindsight=False, lookahead=0.0, feature_basis=0)
+A2C_LIKE = replace(
+    carried_over(ON_PREPARED, algorithms.A2C), frames=ENDLESS, hindsight=False, lookahead=0.0, feature_basis=0
+)
 OURS = tuple(
     replace(A2C_LIKE, envs=envs, matmul_precision=precision)
     for envs in (400, 1600)
@@ -56,7 +60,7 @@ class Runner:
         return updates * self.envs * self.steps / (time.perf_counter() - started)
 
 
-def our_runner(world: World, learner: Learner) -> Runner:
+def our_runner(world: World, learner: OnPolicy) -> Runner:
     """The package's A2C."""
     trainer = Trainer(world, learner, COLLISION_AWARE, seed=0)
     name = f"clearway A2C, {str(trainer.lookup.dtype).removeprefix('torch.')}"

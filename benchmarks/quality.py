@@ -47,7 +47,8 @@ from clearway.evaluate.optimum import world_yardsticks
 from clearway.evaluate.oracle import DISCOUNT, ENTROPY_WEIGHT
 from clearway.evaluate.report import Protocol
 from clearway.files import written_whole
-from clearway.learn.config import PRESETS, Learner
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import PRESETS
 from clearway.learn.provenance import hardware, package_versions
 from clearway.learn.settings import with_settings
 from clearway.learn.train import RunRequest, set_threads
@@ -61,7 +62,7 @@ SHOWN_VERSIONS = ("python", "clearway", "torch", "numpy")
 PEAK_SIZES, PEAK_REPEATS = (1024, 2048), 3
 
 
-def references(world: World, reward: Reward, learner: Learner) -> list[Reference]:
+def references(world: World, reward: Reward, learner: OnPolicy) -> list[Reference]:
     """The optimum and the soft fixed points of the learner's own and of the published settings."""
     own = replace(reward, clip=reward.clip or learner.clip_rewards)
     last_entropy = learner.entropy_end / learner.reward_scale  # in units of the reward
@@ -94,7 +95,7 @@ class Bench:
 
     scenes: Sequence[Scene]
     targets: Mapping[str, Sequence[int]]
-    learner: Learner
+    learner: OnPolicy
     reward: Reward
     options: argparse.Namespace
 
@@ -108,6 +109,7 @@ class Bench:
         count = options.targets
         targets = {s.name: seeded_targets(s, count) if count else default_targets(s) for s in scenes}
         learner = PRESETS[options.preset]
+        assert isinstance(learner, OnPolicy)
         if options.frames:
             learner = replace(learner, frames=options.frames)
         return cls(scenes, targets, with_settings(learner, options.set), REWARDS[options.reward], options)
@@ -218,10 +220,10 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--encoder", help=f"of the pictures; default: {ENCODER} for rooms, else the file's own")
     parser.add_argument("--targets", type=at_least_one, help="seeded targets a scene; default: those of clearway train")
     parser.add_argument("--reward", choices=REWARDS, default="collision-aware")
-    parser.add_argument("--preset", choices=PRESETS, default="default")
+    parser.add_argument("--preset", choices=("default", "paper"), default="default")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4])
     parser.add_argument("--frames", type=at_least_one, help="default: the preset's")
-    parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="settings of clearway.learn.config")
+    parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="settings of the preset's algorithm")
     parser.add_argument("--every", type=at_least_one, default=50_000, help="frames between looks (default %(default)s)")
     parser.add_argument("--episodes", type=at_least_one, default=25, help="a target, for a look (default %(default)s)")
     parser.add_argument("--step-cap", type=at_least_one, default=STEP_CAP, help="of the last evaluation's episodes")

@@ -10,7 +10,7 @@ import torch
 
 from clearway.envs.world import World, make_world
 from clearway.errors import SceneError
-from clearway.learn.config import DEFAULT
+from clearway.learn.presets import DEFAULT
 from clearway.learn.setup import fitted_features
 from clearway.perception import encode_scenes
 from clearway.scenes.library import cached_room_scene

@@ -19,7 +19,7 @@ run, a process for each size, updates of both sizes in turn, so that whatever el
     by CPU       the same by the processor time of the updates, which other programs on the machine disturb less
 
 `at once`: scenes that are walked at the same time, in turn with the others; by default all.
-`heads`: whether every scene has its own last layers, as published, or all share one (see `clearway.learn.config`).
+`heads`: whether every scene has its own last layers, as published, or all share one (see `clearway.learn.on_policy`).
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ import numpy as np
 import torch
 
 from clearway.envs.world import make_world
-from clearway.learn.config import DEFAULT, Learner
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
@@ -62,7 +63,7 @@ class Size:
 
     rooms: int
     store: str
-    learner: Learner
+    learner: OnPolicy
 
 
 @dataclass

@@ -60,11 +60,15 @@ from torch import Tensor, nn
 from clearway.envs.navigation import Navigation, TargetChoice
 from clearway.envs.streams import Streams
 from clearway.envs.world import World, make_world
-from clearway.learn.config import DEFAULT, Learner
+from clearway.learn import algorithms
+from clearway.learn.algorithms import carried_over
+from clearway.learn.figures import Figures as Figured
 from clearway.learn.losses import Batch, LossSettings, actor_critic_loss
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
-from clearway.learn.trainer import Trainer, Update
+from clearway.learn.trainer import Trainer
 from clearway.model.feature_map import FeatureMap
 from clearway.model.first_layer import VisitedStates
 from clearway.model.network import OUTPUTS
@@ -80,7 +84,7 @@ BASIS = 512  # directions of the reduced features
 ROW_CHUNK = 4000  # rows of a naive update held at a time
 ENDLESS = 10**9  # frames of the schedules; none ends during a benchmark
 PPO = replace(DEFAULT, frames=ENDLESS, matmul_precision="highest")
-A2C = replace(PPO.as_a2c(), hindsight=False, lookahead=0.0, bootstrap_cut=False)
+A2C = carried_over(replace(PPO, hindsight=False, lookahead=0.0, bootstrap_cut=False), algorithms.A2C)
 Peaks = dict[torch.dtype, dict[int, float]]
 
 
@@ -172,7 +176,7 @@ class PlainNetwork(nn.Module):
 class NaiveA2C:
     """The same A2C update with nothing but the plain network, autograd and copies of the features."""
 
-    def __init__(self, world: World, learner: Learner, seed: int) -> None:
+    def __init__(self, world: World, learner: OnPolicy, seed: int) -> None:
         self.world, self.learner = world, learner
         self.per_scene = learner.envs // world.scene_count
         assert world.features is not None
@@ -274,7 +278,7 @@ class Case:
         return statistics.median(rates), rates[0], rates[-1]
 
 
-def needed_gflop(world: World, features: int, states: float, learner: Learner, updates: Sequence[Update]) -> float:
+def needed_gflop(world: World, features: int, states: float, learner: OnPolicy, updates: Sequence[Figured]) -> float:
     """GFLOP of an update on so many features, by the formulas above; mean over some that projected so many states."""
     width, targets = learner.width, world.target_count
     projection = 2 * states * features * learner.history_length * width
@@ -288,18 +292,19 @@ def needed_gflop(world: World, features: int, states: float, learner: Learner, u
     passes, parts = learner.epochs, learner.epochs * learner.minibatches
     siamese_steps = passes if learner.siamese_step == "pass" else parts
     renewed = (siamese_steps - 1) * projection + (parts - 1) * (tables - projection)
-    told = statistics.fmean(update.hindsight_rows for update in updates)
+    told = statistics.fmean(update["hindsight_rows"] for update in updates)
     learnt = statistics.fmean(
-        (rows + u.hindsight_rows) * (u.distinct_histories * of_history + u.distinct_pairs * of_row) for u in updates
+        (rows + u["hindsight_rows"]) * (u["distinct_histories"] * of_history + u["distinct_pairs"] * of_row)
+        for u in updates
     )
     stepped = 3 * passes * learnt + parts * extra_targets + siamese_steps * projection
     return (gathered + told * (of_history + of_row) + renewed + stepped) / 1e9
 
 
-def fast_case(world: World, learner: Learner) -> Case:
+def fast_case(world: World, learner: OnPolicy) -> Case:
     """The learner of the package."""
     trainer = Trainer(world, learner, COLLISION_AWARE, seed=0)
-    updates: list[Update] = []
+    updates: list[Figured] = []
     states: list[int] = []
 
     def update() -> None:
@@ -316,7 +321,7 @@ def fast_case(world: World, learner: Learner) -> Case:
     return Case(name, learner.envs, learner.rollout_steps, update, gflop, dtype, comparable)
 
 
-def naive_case(world: World, learner: Learner) -> Case:
+def naive_case(world: World, learner: OnPolicy) -> Case:
     """The naive version at the same size."""
     return Case("naive a2c", learner.envs, learner.rollout_steps, NaiveA2C(world, learner, seed=0).update)
 

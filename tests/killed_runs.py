@@ -19,9 +19,10 @@ from pathlib import Path
 import torch
 
 from clearway.learn import train
-from clearway.learn.config import PRESETS
+from clearway.learn.figures import Figures
+from clearway.learn.presets import PRESETS
 from clearway.learn.train import RunRequest
-from clearway.learn.trainer import Trainer, Update
+from clearway.learn.trainer import Trainer
 from small_runs import small_learner, small_request
 
 UPDATES = 300
@@ -40,7 +41,7 @@ def child(folder: Path, preset: str, told: int) -> None:
     train.SECONDS_BETWEEN_CHECKPOINTS = 0.0
     whole = Trainer.update
 
-    def update(trainer: Trainer) -> Update:
+    def update(trainer: Trainer) -> Figures:
         os.write(told, b".")
         return whole(trainer)
 

@@ -12,7 +12,7 @@ from torch import Tensor
 from clearway.envs.navigation import Navigation
 from clearway.envs.streams import Streams
 from clearway.envs.world import World
-from clearway.learn.config import Learner
+from clearway.learn.a3c.config import A3C
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import Reward
@@ -23,7 +23,7 @@ ALPHA, EPSILON = 0.99, 0.1
 class PlainWorker:
     """One worker with its own environment."""
 
-    def __init__(self, number: int, world: World, learner: Learner, reward: Reward, seed: int) -> None:
+    def __init__(self, number: int, world: World, learner: A3C, reward: Reward, seed: int) -> None:
         self.world, self.learner = world, learner
         self.target = torch.tensor([number % world.target_count])
         self.scene = world.target_scene[self.target]
@@ -89,7 +89,7 @@ def published_tensors(network: SiameseActorCritic, scene: int) -> list[Tensor]:
 class PlainA3C:
     """All workers take turns: in a round they copy the parameters together, then update them one after the other."""
 
-    def __init__(self, world: World, learner: Learner, reward: Reward, seed: int, workers: list[int]) -> None:
+    def __init__(self, world: World, learner: A3C, reward: Reward, seed: int, workers: list[int]) -> None:
         self.learner = learner
         self.workers = [PlainWorker(number, world, learner, reward, seed) for number in workers]
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor
 
+from clearway.envs.navigation import Navigation
 from clearway.envs.world import World, make_world
-from clearway.learn.config import DEFAULT, Learner
+from clearway.learn.bc import Cloning
+from clearway.learn.learner import Learner
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT
+from clearway.learn.rollout import sample_actions
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -48,13 +53,16 @@ def small_network(world: World, width: int = 16, seed: int = 0) -> SiameseActorC
     return SiameseActorCritic(NetworkShape(world.scene_count, world.features.shape[1], width), seed)
 
 
-def small_learner(learner: Learner = DEFAULT, **changes: Any) -> Learner:
+Kind = TypeVar("Kind", bound=Learner)
+
+
+def small_learner(learner: Kind = DEFAULT, **changes: Any) -> Kind:
     """Settings for 10 environments, 8 steps, 10 updates, where `changes` do not say otherwise."""
     small: dict[str, Any] = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
-    return replace(learner, **(small | changes))
+    return replace(learner, **({name: small[name] for name in small if hasattr(learner, name)} | changes))
 
 
-def small_trainer(learner: Learner, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
+def small_trainer(learner: OnPolicy, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
     """A trainer on the two small scenes."""
     return Trainer(small_world(), learner, reward, seed)
 
@@ -63,6 +71,26 @@ def small_request(**changes: Any) -> RunRequest:
     """A training run on the two small scenes."""
     request = RunRequest(small_scenes(), small_targets(), small_learner(), COLLISION_AWARE, seed=3)
     return replace(request, **changes)
+
+
+@torch.no_grad()
+def reached_from_everywhere(trainer: Trainer | Cloning) -> Tensor:
+    """(M,) share of all starts from which the sampled policy reaches each target in 4x the shortest path plus 4."""
+    world = trainer.world
+    trainer.lookup.refresh()
+    target = torch.repeat_interleave(torch.arange(world.target_count), world.start_count)  # ordered by scene
+    episodes = Navigation(world, COLLISION_AWARE, torch.arange(len(target)))
+    episodes.reset(target=target, start=world.start_state)
+    limit = 4 * world.start_steps + 4
+    rows = torch.bincount(world.target_scene[target], minlength=world.scene_count).tolist()
+    reached = torch.zeros(len(target), dtype=torch.bool)
+    draws = torch.Generator().manual_seed(0)
+    for step in range(1, int(limit.max()) + 1):
+        scores = trainer.lookup.forward(episodes.history, target, rows).scores
+        done = episodes.step(sample_actions(scores, torch.rand(len(target), generator=draws).double()))
+        reached |= done.reached & (step <= limit)
+    share = torch.zeros(world.target_count).index_add_(0, target, reached.float())
+    return share / world.start_count
 
 
 def equal_bits(first: dict[str, Tensor], second: dict[str, Tensor]) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from clearway.experiments.budget import SMOKE
 from clearway.experiments.plan import SceneFile
 from clearway.experiments.setting import Setting
-from clearway.learn.config import DEFAULT, PAPER_A2C
+from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.run_folder import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene

@@ -97,6 +97,17 @@ def wait_to_be_told(folder: Path, part: int) -> None:
         signal.pause()
 
 
+def wait_to_be_interrupted(folder: Path, part: int) -> None:
+    """Be under way until Ctrl+C, and leave a file then."""
+    (folder / "under-way").touch()
+    try:
+        while True:
+            time.sleep(0.01)
+    except KeyboardInterrupt:
+        (folder / "saved").touch()
+        raise
+
+
 def wait_for(path: Path) -> None:
     """Come back when there is such a file."""
     end = time.monotonic() + 60

@@ -14,7 +14,7 @@ from clearway.cli.imports.plugin import ImportPlugin
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_scene_agent
 from clearway.errors import EncoderError, PluginError
-from clearway.learn.config import Algorithm
+from clearway.learn.algorithms import ALGORITHMS
 from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
@@ -48,7 +48,7 @@ def test_the_built_in_names_are_those_that_there_are() -> None:
     assert BUILT_IN["encoders"] == (encode.AUTO, encode.TRAINED, encode.RANDOM, depth_grid.NAME)
     assert BUILT_IN["importers"] == tuple(importers)
     assert set(BUILT_IN["rewards"]) == set(REWARDS)
-    assert BUILT_IN["algorithms"] == get_args(Algorithm)
+    assert BUILT_IN["algorithms"] == tuple(ALGORITHMS)
     assert set(BUILT_IN) == set(KINDS)
 
 

@@ -17,7 +17,13 @@ if TYPE_CHECKING:
     from clearway.api.training import TrainResult, train
     from clearway.deploy.navigator import Navigator
     from clearway.errors import ClearwayError
-    from clearway.learn.config import PAPER_A2C, PAPER_A3C, Learner
+    from clearway.learn.a2c import A2C
+    from clearway.learn.a3c.config import A3C
+    from clearway.learn.bc import BC
+    from clearway.learn.learner import Learner
+    from clearway.learn.ppo import PPO
+    from clearway.learn.presets import PAPER_A2C, PAPER_A3C
+    from clearway.learn.q_learning import QLearning
     from clearway.reward import Reward
     from clearway.scenes.scene import Scene
 
@@ -29,9 +35,14 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "encode_scenes": "clearway.api.scenes",
     "Reward": "clearway.reward",
     "make_env": "clearway.api.environments",
-    "Learner": "clearway.learn.config",
-    "PAPER_A2C": "clearway.learn.config",
-    "PAPER_A3C": "clearway.learn.config",
+    "Learner": "clearway.learn.learner",
+    "PPO": "clearway.learn.ppo",
+    "A2C": "clearway.learn.a2c",
+    "A3C": "clearway.learn.a3c.config",
+    "BC": "clearway.learn.bc",
+    "QLearning": "clearway.learn.q_learning",
+    "PAPER_A2C": "clearway.learn.presets",
+    "PAPER_A3C": "clearway.learn.presets",
     "train": "clearway.api.training",
     "TrainResult": "clearway.api.training",
     "evaluate": "clearway.api.evaluation",
@@ -42,12 +53,17 @@ _HOME = {  # of each name, in the order in which a reader meets them
 }
 
 __all__ = [
+    "A2C",
+    "A3C",
+    "BC",
     "PAPER_A2C",
     "PAPER_A3C",
+    "PPO",
     "ClearwayError",
     "EvaluateResult",
     "Learner",
     "Navigator",
+    "QLearning",
     "Reward",
     "Scene",
     "TrainResult",

@@ -20,6 +20,9 @@ BudgetName = Literal["smoke", "paper"]
 LearnerName = Literal["published", "published-a3c", "default"]
 """See `clearway.experiments.setting`."""
 
+PresetName = Literal["default", "paper", "paper-a3c"]
+"""See `clearway.learn.presets`."""
+
 FeatureStore = Literal["memory", "float16", "mapped"]
 """See `clearway.envs.feature_store`."""
 

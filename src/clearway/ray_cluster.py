@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from clearway.errors import ClearwayError, RunError
+from clearway.errors import RunError
 
 LOCAL = "local"
 
@@ -58,24 +58,3 @@ def kept_connected(address: str | None, cores: int | None = None) -> Iterator[No
         return
     with connected(address, cores):
         yield
-
-
-def result(ray: Any, reference: object, died: Callable[[str], ClearwayError]) -> Any:
-    """What a task gave.
-
-    Args:
-        ray: as `connected` gives it.
-        reference: of the task.
-        died: makes the error for a reason, where the task's worker or node died.
-
-    Raises:
-        ClearwayError: the one that the task raised, or `died`'s.
-    """
-    try:
-        return ray.get(reference)
-    except ray.exceptions.RayTaskError as error:
-        if isinstance(error.cause, ClearwayError):
-            raise error.cause from None
-        raise
-    except ray.exceptions.RayError as error:
-        raise died(str(error).strip().splitlines()[0]) from error

@@ -7,7 +7,7 @@ import torch
 
 import clearway
 from clearway.errors import ArgumentError
-from clearway.learn.config import DEFAULT, PAPER_A3C
+from clearway.learn.presets import DEFAULT, PAPER_A3C
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.reward import SHORTEST
@@ -89,8 +89,8 @@ def test_numbers_may_be_numpy_s_and_the_record_is_plain(corridor, tmp_path) -> N
 @pytest.mark.parametrize("algorithm", ["ppo", "a2c", "paper", replace(DEFAULT, discount=0.5)])
 def test_algorithms_by_name_and_by_settings(corridor, algorithm) -> None:
     learner = clearway.train(corridor, algorithm=algorithm, **SMALL).record.learner
-    expected = {"ppo": DEFAULT, "a2c": DEFAULT.as_a2c(), "paper": clearway.PAPER_A2C}.get(algorithm, algorithm) \
-        if isinstance(algorithm, str) else algorithm  # fmt: skip
+    named = {"ppo": DEFAULT, "a2c": clearway.A2C(), "paper": clearway.PAPER_A2C}
+    expected = named[algorithm] if isinstance(algorithm, str) else algorithm
     assert learner == replace(expected, **SMALL)
 
 

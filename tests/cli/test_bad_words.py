@@ -45,7 +45,7 @@ def test_a_refusal_in_colours_is_one_plain_line():
         (("--set", "envs=20", "clip_rewards=maybe"), ("clip_rewards=maybe", "true or false")),
         (("--set", "algorithm=magic"), ("algorithm=magic", "ppo")),
         (("--set", "discount=1.5"), ("discount is 1.5",)),
-        (("--algorithm", "a3c"), ("a3c", "paper-a3c")),
+        (("--algorithm", "dqn"), ("dqn", "a3c")),
         (("--alpha", "nan"), ("--alpha is nan",)),
         (("--terminal", "inf"), ("--terminal is inf",)),
         (("--frames", "-5"), ("frames is -5",)),

@@ -12,7 +12,7 @@ from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.reproduce import ReproduceRequest
-from clearway.learn.config import DEFAULT, PAPER_A2C, PAPER_A3C
+from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from small_runs import small_learner

@@ -8,7 +8,8 @@ from clearway.errors import RunError
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.plan import Job
 from clearway.learn import train
-from clearway.learn.trainer import Trainer, Update
+from clearway.learn.figures import Figures
+from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
 
@@ -48,7 +49,7 @@ def test_an_interrupted_job_ends_with_the_same_episodes(tmp_path: Path, monkeypa
     monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
     update, left = Trainer.update, 7
 
-    def stop_after_some(self: Trainer) -> Update:
+    def stop_after_some(self: Trainer) -> Figures:
         nonlocal left
         left -= 1
         if left < 0:

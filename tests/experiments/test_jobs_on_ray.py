@@ -101,3 +101,9 @@ def test_more_threads_than_any_node_has_are_refused(tmp_path: Path) -> None:
     ray.init(num_cpus=2, include_dashboard=False)
     with pytest.raises(RunError, match=r"no node .* the 3 processors .*there are 2 and .*--threads"):
         run_jobs(setting.out, jobs_of(setting), ray="local", workers=None, threads=3, show=nothing)
+
+
+def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    with pytest.raises(RunError, match=r"--ray auto: no cluster.*--ray local"):
+        run_jobs(setting.out, jobs_of(setting), ray="auto", workers=None, threads=1, show=nothing)

@@ -20,7 +20,7 @@ from clearway.experiments.job import do, episodes_of, is_done, trial_path
 from clearway.experiments.reproduce import planned
 from clearway.experiments.section import ReportTable, Section
 from clearway.experiments.setting import Setting
-from clearway.learn.config import DEFAULT
+from clearway.learn.presets import DEFAULT
 from clearway.reward import COLLISION_AWARE
 from clearway.viz import report
 from clearway.viz.report import HTML, JSON, MARKDOWN, write_report

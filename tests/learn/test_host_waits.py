@@ -9,7 +9,8 @@ from torch import Tensor
 from torch.overrides import TorchFunctionMode
 from torch.utils._python_dispatch import TorchDispatchMode
 
-from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.trainer import Trainer
 from small_runs import small_learner, small_trainer
 
@@ -63,7 +64,7 @@ def waits(work: Callable[[], object]) -> list[str]:
     return found
 
 
-def trainer_after_a_while(learner: Learner, **changes: Any) -> Trainer:
+def trainer_after_a_while(learner: OnPolicy, **changes: Any) -> Trainer:
     """A trainer whose episodes end now and then, on four times as many rows as states: all states are projected."""
     trainer = small_trainer(small_learner(learner, envs=20, frames=100_000, **changes))
     for _ in range(3):
@@ -86,7 +87,7 @@ def test_what_waits_is_found(work: Callable[[Tensor], object]) -> None:
 
 
 @pytest.mark.parametrize("learner", [DEFAULT, PAPER_A2C])
-def test_a_rollout_never_waits(learner: Learner) -> None:
+def test_a_rollout_never_waits(learner: OnPolicy) -> None:
     trainer = trainer_after_a_while(learner)
     trainer.lookup.refresh()
     assert waits(lambda: trainer.collector.collect()) == []

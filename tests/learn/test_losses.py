@@ -5,8 +5,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from clearway.learn.config import DEFAULT, PAPER_A2C
 from clearway.learn.losses import Batch, LossSettings, actor_critic_loss, loss_gradient, merged
+from clearway.learn.presets import DEFAULT, PAPER_A2C
 
 LOG_4 = math.log(4)
 SETTINGS = LossSettings(entropy_weight=0.1, value_weight=0.5, ratio_clip=0.2, sum_loss=False)

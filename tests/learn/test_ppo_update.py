@@ -81,9 +81,9 @@ def test_a_ppo_update_equals_the_naive_one(siamese_step: Literal["pass", "miniba
     before = copy.deepcopy(trainer.network)
     expected = naive_update(small_trainer(learner, seed=2))
     update = trainer.update()
-    assert update.gradient_norm > learner.clip_norm
-    assert update.clipped > 0
-    assert (update.hindsight_rows > 0) == hindsight
+    assert update["gradient_norm"] > learner.clip_norm
+    assert update["clipped"] > 0
+    assert (update["hindsight_rows"] > 0) == hindsight
     for (name, after), start, naive in zip(
         trainer.network.named_parameters(), before.parameters(), expected.parameters(), strict=True
     ):

@@ -5,7 +5,7 @@ import torch
 from torch import Tensor
 
 from clearway.envs.world import World
-from clearway.learn.config import PAPER_A2C
+from clearway.learn.presets import PAPER_A2C
 from clearway.learn.rollout import Rollout, as_rows, by_step, sample_actions
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE

@@ -1,7 +1,7 @@
 import pytest
 
 from clearway.errors import RunError
-from clearway.learn.config import DEFAULT
+from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.settings import with_settings
 
 
@@ -14,9 +14,10 @@ def test_settings_keep_their_types() -> None:
     assert learner.epochs == DEFAULT.epochs
 
 
-def test_settings_that_belong_together_come_together() -> None:
-    learner = with_settings(DEFAULT, ["algorithm=a2c", "epochs=1", "minibatches=1"])
-    assert learner == DEFAULT.as_a2c()
+def test_a_setting_that_the_algorithm_lacks_is_refused_with_the_names_of_those_it_has() -> None:
+    for learner, word, has in ((PAPER_A2C, "epochs=2", "hindsight"), (PAPER_A3C, "hindsight=true", "clip_norm")):
+        with pytest.raises(RunError, match=rf"^--set {word}: .* {learner.algorithm}'s settings: frames, .*{has}"):
+            with_settings(learner, [word])
 
 
 def test_no_words_change_nothing() -> None:
@@ -26,14 +27,14 @@ def test_no_words_change_nothing() -> None:
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("envs", "expected name=value with a name among frames, envs"),
+        ("envs", "expected name=value with a name among ppo's settings: frames, "),
         ("environments=3", "expected name=value"),
         ("envs=many", "--set envs=many: expected a whole number"),
         ("envs=1.5", "expected a whole number"),
         ("discount=high", "expected a number"),
         ("hindsight=yes", "expected true or false"),
         ("optimiser=sgd", "expected adam or rmsprop"),
-        ("algorithm=dqn", "expected ppo or a2c or a3c"),
+        ("algorithm=dqn", "expected name=value"),
         ("epochs=0", "epochs is 0, expected at least 1"),
     ],
 )

@@ -17,9 +17,10 @@ import torch
 from clearway.errors import RunError
 from clearway.learn import checkpoint, train
 from clearway.learn.checkpoint import Progress, newest_checkpoint, read_network, read_progress, read_training
-from clearway.learn.config import PAPER_A2C
+from clearway.learn.figures import Figures
+from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
-from clearway.learn.trainer import Trainer, Update
+from clearway.learn.trainer import Trainer
 from clearway.reward import SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from small_runs import equal_bits, small_learner, small_request, small_scenes
@@ -33,7 +34,7 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, frames: int, number: int = sig
     """Send the signal in the middle of the update that reaches `frames`."""
     whole = Trainer.update
 
-    def update(trainer: Trainer) -> Update:
+    def update(trainer: Trainer) -> Figures:
         if trainer.frames + trainer.frames_per_update == frames:
             signal.raise_signal(number)
         return whole(trainer)
@@ -227,7 +228,7 @@ def test_numbers_that_are_not_finite_stop_the_run_and_the_checkpoint_before_stay
     monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
     whole = Trainer.update
 
-    def update(trainer: Trainer) -> Update:
+    def update(trainer: Trainer) -> Figures:
         if trainer.updates == 2:
             with torch.no_grad():
                 trainer.network.fusion_bias[0] = torch.nan

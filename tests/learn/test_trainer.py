@@ -10,8 +10,10 @@ from torch import Tensor, nn
 
 from clearway.errors import RunError
 from clearway.learn import trainer as trainer_module
-from clearway.learn.config import DEFAULT, PAPER_A2C, Learner
+from clearway.learn.a2c import A2C
 from clearway.learn.losses import Batch, merged
+from clearway.learn.on_policy import OnPolicy
+from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.rollout import Rollout
 from clearway.learn.trainer import Step, Trainer
 from clearway.model import lookup
@@ -20,7 +22,7 @@ from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
 
-A2C = small_learner(DEFAULT.as_a2c(), hindsight=False, lookahead=0.0, step_limit=5, matmul_precision="highest")
+PLAIN_A2C = small_learner(A2C(), hindsight=False, lookahead=0.0, step_limit=5, matmul_precision="highest")
 
 
 def predicted(trainer: Trainer, network: SiameseActorCritic, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
@@ -52,7 +54,7 @@ def advantages_step_by_step(trainer: Trainer, rollout: Rollout, value: Tensor, a
 
 
 def naive_update(trainer: Trainer, lr: float) -> SiameseActorCritic:
-    """The network after one A2C update from where the trainer stands, computed afresh; uses up the rollout."""
+    """The network after one PLAIN_A2C update from where the trainer stands, computed afresh; uses up the rollout."""
     learner, network = trainer.learner, copy.deepcopy(trainer.network)
     rollout = trainer.collector.collect()
     scores, value = predicted(trainer, network, rollout.history, rollout.target)
@@ -90,15 +92,15 @@ def published_step(network: SiameseActorCritic, clip_norm: float, lr: float) -> 
 @pytest.mark.parametrize(
     "learner",
     [
-        pytest.param(A2C, id="default as a2c"),
-        pytest.param(replace(A2C, clip_norm=0.01), id="clipped"),
-        pytest.param(replace(A2C, sum_loss=True, clip_norm=1e9, gae_lambda=1.0), id="summed"),
-        pytest.param(replace(A2C, bootstrap_cut=False), id="cut is an end"),
+        pytest.param(PLAIN_A2C, id="default as a2c"),
+        pytest.param(replace(PLAIN_A2C, clip_norm=0.01), id="clipped"),
+        pytest.param(replace(PLAIN_A2C, sum_loss=True, clip_norm=1e9, gae_lambda=1.0), id="summed"),
+        pytest.param(replace(PLAIN_A2C, bootstrap_cut=False), id="cut is an end"),
         pytest.param(small_learner(PAPER_A2C, step_limit=5), id="paper"),
         pytest.param(small_learner(PAPER_A2C, step_limit=5, clip_norm=0.02), id="paper, clipped"),
     ],
 )
-def test_an_a2c_update_equals_the_naive_one(learner: Learner) -> None:
+def test_an_a2c_update_equals_the_naive_one(learner: OnPolicy) -> None:
     trainer, other = small_trainer(learner, seed=2), small_trainer(learner, seed=2)
     before = copy.deepcopy(trainer.network)
     expected = naive_update(other, learner.lr_start)
@@ -130,13 +132,13 @@ def test_schedules_run_from_start_to_end() -> None:
     trainer = small_trainer(learner)
     updates = [trainer.update() for _ in range(10)]
     assert trainer.finished
-    assert [u.lr for u in updates] == pytest.approx([1e-2 - 9e-4 * k for k in range(10)])
+    assert [u["lr"] for u in updates] == pytest.approx([1e-2 - 9e-4 * k for k in range(10)])
     assert learner.barrier_weight_at(0) == learner.log_barrier
     ahead = replace(learner, lookahead=0.02, log_barrier=0.4, settle=0.2)
     moments = [0, 320, 639, 640, 800, 1600]  # of 800 frames
     assert [ahead.lookahead_weight_at(n) for n in moments] == pytest.approx([0.02, 0.01, 0.02 / 640, 0, 0, 0])
     assert [ahead.barrier_weight_at(n) for n in moments] == pytest.approx([0.4, 0.2, 0.4 / 640, 0, 0, 0])
-    assert [u.entropy_weight for u in updates] == pytest.approx([0.1 * 0.01 ** (k / 10) for k in range(10)])
+    assert [u["entropy_weight"] for u in updates] == pytest.approx([0.1 * 0.01 ** (k / 10) for k in range(10)])
     assert trainer.frames == 800
     assert trainer.updates == 10
 
@@ -174,14 +176,14 @@ def test_the_first_layer_moves_once_a_pass_or_with_every_minibatch(monkeypatch: 
 
 def test_what_repeats_is_counted_once() -> None:
     update = small_trainer(small_learner(epochs=2, minibatches=2)).update()
-    assert 0 < update.distinct_histories < update.distinct_pairs < 1
+    assert 0 < update["distinct_histories"] < update["distinct_pairs"] < 1
     whole = small_trainer(small_learner(PAPER_A2C)).update()
-    assert whole.distinct_histories == whole.distinct_pairs == 1
+    assert whole["distinct_histories"] == whole["distinct_pairs"] == 1
 
 
 def test_hindsight_adds_rows_only_when_asked() -> None:
-    assert small_trainer(small_learner(step_limit=200, hindsight=True)).update().hindsight_rows > 0
-    assert small_trainer(small_learner(step_limit=200, hindsight=False)).update().hindsight_rows == 0
+    assert small_trainer(small_learner(step_limit=200, hindsight=True)).update()["hindsight_rows"] > 0
+    assert small_trainer(small_learner(step_limit=200, hindsight=False)).update()["hindsight_rows"] == 0
 
 
 def test_hindsight_and_look_ahead_get_the_learner_s_settings(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -236,8 +238,8 @@ def test_targets_reached_less_often_are_drawn_more_often() -> None:
     assert unbalanced.navigation.choice.weights.tolist() == [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
 
 
-@pytest.mark.parametrize("preset", [DEFAULT, replace(DEFAULT, balance=3.0), DEFAULT.as_a2c(), PAPER_A2C])
-def test_a_seed_repeats_and_tensors_bring_a_trainer_back_bit_for_bit(preset: Learner) -> None:
+@pytest.mark.parametrize("preset", [DEFAULT, replace(DEFAULT, balance=3.0), A2C(), PAPER_A2C])
+def test_a_seed_repeats_and_tensors_bring_a_trainer_back_bit_for_bit(preset: OnPolicy) -> None:
     learner = small_learner(preset)
     trainer, again, resumed = (small_trainer(learner, SHORTEST, seed=9) for _ in range(3))
     for each in (trainer, again):
@@ -306,7 +308,7 @@ def test_more_minibatches_than_rows_of_a_scene_are_refused() -> None:
 
 def test_one_row_an_update_gives_finite_figures() -> None:
     learner = small_learner(envs=1, rollout_steps=1, minibatches=1, epochs=1)
-    figures = vars(Trainer(corridor_world(), learner, COLLISION_AWARE, 0).update())
+    figures = Trainer(corridor_world(), learner, COLLISION_AWARE, 0).update()
     assert all(math.isfinite(value) for value in figures.values())
 
 
@@ -322,8 +324,8 @@ def test_projecting_visited_states_alone_changes_nothing_but_rounding(
     assert isinstance(visited.lookup.first_layer, VisitedStates)
     for _ in range(3):
         first, second = everywhere.update(), visited.update()
-        assert second.loss == pytest.approx(first.loss, rel=1e-3)
-        assert second.gradient_norm == pytest.approx(first.gradient_norm, rel=1e-3)
+        assert second["loss"] == pytest.approx(first["loss"], rel=1e-3)
+        assert second["gradient_norm"] == pytest.approx(first["gradient_norm"], rel=1e-3)
     for name, parameter in visited.network.named_parameters():
         torch.testing.assert_close(parameter, everywhere.network.get_parameter(name), rtol=1e-3, atol=1e-4)
 
@@ -354,9 +356,9 @@ def test_bfloat16_factors_learn_nearly_the_same_and_leave_nothing_of_it_behind(
     assert rounded.lookup.dtype == torch.bfloat16
     for _ in range(2):
         expected, found = exact.update(), rounded.update()
-        assert found.hindsight_rows > 0
-        assert found.loss == pytest.approx(expected.loss, abs=0.02)
-        assert found.gradient_norm == pytest.approx(expected.gradient_norm, rel=0.1)
+        assert found["hindsight_rows"] > 0
+        assert found["loss"] == pytest.approx(expected["loss"], abs=0.02)
+        assert found["gradient_norm"] == pytest.approx(expected["gradient_norm"], rel=0.1)
     for name, parameter in rounded.network.named_parameters():
         moved = parameter - exact.network.get_parameter(name)
         assert 0 < moved.abs().max() < 0.01, name

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from clearway.errors import RunError, SceneError
+from clearway.errors import SceneError
 from clearway.spread.workers import Work, workers_for
 from spread_parts import died, fail, no_tool, noted, square
 
@@ -29,10 +29,3 @@ def test_this_process_does_a_part_when_it_is_asked_for(tmp_path: Path) -> None:
 def test_an_error_is_what_the_part_raises() -> None:
     with workers_for(Work(no_tool, fail, died)) as crew, pytest.raises(SceneError):
         list(crew.results(["scene"]))
-
-
-def test_a_cluster_that_is_not_there_is_said_in_one_line() -> None:
-    pytest.importorskip("ray")
-    with pytest.raises(RunError, match=r"--ray 127\.0\.0\.1:1: no cluster.*--ray local"):
-        with workers_for(Work(no_tool, square, died), ray="127.0.0.1:1"):
-            pass

@@ -17,10 +17,10 @@ from clearway.evaluate.report import Evaluation
 from clearway.evaluate.run import evaluate_run
 from clearway.evaluate.tables import Level, Width, markdown_table
 from clearway.learn import load
-from clearway.learn.load import Agent
+from clearway.learn.load import Acting
 from clearway.scenes.scene import Scene
 
-Run: TypeAlias = Agent | TrainResult | str | os.PathLike[str]
+Run: TypeAlias = Acting | TrainResult | str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class EvaluateResult:
         scenes: where it walked.
     """
 
-    agent: Agent
+    agent: Acting
     evaluations: tuple[Evaluation, ...]
     scenes: tuple[Scene, ...]
 
@@ -102,7 +102,7 @@ class EvaluateResult:
 TEXT_WIDTH = 120  # columns
 
 
-def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] | None = None) -> Agent:
+def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] | None = None) -> Acting:
     """The trained agent of a run folder, from its newest checkpoint or the one given.
 
     Raises:
@@ -110,7 +110,7 @@ def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] |
         ClearwayError: there is no such run, the checkpoint is damaged or lies in another folder.
     """
     chosen = None if checkpoint is None else as_path("checkpoint", checkpoint)
-    return load.load_agent(as_path("run", run), chosen)
+    return load.load_acting(as_path("run", run), chosen)
 
 
 def evaluate(
@@ -148,8 +148,8 @@ def evaluate(
     return EvaluateResult(agent, tuple(evaluations), tuple(places))
 
 
-def _agent(run: Run) -> Agent:
-    if isinstance(run, Agent):
+def _agent(run: Run) -> Acting:
+    if isinstance(run, Acting):
         return run
     if isinstance(run, TrainResult):
         return run.agent

@@ -14,26 +14,21 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
 from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
-from clearway.learn.config import DEFAULT, PAPER_A3C, PRESETS, Learner
-from clearway.learn.load import Agent, load_agent
+from clearway.learn.algorithms import ALGORITHMS, algorithm
+from clearway.learn.learner import Learner
+from clearway.learn.load import Acting, load_acting
+from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunRecord
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.markdown import table_lines
+from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 from clearway.torch_threads import torch_threads
 
 Targets: TypeAlias = Mapping[str, Iterable[int]] | Iterable[int] | None
-
-ALGORITHMS: dict[str, Learner] = {
-    "ppo": DEFAULT,
-    "a2c": DEFAULT.as_a2c(),
-    "a3c": PAPER_A3C,
-    **{str(name): learner for name, learner in PRESETS.items()},
-}
-"""Settings by a word: an algorithm's own, or a preset's."""
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
 
@@ -49,7 +44,7 @@ class TrainResult:
         folder: the run folder; None where none was asked for.
     """
 
-    agent: Agent
+    agent: Acting
     scenes: tuple[Scene, ...]
     metrics: tuple[Mapping[str, float], ...]
     folder: Path | None = None
@@ -105,8 +100,8 @@ def train(
         scenes: a scene, a scene file, a folder of them, or several. All with features of one encoder.
         targets: state ids by scene name, or state ids alone for a single scene; five seeded ones where there are none.
         reward: one of `clearway.reward.REWARDS` by its name, a `Reward`, or package.module:name.
-        algorithm: "ppo" (our recipe), "a2c" (our recipe with one update a rollout) or "a3c" (as published); "paper"
-            is the published settings, synchronous; or a `Learner`.
+        algorithm: "ppo" (our recipe), "a2c", "a3c" (as published), "bc" or "q-learning", with its own defaults; a
+            preset, such as "paper" (the published settings, synchronous); or settings, such as `PPO(envs=200)`.
         frames: training frames, instead of the algorithm's own.
         seed: of parameters, environments, actions and the choice of targets.
         out: the run folder, which `clearway evaluate`, `view`, `export` and the others open. None keeps no folder: the
@@ -118,7 +113,7 @@ def train(
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.envs.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         show_progress: draw a progress bar.
-        settings: single settings of the algorithm by name, such as `envs=200`; all are fields of `Learner`.
+        settings: single settings of the algorithm by name, such as `envs=200`; all are fields of its class.
 
     Raises:
         ArgumentError: an argument is of the wrong kind or out of range.
@@ -148,29 +143,33 @@ def train(
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
         folder = train_run(request, path, resume=resume, show_progress=show_progress)
         return TrainResult(
-            agent=load_agent(path),
+            agent=load_acting(path),
             scenes=tuple(loaded),
             metrics=tuple(folder.metrics()),
             folder=None if out is None else path,
         )
 
 
-def chosen_learner(algorithm: str | Learner, frames: int | None, settings: Mapping[str, object]) -> Learner:
+def chosen_learner(wanted: str | Learner, frames: int | None, settings: Mapping[str, object]) -> Learner:
     """The settings of an algorithm, some of them changed.
 
     Raises:
         ArgumentError: there is no such algorithm or setting, or a value is of the wrong type.
         RunError: the settings cannot work together.
     """
-    if isinstance(algorithm, Learner):
-        learner = algorithm
-    elif isinstance(algorithm, str) and algorithm in ALGORITHMS:
-        learner = ALGORITHMS[algorithm]
+    if isinstance(wanted, Learner):
+        learner = wanted
+    elif isinstance(wanted, str) and wanted in PRESETS:
+        learner = PRESETS[wanted]
+    elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
+        learner = algorithm(wanted)()
     else:
-        names = ", ".join(map(repr, ALGORITHMS))
-        raise ArgumentError(f"algorithm={algorithm!r:.80}: no such algorithm. Use one of {names}, or a Learner")
+        names = ", ".join(map(repr, (*ALGORITHMS, *PRESETS)))
+        raise ArgumentError(
+            f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}, or settings such as PPO()"
+        )
     given = settings if frames is None else {**settings, "frames": frames}
-    return replace(learner, **as_settings(Learner, given))
+    return replace(learner, **as_settings(type(learner), given))
 
 
 def _chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict[str, tuple[int, ...]]:

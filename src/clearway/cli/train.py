@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import FeatureStore, ZoneLevel
+from clearway.choices import FeatureStore, PresetName, ZoneLevel
 from clearway.cli.arguments import check_at_least, check_seeds, chosen_targets, scene_files
 from clearway.cli.console import say
 from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
-from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
-from clearway.learn.settings import with_settings
+
+if TYPE_CHECKING:
+    from clearway.learn.learner import Learner
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,15 @@ class Train:
     parameters: RewardParameters = field(default_factory=RewardParameters)
     zones: ZoneLevel = "pose"
     """Whether zones are those of poses or of whole cells."""
-    algorithm: Algorithm | None = None
-    """ppo, a2c or a3c, instead of the preset's own; a3c goes with the presets paper and paper-a3c."""
-    preset: PresetName = "default"
-    """default is our recipe; paper is the published settings, synchronous; paper-a3c is the published algorithm."""
+    algorithm: str | None = None
+    """ppo, a2c, a3c, bc or q-learning, with the preset's settings as far as it has them; without --preset its own."""
+    preset: PresetName | None = None
+    """default is our recipe, PPO, and taken where there is no --algorithm either; paper is the published settings,
+    synchronous; paper-a3c is the published algorithm."""
     set: tuple[str, ...] = ()
-    """Single settings of the learner, for example --set envs=200 clip_rewards=true (all: clearway.learn.config)."""
+    """Single settings of the algorithm, for example --set envs=200 clip_rewards=true (all: docs/learning.md)."""
     frames: int | None = None
-    """Training frames, instead of the preset's own."""
+    """Training frames, instead of the preset's or algorithm's own."""
     feature_basis: int | None = None
     """Learn from features in so many leading principal directions, instead of the preset's choice; 0: as they are. It
     loses nothing where poses are fewer, and costs quality elsewhere."""
@@ -88,13 +90,16 @@ class Train:
         say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{each}")
 
     def _learner(self) -> Learner:
-        learner = PRESETS[self.preset]
-        if self.algorithm == "a2c":
-            learner = learner.as_a2c()
-        elif self.algorithm is not None:
-            learner = replace(learner, algorithm=self.algorithm)
+        from clearway.learn.algorithms import algorithm, carried_over
+        from clearway.learn.presets import PRESETS
+        from clearway.learn.settings import with_settings
+
+        learner = PRESETS[self.preset or "default"]
+        if self.algorithm is not None:
+            kind = algorithm(self.algorithm)
+            learner = kind() if self.preset is None else carried_over(learner, kind)
         if self.frames is not None:
             learner = replace(learner, frames=self.frames)
         if self.feature_basis is not None:
-            learner = replace(learner, feature_basis=self.feature_basis)
+            learner = with_settings(learner, [f"feature_basis={self.feature_basis}"])
         return with_settings(learner, self.set)

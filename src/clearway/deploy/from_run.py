@@ -14,6 +14,7 @@ from clearway.deploy.graph import PolicyGraph
 from clearway.deploy.model import Step
 from clearway.deploy.onnx_file import shifted
 from clearway.errors import DeployError, EncoderError
+from clearway.learn.learner import OnFeatures
 from clearway.learn.load import Agent, load_agent, run_scenes
 from clearway.perception import Encoder, encoder_from_record
 from clearway.perception.encoder import NetworkEncoder, sensor_of
@@ -65,6 +66,7 @@ class SceneAgent:
     def _normalisation(self, encoder: Encoder | None) -> dict[str, object]:
         """What the agent itself does to what it is given."""
         learner = self.agent.record.learner
+        assert isinstance(learner, OnFeatures), "a network's agent has the settings of one"
         network = encoder if isinstance(encoder, NetworkEncoder) else None  # another package's says nothing of itself
         pixels = network and {"resize": "bilinear, antialiased, the whole picture", **network.preprocessing.to_json()}
         return {

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from clearway.envs.world import World
-from clearway.model.policy import Policy
+from clearway.model.policy import Policy, shortest_path_actions
 from clearway.scenes.actions import ACTION_COUNT
 
 
@@ -27,10 +27,7 @@ def shortest_path_policy(world: World) -> Policy:
     steps_to_go = world.distance_table()
 
     def probabilities(history: Tensor, target: Tensor) -> Tensor:
-        here = history[:, -1]
-        after = steps_to_go[target[:, None], world.next_state[here]]  # (B, A)
-        nearer = after == steps_to_go[target, here][:, None] - 1
-        optimal = (nearer & (after >= 0)).to(torch.float64)
+        optimal = shortest_path_actions(world, steps_to_go, history[:, -1], target).to(torch.float64)
         return optimal / optimal.sum(1, keepdim=True).clamp(min=1)
 
     return probabilities

@@ -11,7 +11,7 @@ from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
 from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_policies, world_yardsticks
 from clearway.evaluate.protocol import evaluate_agents
 from clearway.evaluate.report import Evaluation, Trained
-from clearway.learn.load import Agent, run_world
+from clearway.learn.load import Acting, run_world
 from clearway.model.policy import Policy
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene, encoder_names
@@ -19,7 +19,7 @@ from clearway.torch_threads import torch_threads
 
 
 def evaluate_run(
-    agent: Agent,
+    agent: Acting,
     scenes: Sequence[Scene],
     *,
     episodes_per_target: int = EPISODES_PER_TARGET,
@@ -40,7 +40,7 @@ def evaluate_run(
 
 
 def evaluate_runs(
-    agents: Mapping[str, Agent],
+    agents: Mapping[str, Acting],
     scenes: Sequence[Scene],
     *,
     episodes_per_target: int = EPISODES_PER_TARGET,
@@ -88,6 +88,6 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
     return found
 
 
-def _trained(agent: Agent) -> Trained:
+def _trained(agent: Acting) -> Trained:
     record = agent.record
     return Trained(agent.frames, record.seed, record.paid, record.zone_level)

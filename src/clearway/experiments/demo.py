@@ -12,8 +12,8 @@ from clearway.evaluate.files import write_evaluations
 from clearway.evaluate.report import Evaluation
 from clearway.evaluate.run import evaluate_runs
 from clearway.evaluate.showcase import Showcase, showcases
-from clearway.learn.config import DEFAULT
 from clearway.learn.load import Agent, load_agent, run_world
+from clearway.learn.presets import DEFAULT
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, train
 from clearway.perception import encode_scenes

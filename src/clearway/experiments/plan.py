@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
-from clearway.learn.config import Learner
+from clearway.learn.learner import Learner
 from clearway.reward import Reward
 
 TargetSets = tuple[tuple[int, ...], ...]
@@ -52,7 +52,8 @@ class PlannedRun:
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
-        content = [scenes, self.targets, asdict(self.reward), self.learner.told_apart_by(), self.seed]
+        settings = {"algorithm": self.learner.algorithm, **asdict(self.learner)}
+        content = [scenes, self.targets, asdict(self.reward), settings, self.seed]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
         targets = sum(len(own) for own in self.targets)
         frames = f"{self.learner.frames / 1e6:g}M"

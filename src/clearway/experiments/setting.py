@@ -12,7 +12,8 @@ from clearway.envs.world import World, make_world
 from clearway.errors import SceneError
 from clearway.experiments.budget import Budget
 from clearway.experiments.plan import PlannedRun, SceneFile, TargetSets, Trial
-from clearway.learn.config import DEFAULT, PAPER_A2C, PAPER_A3C, Learner
+from clearway.learn.learner import Learner
+from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import scene_digest
 from clearway.perception import encode_scenes
 from clearway.reward import Reward

@@ -13,6 +13,7 @@ from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
 from clearway.experiments.trajectories import maps
 from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
+from clearway.learn.settings import with_settings
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
 
 REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE)
@@ -47,7 +48,7 @@ def section(setting: Setting) -> Section:
 def all_groups(setting: Setting) -> list[Group]:
     """All rewards; and the two that the paper compares once more without clipping, where a learner clips."""
     unclipped = {
-        f"{name}, {UNCLIPPED}": replace(learner, clip_rewards=False)
+        f"{name}, {UNCLIPPED}": with_settings(learner, ["clip_rewards=false"])
         for name, learner in setting.learners.items()
         if learner.clip_rewards
     }

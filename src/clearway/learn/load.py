@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 from torch import Tensor
 
 from clearway.envs.world import World, make_world, scene_tables
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
+from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord, scene_digest
 from clearway.model.feature_map import FeatureMap, prepared_features
@@ -19,6 +21,22 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import Critic, Policy, network_critic, network_policy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
+
+
+@runtime_checkable
+class Acting(Protocol):
+    """What is needed of a run's agent to walk with it, whatever it consists of."""
+
+    @property
+    def record(self) -> RunRecord:
+        """Of its run."""
+
+    @property
+    def frames(self) -> int:
+        """It has learnt from."""
+
+    def policy(self, world: World) -> Policy:
+        """What it does in a world with the run's scenes."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +72,7 @@ class Agent:
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
         names = tuple(scene.name for scene in self.record.scenes)
-        if world.scene_names != names and self.record.learner.heads == "scene":
+        if world.scene_names != names and self.record.learner.heads_by_scene:
             raise RunError(f"the scenes are {world.scene_names}, but the agent's {names}. Give those, in this order")
         count, expected = world.features.shape[1], self.feature_map.feature_count
         if count != expected:
@@ -63,7 +81,22 @@ class Agent:
 
 
 def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
-    """The agent of a run, from its newest checkpoint or the one given.
+    """The agent of a run that consists of a network, from its newest checkpoint or the one given.
+
+    Raises:
+        RunError: as for `load_acting`, or the agent has no network.
+    """
+    agent = load_acting(folder, checkpoint)
+    if not isinstance(agent, Agent):
+        name = agent.record.learner.algorithm
+        raise RunError(
+            f"{folder}: an agent of {name} has no network. Use clearway evaluate, or train another algorithm"
+        )
+    return agent
+
+
+def load_acting(folder: Path, checkpoint: Path | None = None) -> Acting:
+    """The agent of a run, whatever it consists of, from its newest checkpoint or the one given.
 
     Raises:
         RunError: there is no such run, the checkpoint is damaged or lies in another folder.
@@ -78,22 +111,31 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     if broken:
         raise RunError(f"{path}: its {broken[0]} holds NaN or Inf. Use another checkpoint")
     try:
-        feature_map = FeatureMap.from_tensors(part_of(tensors, "features"))
-        network = _network(record, feature_map.input_count, part_of(tensors, "network"))
+        return record.learner.agent(record, tensors, frames)
     except (LookupError, RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())[:300]
         raise RunError(f"{path}: does not fit its run ({reason}). Use another checkpoint") from error
-    return Agent(record, network, feature_map, frames)
+
+
+def network_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> Agent:
+    """The agent of a run that consists of a network.
+
+    Raises:
+        LookupError, RuntimeError, ValueError: the tensors do not fit the run.
+    """
+    feature_map = FeatureMap.from_tensors(part_of(tensors, "features"))
+    return Agent(record, _network(record, feature_map.input_count, part_of(tensors, "network")), feature_map, frames)
 
 
 def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tensor]) -> SiameseActorCritic:
     """The network of a run with these parameters; made only once its sizes are known to be theirs."""
     learner = record.learner
+    assert isinstance(learner, OnFeatures), "an algorithm that has a network has its settings"
     wanted = (learner.history_length, learner.width, input_count)
     found = tuple(parameters["siamese_weight"].shape)
     if found != wanted:
         raise RuntimeError(f"siamese_weight has shape {found}, expected {wanted}")
-    heads = learner.head_count(len(record.scenes))
+    heads = record.learner.head_count(len(record.scenes))
     network = SiameseActorCritic(NetworkShape(heads, input_count, learner.width, learner.history_length))
     network.load_state_dict(parameters)
     return network

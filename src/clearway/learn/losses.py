@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.learn.config import Learner
+from clearway.learn.on_policy import OnPolicy
 from clearway.scenes.actions import ACTION_COUNT
 
 
@@ -93,12 +93,13 @@ class LossSettings:
     entropy_weight: float
     value_weight: float
     ratio_clip: float
+    """Infinite: ratios are not clipped."""
     sum_loss: bool
     barrier_weight: float = 0.0
     lookahead_weight: float = 0.0
 
     @classmethod
-    def after(cls, frames: int, learner: Learner) -> LossSettings:
+    def after(cls, frames: int, learner: OnPolicy) -> LossSettings:
         """A learner's settings after that many frames."""
         return cls(
             learner.entropy_weight_at(frames),

@@ -6,14 +6,13 @@ import importlib.util
 import json
 import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 from torch import Tensor
 
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS, EpisodeStatistics
-from clearway.learn.trainer import Update
 
 Row = dict[str, float]
 BOARD = "tensorboard"  # folder of TensorBoard's files, beside the JSON lines
@@ -27,8 +26,8 @@ class Counting(Protocol):
     statistics: EpisodeStatistics
 
 
-def metrics_row(trainer: Counting, update: Update, seconds: float) -> Row:
-    """One row of figures: the episodes ended since the last row, and the latest update's.
+def metrics_row(trainer: Counting, figures: Mapping[str, float], seconds: float) -> Row:
+    """One row of figures: the episodes ended since the last row, and the latest update's own.
 
     seconds: training time so far, checkpoints and evaluation left out.
     """
@@ -39,7 +38,7 @@ def metrics_row(trainer: Counting, update: Update, seconds: float) -> Row:
         "seconds": round(seconds, 3),
         **episode_figures(totals),
         "solved_targets": trainer.statistics.solved,
-        **{name: _short(value) for name, value in vars(update).items()},
+        **{name: _short(value) for name, value in figures.items()},
     }
 
 

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from clearway.envs.world import World
 from clearway.errors import RunError
-from clearway.learn.config import Learner
+from clearway.learn.on_policy import OnPolicy
 
 ROTATION_SALT = 1_000_033
 
@@ -46,7 +46,7 @@ class Rotation:
         return order[number * self.scene_count // self.sets : (number + 1) * self.scene_count // self.sets].sort()[0]
 
 
-def divided_envs(world: World, learner: Learner, scenes: Tensor) -> tuple[int, ...]:
+def divided_envs(world: World, learner: OnPolicy, scenes: Tensor) -> tuple[int, ...]:
     """Environments of each scene, (C,); 0 of all but `scenes`, which share them and have one each at least.
 
     Raises:
@@ -62,7 +62,7 @@ def divided_envs(world: World, learner: Learner, scenes: Tensor) -> tuple[int, .
     return tuple(counts.tolist())
 
 
-def check_division(world: World, learner: Learner, rotation: Rotation) -> None:
+def check_division(world: World, learner: OnPolicy, rotation: Rotation) -> None:
     """Check that environments suffice for every set that the rotation could deal: the smallest scene with the largest.
 
     Raises:
@@ -77,20 +77,20 @@ def check_division(world: World, learner: Learner, rotation: Rotation) -> None:
     _check_rows(learner, max(1, int(least * learner.envs)))  # rounded up it is more
 
 
-def _shares(world: World, learner: Learner, scenes: Tensor) -> Tensor:
+def _shares(world: World, learner: OnPolicy, scenes: Tensor) -> Tensor:
     """Share of the environments that each scene is due, (C,) float64; 0 of all but `scenes`."""
     states = torch.zeros(world.scene_count, dtype=torch.float64)
     states[scenes] = torch.diff(world.scene_offset).cpu().double()[scenes]
     return states / states.sum() if learner.envs_by == "states" else (states > 0).double() / len(scenes)
 
 
-def _check_envs(learner: Learner, scenes: int) -> None:
+def _check_envs(learner: OnPolicy, scenes: int) -> None:
     if learner.envs < scenes:
         other = "fewer scenes_at_once" if learner.scenes_at_once else "walk some scenes at a time (scenes_at_once)"
         raise RunError(f"{learner.envs} environments for {scenes} scenes. Give more environments (envs), or {other}")
 
 
-def _check_rows(learner: Learner, envs: int) -> None:
+def _check_rows(learner: OnPolicy, envs: int) -> None:
     """Check that a scene with so many environments has rows for every minibatch."""
     if envs * learner.rollout_steps < learner.minibatches:
         raise RunError(

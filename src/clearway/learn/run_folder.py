@@ -1,6 +1,7 @@
 """A run folder: what was asked for, how it went, and its checkpoints.
 
-run.json         learner, reward, seed, zone level, scenes with their targets and digests, versions, hardware, command
+run.json         the learner (algorithm and its own settings), reward, seed, zone level, scenes with their targets and
+                 digests, versions, hardware, command
 metrics.jsonl    one row of figures a line (docs/metrics.md)
 checkpoints/     see `checkpoint`
 milestones/N/    the agent after N frames, where it was asked for: a checkpoint to act from, not to train on from
@@ -24,13 +25,15 @@ import numpy as np
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.files import parse_json, read_json, written_whole
-from clearway.learn.config import ADDED_LATER, Learner
+from clearway.learn.algorithms import algorithm
+from clearway.learn.learner import Learner
+from clearway.learn.old_runs import own_settings
 from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
 
 
@@ -78,7 +81,8 @@ class RunRecord:
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
-        return {**asdict(self), "reward": self.reward.to_json()}
+        learner = {"algorithm": self.learner.algorithm, **asdict(self.learner)}
+        return {**asdict(self), "learner": learner, "reward": self.reward.to_json()}
 
     def same_experiment(self, other: RunRecord) -> bool:
         """Both would give the same agent: all but versions, hardware, paths and command agree."""
@@ -202,7 +206,7 @@ class RunFolder:
         if found > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
-            return _record_from(content)
+            return _record_from(content, found)
         except (KeyError, TypeError, AttributeError, OverflowError, RunError) as error:
             reason, remedy = str(error).rstrip(".")[:300], "Restore it or train again"
             by = _maker(content)
@@ -243,13 +247,13 @@ class RunFolder:
                 part.write_text(text)
 
 
-def _record_from(content: Mapping[str, Any]) -> RunRecord:
+def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
     wanted = {"seed": int, "zone_level": ZoneLevel, "versions": dict, "hardware": dict, "command": list}
     for name, kind in wanted.items():
         if not _fits(content[name], kind):
             raise TypeError(f"{name} is {content[name]!r:.40}")
     return RunRecord(
-        learner=_settings(Learner, {**ADDED_LATER, **content["learner"]}),
+        learner=_learner(content["learner"], version),
         reward=reward_from_json(content["reward"]),
         seed=content["seed"],
         zone_level=content["zone_level"],
@@ -258,6 +262,12 @@ def _record_from(content: Mapping[str, Any]) -> RunRecord:
         hardware=content["hardware"],
         command=tuple(content["command"]),
     )
+
+
+def _learner(content: Mapping[str, Any], version: int) -> Learner:
+    kind = algorithm(content["algorithm"])
+    settings = {name: value for name, value in content.items() if name != "algorithm"}
+    return _settings(kind, own_settings(kind, settings) if version == 1 else settings)
 
 
 def _maker(content: Mapping[str, Any]) -> str:
@@ -271,8 +281,9 @@ def _settings(kind: type[Learner], content: Mapping[str, Any]) -> Learner:
     expected = {field.name for field in fields(kind)}
     if set(content) != expected:
         raise KeyError(", ".join(sorted(set(content) ^ expected)))
-    for name, wanted in get_type_hints(kind).items():
-        if not _fits(content[name], wanted):
+    types = get_type_hints(kind)
+    for name in expected:
+        if not _fits(content[name], types[name]):
             raise TypeError(f"{name} is {content[name]!r:.40}")
     return kind(**content)
 

@@ -4,25 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from clearway.errors import RunError
-from clearway.learn.config import Learner
+from clearway.learn.learner import Learner
+
+Kind = TypeVar("Kind", bound=Learner)
 
 
-def with_settings(learner: Learner, words: Sequence[str]) -> Learner:
+def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
     """The learner with settings such as "envs=200" changed.
 
     Raises:
         RunError: a word is not name=value or names no setting, its value has the wrong type, or the settings cannot
             work together.
     """
-    known, types = asdict(learner), get_type_hints(Learner)
+    known, types = asdict(learner), get_type_hints(type(learner))
     changes: dict[str, Any] = {}
     for word in words:
         name, equals, text = word.partition("=")
         if not equals or name not in known:
-            raise RunError(f"--set {word}: expected name=value with a name among {', '.join(known)}. Correct it")
+            names = f"a name among {learner.algorithm}'s settings: {', '.join(known)}"
+            raise RunError(f"--set {word}: expected name=value with {names}. Correct it")
         choices = get_args(types[name]) if get_origin(types[name]) is Literal else ()
         changes[name] = _parsed(word, text, known[name], choices)
     return replace(learner, **changes)

@@ -7,9 +7,10 @@ from torch import Tensor
 from clearway.envs.feature_store import all_finite, evenly_spaced
 from clearway.envs.world import World
 from clearway.errors import RunError
-from clearway.learn.config import Learner
+from clearway.learn.learner import OnFeatures
+from clearway.learn.on_policy import OnPolicy
 from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp
-from clearway.model.feature_map import FeatureMap
+from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.network import SiameseActorCritic
 
 FITTED_STATES = 32_768  # states that a feature map is fitted to: evenly spaced ones, where there are more
@@ -26,8 +27,8 @@ def check_seed(seed: int) -> None:
         raise RunError(f"seed is {seed}, expected 0 to {SEED_LIMIT - 1}. Give a seed in that range")
 
 
-def checked_features(world: World) -> Tensor:
-    """The world's features (S, F).
+def network_input(world: World, learner: OnFeatures) -> tuple[FeatureMap, Tensor]:
+    """What prepares the world's features for the network, and all of them prepared, see `prepared_features`.
 
     Raises:
         RunError: there are none, or some are not finite.
@@ -36,10 +37,11 @@ def checked_features(world: World) -> Tensor:
         raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
     if not all_finite(world.features):
         raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
-    return world.features
+    feature_map = fitted_features(world.features, learner)
+    return feature_map, prepared_features(world, feature_map)
 
 
-def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
+def fitted_features(features: Tensor, learner: OnFeatures) -> FeatureMap:
     """The network's input for the features (S, F), as the settings have it; fitted to `FITTED_STATES` at most."""
     sample = evenly_spaced(features, FITTED_STATES)
     return FeatureMap.fitted(
@@ -47,7 +49,7 @@ def fitted_features(features: Tensor, learner: Learner) -> FeatureMap:
     )
 
 
-def optimisers(network: SiameseActorCritic, learner: Learner) -> tuple[Optimiser, Optimiser]:
+def optimisers(network: SiameseActorCritic, learner: OnPolicy) -> tuple[Optimiser, Optimiser]:
     """Of the first layer's weight, and of all other parameters."""
     kind = Adam if learner.optimiser == "adam" else SharedRMSProp
     named = dict(network.named_parameters())

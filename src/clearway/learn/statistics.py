@@ -5,13 +5,33 @@ Axis letters: T steps, N environments, M targets.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import torch
 from torch import Tensor
 
-from clearway.learn.rollout import Rollout
-
 WINDOW = 20  # episodes of a target after which its success rate is taken anew
 EPISODES, REACHED, STEPS, COLLISIONS = range(4)
+
+
+class Counted(Protocol):
+    """What is counted of T steps of N environments, (T, N) each."""
+
+    @property
+    def target(self) -> Tensor:
+        """Int64."""
+
+    @property
+    def reached(self) -> Tensor:
+        """Bool."""
+
+    @property
+    def truncated(self) -> Tensor:
+        """Bool."""
+
+    @property
+    def blocked(self) -> Tensor:
+        """Bool."""
 
 
 class EpisodeStatistics:
@@ -32,7 +52,7 @@ class EpisodeStatistics:
         self.window = torch.zeros(target_count, 2, dtype=torch.float64, device=device)
         self.recent_success = torch.zeros(target_count, dtype=torch.float64, device=device)
 
-    def add(self, rollout: Rollout) -> None:
+    def add(self, rollout: Counted) -> None:
         """Count all steps of a rollout."""
         ended = rollout.reached | rollout.truncated
         steps = _since_the_last_end(torch.ones_like(ended), ended, self.open_steps)

@@ -19,7 +19,6 @@ from torch import Tensor
 from clearway.choices import FeatureStore, ZoneLevel
 from clearway.envs.world import World, make_world
 from clearway.errors import RunError
-from clearway.learn.a3c.trainer import AsyncTrainer
 from clearway.learn.checkpoint import (
     Progress,
     newest_checkpoint,
@@ -28,14 +27,12 @@ from clearway.learn.checkpoint import (
     read_training,
     write_checkpoint,
 )
-from clearway.learn.config import Learner
+from clearway.learn.figures import Figures
+from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
-from clearway.learn.named_tensors import joined
 from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.learn.trainer import Trainer, Update
-from clearway.model.feature_map import FeatureMap
 from clearway.model.precision import multiplies_bfloat16
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
@@ -43,31 +40,35 @@ from clearway.scenes.scene import Scene
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
 SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
-NETWORK = "network."  # tensors of the network among a trainer's
 
 
 class Learning(Protocol):
-    """What a run needs of a trainer, synchronous or not."""
+    """What a run needs of a trainer, whatever the algorithm."""
 
     world: World
-    learner: Learner
     statistics: EpisodeStatistics
-    feature_map: FeatureMap
     frames: int
     updates: int
+
+    @property
+    def learner(self) -> Learner:
+        """The settings."""
 
     @property
     def finished(self) -> bool:
         """All frames of the settings are used."""
 
-    def update(self) -> Update:
-        """Learn from some more frames."""
+    def update(self) -> Figures:
+        """Learn from some more frames; returns the algorithm's figures, see docs/metrics.md."""
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on, besides `frames` and `updates`."""
 
     def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
         """Go on from where `tensors` was called, after that many frames and updates."""
+
+    def fixed_tensors(self) -> dict[str, Tensor]:
+        """What an agent needs to act, besides `Learner.acts_on` of `tensors`, and training does not change."""
 
     def close(self) -> None:
         """Give back what lives outside this process's own memory, such as other processes."""
@@ -111,12 +112,10 @@ class RunRequest:
         return replace(record, hardware={**record.hardware, **where})
 
     def trainer(self) -> Learning:
-        """A trainer at its first frame. A3C runs in as many processes as torch has threads."""
+        """A trainer at its first frame."""
         device = usable_device(self.device)
         world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store).to(device)
-        if self.learner.algorithm == "a3c":
-            return AsyncTrainer(world, self.learner, self.reward, self.seed, torch.get_num_threads())
-        return Trainer(world, self.learner, self.reward, self.seed)
+        return self.learner.trainer(world, self.reward, self.seed)
 
 
 def train(
@@ -223,7 +222,7 @@ def _run(
     log = MetricsLog(folder.metrics_path, folder.metrics(), seconds)
     seen, rows = trainer.frames, _rows_due(trainer)
     saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
-    update: Update | None = None
+    update: Figures | None = None
 
     def tell() -> None:
         """Keep the milestones gone by, and write the row that is due."""
@@ -267,7 +266,7 @@ def _rows_due(trainer: Learning) -> int:
 def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
     """Write a checkpoint of the trainer as it stands."""
     tensors = trainer.tensors()
-    training = {key: value for key, value in tensors.items() if not key.startswith(NETWORK)}
+    training = {key: value for key, value in tensors.items() if not _acts(trainer, key)}
     progress = Progress(trainer.frames, trainer.updates, seconds)
     write_checkpoint(folder.checkpoints, _agent(trainer, tensors), training, progress)
 
@@ -282,19 +281,24 @@ def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
 
 
 def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The parameters, and the map that prepares features.
+    """What is needed to act: of a network the parameters, and the map that prepares features.
 
     Raises:
         RunError: a parameter is not finite.
     """
-    network = {key: value for key, value in tensors.items() if key.startswith(NETWORK)}
-    broken = [name for name, tensor in network.items() if not tensor.isfinite().all()]
+    learnt = {key: value for key, value in tensors.items() if _acts(trainer, key)}
+    broken = [name for name, tensor in learnt.items() if not tensor.isfinite().all()]
     if broken:
         raise RunError(
             f"{broken[0]} holds NaN or Inf after {trainer.frames} frames. Training stopped; "
             "lower the learning rate or check the features"
         )
-    return network | joined({"features": trainer.feature_map.tensors()})
+    return learnt | trainer.fixed_tensors()
+
+
+def _acts(trainer: Learning, name: str) -> bool:
+    """Whether an agent needs the trainer's tensor of that name to act."""
+    return name.startswith(f"{trainer.learner.acts_on}.")
 
 
 @contextmanager

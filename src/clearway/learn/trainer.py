@@ -1,4 +1,4 @@
-"""The synchronous trainer: rollout, advantages, update; one call an update, no files and no printing.
+"""The synchronous trainer of PPO and A2C: rollout, advantages, update; one call an update, no files and no printing.
 
 Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
 """
@@ -15,20 +15,19 @@ from torch import Tensor
 from clearway.envs.navigation import Navigation, TargetChoice
 from clearway.envs.streams import Streams
 from clearway.envs.world import World
-from clearway.errors import RunError
-from clearway.learn.config import Learner
+from clearway.learn.figures import Figures, check_finite
 from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.lookahead import Observed, better_policy
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient, merged
 from clearway.learn.minibatches import Minibatch, dealt_epochs
 from clearway.learn.named_tensors import joined, part_of
+from clearway.learn.on_policy import OnPolicy
 from clearway.learn.optimiser import clip_gradients
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.rotation import Rotation, check_division, divided_envs
-from clearway.learn.setup import check_seed, checked_features, fitted_features, optimisers
+from clearway.learn.setup import check_seed, network_input, optimisers
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
@@ -36,35 +35,6 @@ from clearway.model.sums import counted
 from clearway.reward import Reward
 
 SHUFFLE_SALT = 1_000_003
-
-
-@dataclass(frozen=True)
-class Update:
-    """Figures of one update, means over its minibatches; floats.
-
-    Attributes:
-        loss, policy_loss, value_loss, entropy: see `losses`.
-        clipped: share of rows whose probability ratio lies outside PPO's clip.
-        gradient_norm: before clipping.
-        explained_variance: 1 - Var(R - V) / Var(R) of the rollout.
-        hindsight_rows: rows that hindsight added.
-        distinct_pairs, distinct_histories: pairs of a history and a target, and histories, that the network computed
-            for a row learnt from, see `minibatches`.
-        lr, entropy_weight: as used.
-    """
-
-    loss: float
-    policy_loss: float
-    value_loss: float
-    entropy: float
-    clipped: float
-    gradient_norm: float
-    explained_variance: float
-    hindsight_rows: int
-    distinct_pairs: float
-    distinct_histories: float
-    lr: float
-    entropy_weight: float
 
 
 @dataclass(frozen=True)
@@ -83,7 +53,7 @@ class Trainer:
 
     Args:
         world: tables of the scenes and targets; must hold features.
-        learner: the settings.
+        learner: the settings, of PPO or A2C.
         reward: what is earned.
         seed: of parameters, environments, actions and shuffling.
 
@@ -92,9 +62,9 @@ class Trainer:
             rows than there are minibatches.
     """
 
-    def __init__(self, world: World, learner: Learner, reward: Reward, seed: int) -> None:
+    def __init__(self, world: World, learner: OnPolicy, reward: Reward, seed: int) -> None:
         check_seed(seed)
-        self.feature_map = fitted_features(checked_features(world), learner)
+        self.feature_map, features = network_input(world, learner)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
         self.rotation = Rotation(world.scene_count, learner.scenes_at_once, learner.scene_updates, seed)
@@ -108,7 +78,7 @@ class Trainer:
         dtype = factor_dtype(learner.matmul_precision, device)
         self.lookup = LookupNetwork(
             self.network,
-            prepared_features(world, self.feature_map),
+            features,
             world.target_state,
             dtype,
             most_seen=self.env_count * (learner.history_length + learner.rollout_steps),
@@ -142,8 +112,8 @@ class Trainer:
         """All frames of the settings are used."""
         return self.frames >= self.learner.frames
 
-    def update(self) -> Update:
-        """Gather one rollout and learn from it.
+    def update(self) -> Figures:
+        """Gather one rollout and learn from it; returns figures of it, see docs/metrics.md.
 
         Raises:
             RunError: the loss or a gradient is not finite.
@@ -166,14 +136,14 @@ class Trainer:
         self.frames += self.frames_per_update
         self.updates += 1
         self._rebalance()
-        result = Update(
-            **_figures(steps, explained),
-            hindsight_rows=len(batch) - rows,
-            distinct_pairs=sum(step.pairs for step in steps) / sum(step.rows for step in steps),
-            distinct_histories=sum(step.histories for step in steps) / sum(step.rows for step in steps),
-            lr=lr,
-            entropy_weight=settings.entropy_weight,
-        )
+        result = {
+            **self._loss_figures(steps, explained),
+            "hindsight_rows": len(batch) - rows,
+            "distinct_pairs": sum(step.pairs for step in steps) / sum(step.rows for step in steps),
+            "distinct_histories": sum(step.histories for step in steps) / sum(step.rows for step in steps),
+            "lr": lr,
+            "entropy_weight": settings.entropy_weight,
+        }
         check_finite(result, self.frames)
         return result
 
@@ -313,6 +283,19 @@ class Trainer:
             self.siamese_optimiser.step(lr * learner.siamese_lr)
         return Step(loss, norm, len(part.rows), part.pair_count, part.history_count)
 
+    def _loss_figures(self, steps: list[Step], explained: Tensor) -> Figures:
+        """Figures of the loss, read from the device at once: means over steps, and the explained variance."""
+        names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
+        told = [
+            torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped, s.norm])
+            for s in steps
+        ]
+        *means, last = torch.cat([torch.stack(told).mean(0), explained[None]]).tolist()
+        figures = {**dict(zip(names, means, strict=True)), "explained_variance": last}
+        if math.isinf(self.learner.ratio_clip):
+            del figures["clipped"]
+        return figures
+
     def _rebalance(self) -> None:
         """Draw targets more often that are reached less often."""
         self.statistics.refresh_success()
@@ -320,6 +303,10 @@ class Trainer:
             choice = self.navigation.choice
             weight = 1 + self.learner.balance * (1 - self.statistics.recent_success)
             choice.reweigh(torch.where(choice.weights > 0, weight[choice.members], 0.0))
+
+    def fixed_tensors(self) -> dict[str, Tensor]:
+        """The map that prepares features."""
+        return joined({"features": self.feature_map.tensors()})
 
     def close(self) -> None:
         """Nothing is held that would have to be given back; see `Learning` in `train`."""
@@ -358,27 +345,3 @@ def scene_of_envs(envs_per_scene: Sequence[int], device: torch.device) -> Tensor
     """The scene of every environment, (N,) int64; environments are ordered by scene."""
     counts = torch.tensor(envs_per_scene, device=device)
     return torch.arange(len(counts), device=device).repeat_interleave(counts)
-
-
-def _figures(steps: list[Step], explained: Tensor) -> dict[str, float]:
-    """What `Update` tells of the loss, read from the device at once: means over steps, and the explained variance."""
-    names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
-    told = [
-        torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped, s.norm]) for s in steps
-    ]
-    *means, last = torch.cat([torch.stack(told).mean(0), explained[None]]).tolist()
-    return {**dict(zip(names, means, strict=True)), "explained_variance": last}
-
-
-def check_finite(update: Update, frames: int) -> None:
-    """Stop where an update, the last of so many frames, has gone astray.
-
-    Raises:
-        RunError: the loss or the gradient's norm is not finite.
-    """
-    for name, value in (("loss", update.loss), ("gradient norm", update.gradient_norm)):
-        if not math.isfinite(value):
-            raise RunError(
-                f"the {name} is {value} after {frames} frames. Training stopped; "
-                "lower the learning rate or check the features"
-            )

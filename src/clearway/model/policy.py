@@ -10,7 +10,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
-from clearway.envs.world import World
+from clearway.envs.world import DistanceTable, World
 from clearway.model.lookup import LookupNetwork
 
 Policy = Callable[[Tensor, Tensor], Tensor]
@@ -27,6 +27,12 @@ def sampled(probabilities: Tensor, uniform: Tensor) -> Tensor:
     """
     bounds = probabilities.to(torch.float64).cumsum(1)
     return ((uniform * bounds[:, -1])[:, None] >= bounds[:, :-1]).sum(1)
+
+
+def shortest_path_actions(world: World, steps_to_go: DistanceTable, state: Tensor, target: Tensor) -> Tensor:
+    """(B, A) bool: actions that begin a shortest path from states (B,) int64 to targets (B,); none without a path."""
+    after = steps_to_go[target[:, None], world.next_state[state]]  # (B, A)
+    return (after == steps_to_go[target, state][:, None] - 1) & (after >= 0)
 
 
 Critic = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]

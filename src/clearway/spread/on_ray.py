@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -72,6 +72,8 @@ def _pass_on(ray: Any, answer: Future[Result], told: Future[Result], died: Calla
     error = answer.exception()
     if error is None:
         told.set_result(answer.result())
+    elif isinstance(error, ray.exceptions.TaskCancelledError):
+        told.set_exception(CancelledError())
     elif isinstance(error, ray.exceptions.RayTaskError):
         told.set_exception(error.cause if isinstance(error.cause, ClearwayError) else error)
     elif isinstance(error, ray.exceptions.RayError):

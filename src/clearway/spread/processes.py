@@ -93,7 +93,9 @@ class _Crew:
         with self.lock:
             if self.ending:
                 raise CancelledError
-            messages = self.files.enter_context(tempfile.TemporaryFile()) if self.work.keeps_messages else None
+            messages = None
+            if self.work.keeps_messages:
+                messages = self.files.enter_context(tempfile.TemporaryFile())  # noqa: SIM115 - closed by `close`
             process = _Process({**self.work.environment, **os.environ}, messages)
             self.started.append(process)
         process.send(self.message)

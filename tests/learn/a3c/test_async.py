@@ -20,12 +20,12 @@ from clearway.learn.a3c.process import world_tensors
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.a3c.trainer import AsyncTrainer
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
-from clearway.learn.config import PAPER_A3C
+from clearway.learn.figures import Figures
 from clearway.learn.load import load_agent
 from clearway.learn.named_tensors import part_of
+from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest
-from clearway.learn.trainer import Update
 from clearway.reward import COLLISION_AWARE
 from plain_a3c import PlainA3C
 from small_runs import equal_bits, small_learner, small_network, small_request, small_world
@@ -72,7 +72,7 @@ def test_one_process_repeats_and_resumes_bit_for_bit(tmp_path: Path, monkeypatch
     with monkeypatch.context() as patch:
         go_on = AsyncTrainer.update
 
-        def update(trainer: AsyncTrainer) -> Update:
+        def update(trainer: AsyncTrainer) -> Figures:
             if trainer.frames >= 150:
                 signal.raise_signal(signal.SIGINT)
             return go_on(trainer)
@@ -151,7 +151,7 @@ from pathlib import Path
 import torch
 from clearway.learn.train import train
 from small_runs import small_learner, small_request
-from clearway.learn.config import PAPER_A3C
+from clearway.learn.presets import PAPER_A3C
 torch.set_num_threads(2)
 train(small_request(learner=small_learner(PAPER_A3C, frames=10_000_000, rollout_steps=5)), Path(sys.argv[1]))
 """

@@ -9,8 +9,9 @@ Axis letters: R workers of this process (ordered by scene), T steps, K history, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -18,16 +19,16 @@ from torch import Tensor
 from clearway.envs.navigation import Navigation, Transition
 from clearway.envs.streams import Streams
 from clearway.envs.world import World
+from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.gradients import clip_scales, clipped, squared_norms, window_rows
 from clearway.learn.a3c.local import LocalNetwork
 from clearway.learn.a3c.rmsprop import SharedRMSPropUpdate
-from clearway.learn.config import Learner
+from clearway.learn.figures import Figures
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
-from clearway.learn.trainer import Update
 from clearway.model.network import NetworkShape
 from clearway.reward import Reward
 
@@ -70,7 +71,7 @@ class Round:
     frames: int
     updates: int
     totals: Tensor
-    figures: Update
+    figures: Figures
 
 
 class WorkerGroup:
@@ -87,7 +88,7 @@ class WorkerGroup:
     def __init__(
         self,
         world: World,
-        learner: Learner,
+        learner: A3C,
         reward: Reward,
         seed: int,
         workers: Tensor,
@@ -126,24 +127,21 @@ class WorkerGroup:
         segments = self._walk(totals)
         length = segments.length
         rates = [learner.lr_at(frames + count) for count in (length.cumsum(0) - length).tolist()]
-        settings = replace(LossSettings.after(frames, learner), sum_loss=True)  # a mean is taken segment by segment
+        weight = learner.entropy_weight_at(frames)
+        settings = LossSettings(weight, learner.value_weight, math.inf, sum_loss=True)  # means: segment by segment
         terms, gradient, explained = self._loss(segments, settings)
         norm = self._update(gradient, rates)
         steps, updates = int(length.sum()), len(rates)
-        figures = Update(
-            loss=float(terms.total) / (updates if learner.sum_loss else steps),
-            policy_loss=float(terms.policy),
-            value_loss=float(terms.value),
-            entropy=float(terms.entropy),
-            clipped=0.0,
-            gradient_norm=norm,
-            explained_variance=explained,
-            hindsight_rows=0,
-            distinct_pairs=1.0,
-            distinct_histories=1.0,
-            lr=rates[0],
-            entropy_weight=settings.entropy_weight,
-        )
+        figures = {
+            "loss": float(terms.total) / (updates if learner.sum_loss else steps),
+            "policy_loss": float(terms.policy),
+            "value_loss": float(terms.value),
+            "entropy": float(terms.entropy),
+            "gradient_norm": norm,
+            "explained_variance": explained,
+            "lr": rates[0],
+            "entropy_weight": weight,
+        }
         return Round(steps, updates, totals, figures)
 
     def _walk(self, totals: Tensor) -> Segments:

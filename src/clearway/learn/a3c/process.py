@@ -16,11 +16,11 @@ import torch
 from torch import Tensor
 
 from clearway.envs.world import World
+from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import Round, WorkerGroup
 from clearway.learn.a3c.shared import SharedTensors
-from clearway.learn.config import Learner
+from clearway.learn.figures import Figures
 from clearway.learn.named_tensors import part_of
-from clearway.learn.trainer import Update
 from clearway.reward import Reward
 
 
@@ -39,7 +39,7 @@ class Report:
     frames: int
     updates: int
     totals: np.ndarray
-    figures: Update
+    figures: Figures
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Assignment:
     number: int
     workers: tuple[int, ...]
     scene_names: tuple[str, ...]
-    learner: Learner
+    learner: A3C
     reward: Reward
     seed: int
     shared: SharedTensors

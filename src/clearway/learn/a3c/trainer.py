@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -20,16 +20,15 @@ from torch import Tensor
 from clearway.children import signals_held
 from clearway.envs.world import World
 from clearway.errors import RunError
+from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import WorkerGroup
 from clearway.learn.a3c.process import Assignment, Message, Report, work, world_tensors
 from clearway.learn.a3c.shared import SharedTensors
-from clearway.learn.config import Learner
+from clearway.learn.figures import Figures, check_finite
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import EPSILON
-from clearway.learn.setup import check_seed, checked_features, fitted_features
+from clearway.learn.setup import check_seed, network_input
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.learn.trainer import Update, check_finite
-from clearway.model.feature_map import prepared_features
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 
@@ -43,7 +42,7 @@ class AsyncTrainer:
 
     Args:
         world: tables of the scenes and targets; must hold features, on the processor.
-        learner: the settings, algorithm "a3c"; `envs` workers, worker i for target i modulo the number of targets.
+        learner: the settings; `envs` workers, worker i for target i modulo the number of targets.
         reward: what is earned.
         seed: of parameters, environments and actions. With one process a seed repeats bit for bit; with more, the
             order in which they meet in shared memory is not repeatable.
@@ -53,9 +52,8 @@ class AsyncTrainer:
         RunError: features are missing or not finite, there are fewer workers than targets, or no memory is left.
     """
 
-    def __init__(self, world: World, learner: Learner, reward: Reward, seed: int, processes: int = 1) -> None:
+    def __init__(self, world: World, learner: A3C, reward: Reward, seed: int, processes: int = 1) -> None:
         check_seed(seed)
-        features = checked_features(world)
         if world.device.type != "cpu":
             raise RunError(f"a3c on the device {world.device}, expected cpu. Leave out --device")
         if learner.envs < world.target_count:
@@ -64,18 +62,18 @@ class AsyncTrainer:
             )
         self.world, self.learner, self.reward, self.seed = world, learner, reward, seed
         self.frames, self.updates = 0, 0
-        self.feature_map = fitted_features(features, learner)
+        self.feature_map, features = network_input(world, learner)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
         self.process_count = min(processes, learner.envs)
-        self.shared = self._new_shared()
+        self.shared = self._new_shared(features)
         self._processes: list[SpawnProcess] = []
         self._connections: list[Connection] = []
         self._paused = False
-        self._figures: list[Update] = []
+        self._figures: list[Figures] = []
 
-    def _new_shared(self) -> SharedTensors:
-        """Shared memory with everything at its start."""
-        learner, world = self.learner, replace(self.world, features=prepared_features(self.world, self.feature_map))
+    def _new_shared(self, features: Tensor) -> SharedTensors:
+        """Shared memory with everything at its start; features (S, F) as the network takes them."""
+        learner, world = self.learner, replace(self.world, features=features)
         shape = NetworkShape(world.scene_count, self.feature_map.input_count, learner.width, learner.history_length)
         parameters = {name: p.data for name, p in SiameseActorCritic(shape, self.seed).named_parameters()}
         squares = {name: torch.full_like(tensor, 1 + EPSILON) for name, tensor in parameters.items()}
@@ -102,7 +100,7 @@ class AsyncTrainer:
         """All frames of the settings are used."""
         return self.frames >= self.learner.frames
 
-    def update(self) -> Update:
+    def update(self) -> Figures:
         """Let the workers use some more frames; returns means over their updates.
 
         Raises:
@@ -149,6 +147,10 @@ class AsyncTrainer:
                 tensor.copy_(tensors[f"{name}.{key}"])
         self.statistics.load_tensors(part_of(tensors, "statistics"))
         self.frames, self.updates = frames, updates
+
+    def fixed_tensors(self) -> dict[str, Tensor]:
+        """The map that prepares features."""
+        return joined({"features": self.feature_map.tensors()})
 
     def close(self) -> None:
         """End the processes and wait for them; those that do not end by themselves are killed."""
@@ -242,7 +244,5 @@ def _by_target(workers: int, targets: int) -> Tensor:
     return torch.argsort(torch.arange(workers) % targets, stable=True)
 
 
-def _mean(figures: list[Update]) -> Update:
-    return Update(
-        **{field.name: sum(getattr(f, field.name) for f in figures) / len(figures) for field in fields(Update)}
-    )
+def _mean(figures: list[Figures]) -> Figures:
+    return {name: sum(each[name] for each in figures) / len(figures) for name in figures[0]}

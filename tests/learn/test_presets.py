@@ -1,10 +1,11 @@
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import pytest
 
 from clearway.errors import RunError
-from clearway.learn.config import DEFAULT, PAPER_A2C, PRESETS, Learner
+from clearway.learn.ppo import PPO
+from clearway.learn.presets import DEFAULT, PAPER_A2C, PRESETS
 
 
 def test_the_paper_s_settings() -> None:
@@ -22,9 +23,6 @@ def test_the_paper_s_settings() -> None:
         "gae_lambda": 1.0,
         "hindsight": False,
         "balance": 0.0,
-        "algorithm": "a2c",
-        "epochs": 1,
-        "minibatches": 1,
         "siamese_lr": 1.0,
         "value_weight": 0.5,
         "entropy_start": 0.01,
@@ -47,9 +45,9 @@ def test_the_paper_s_settings() -> None:
         "envs": 100,
         "envs_by": "scenes",
     }
-    # there is one pass, of one minibatch, over all scenes
-    without_meaning = {"ratio_clip", "siamese_step", "lookahead_temperature", "scene_updates"}
+    without_meaning = {"lookahead_temperature", "scene_updates"}  # there is no look-ahead, and no turn
     assert {name: value for name, value in asdict(PAPER_A2C).items() if name not in without_meaning} == published
+    assert (PAPER_A2C.algorithm, PAPER_A2C.epochs, PAPER_A2C.minibatches) == ("a2c", 1, 1)
 
 
 def test_the_default_is_the_recipe() -> None:
@@ -92,12 +90,6 @@ def test_the_default_is_the_recipe() -> None:
     assert PRESETS["paper"] == PAPER_A2C
 
 
-def test_as_a2c_makes_one_pass_and_changes_nothing_else() -> None:
-    changed = {name for name, value in asdict(DEFAULT.as_a2c()).items() if asdict(DEFAULT)[name] != value}
-    assert changed == {"algorithm", "epochs", "minibatches"}
-    assert PAPER_A2C.as_a2c() == PAPER_A2C
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -134,17 +126,4 @@ def test_as_a2c_makes_one_pass_and_changes_nothing_else() -> None:
 def test_settings_out_of_range_are_refused_by_name(name: str, value: float) -> None:
     settings: dict[str, Any] = {name: value}
     with pytest.raises(RunError, match=rf"{name} is {value}, expected"):
-        Learner(**settings)
-
-
-def test_a2c_with_several_passes_is_refused() -> None:
-    with pytest.raises(RunError, match="one pass"):
-        Learner(algorithm="a2c")
-
-
-def test_a_setting_that_came_later_renames_no_older_run() -> None:
-    assert DEFAULT.told_apart_by().keys() == asdict(DEFAULT).keys() - {"heads", "scenes_at_once", "scene_updates"}
-    assert PAPER_A2C.told_apart_by().keys() == DEFAULT.told_apart_by().keys() - {"settle", "matmul_precision"}
-    changed = replace(DEFAULT, heads="shared", scenes_at_once=4, scene_updates=3)
-    assert changed.told_apart_by() == asdict(changed)
-    assert (DEFAULT.head_count(1000), replace(DEFAULT, heads="shared").head_count(1000)) == (1000, 1)
+        PPO(**settings)

@@ -1,0 +1,48 @@
+"""The algorithms by name. Another one is a file with a config class, see `learner`, and a line here.
+
+That of another package needs no line: it is a class derived from `Learner` under an entry point, see `plugins`.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from clearway.errors import RunError
+from clearway.learn.a2c import A2C
+from clearway.learn.a3c.config import A3C
+from clearway.learn.bc import BC
+from clearway.learn.learner import Learner, setting_names
+from clearway.learn.ppo import PPO
+from clearway.learn.q_learning import QLearning
+from clearway.plugins import find_plugin, load_plugin
+
+ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C, BC, QLearning)}
+Kind = TypeVar("Kind", bound=Learner)
+
+
+def algorithm(name: str) -> type[Learner]:
+    """The config class of that name, ours or another package's.
+
+    Raises:
+        RunError: there is none.
+        PluginError: two packages offer one of this name, or it cannot be imported.
+    """
+    if name in ALGORITHMS:
+        return ALGORITHMS[name]
+    plugin = find_plugin("algorithms", name)
+    if plugin is None:
+        raise RunError(f"algorithm {name!r:.40}: expected one of {', '.join(ALGORITHMS)}. Name one of these")
+    kind = load_plugin(plugin)
+    if not isinstance(kind, type) or not issubclass(kind, Learner) or kind.algorithm != name:
+        raise RunError(f"{plugin}: expected a class derived from Learner with algorithm {name!r}. Ask its authors")
+    return kind
+
+
+def carried_over(learner: Learner, kind: type[Kind]) -> Kind:
+    """The settings of another algorithm: this learner's where both have a setting of that name, else its own defaults.
+
+    Raises:
+        RunError: they cannot work together.
+    """
+    shared = set(setting_names(type(learner))) & set(setting_names(kind))
+    return kind(**{name: getattr(learner, name) for name in shared})

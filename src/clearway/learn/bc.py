@@ -1,0 +1,202 @@
+"""Behaviour cloning from shortest paths: what the network reaches when it is told the right actions, without a reward.
+
+The agent walks by its own policy and learns, in every pose that it comes to, which actions begin a shortest path
+(DAgger: Ross, Gordon & Bagnell, AISTATS 2011). The loss is the cross-entropy to the set of these actions,
+
+    L = mean( -log sum_{a right} pi(a) ),
+
+so that it does not matter how the policy shares between equally short ways. The value is not learnt.
+
+Axis letters: T steps, N environments, B = T * N rows, A actions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+from torch import Tensor
+
+from clearway.envs.navigation import Navigation, TargetChoice
+from clearway.envs.streams import Streams
+from clearway.envs.world import World
+from clearway.errors import RunError
+from clearway.learn.figures import Figures, check_finite
+from clearway.learn.learner import Learner, OnFeatures, linear
+from clearway.learn.named_tensors import joined, part_of
+from clearway.learn.optimiser import Adam, clip_gradients
+from clearway.learn.rollout import ACTION_STREAM, Collector, as_rows
+from clearway.learn.setup import check_seed, network_input
+from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.lookup import Activations, LookupNetwork
+from clearway.model.network import NetworkShape, SiameseActorCritic
+from clearway.model.policy import shortest_path_actions
+from clearway.reward import Reward
+from clearway.scenes.actions import ACTION_COUNT
+
+
+@dataclass(frozen=True)
+class BC(OnFeatures, Learner):
+    """Behaviour cloning from shortest paths; rewards play no part."""
+
+    algorithm: ClassVar[str] = "bc"
+
+    frames: int = 1_000_000
+    """Training frames over all environments; schedules end here."""
+    envs: int = 400
+    """Environments side by side, as many for each scene."""
+    rollout_steps: int = 5
+    """Steps of every environment between updates."""
+    epochs: int = 4
+    """Passes over each rollout, as one batch each."""
+    step_limit: int = 40
+    """Steps after which a training episode is cut."""
+    lr_start: float = 5e-4
+    lr_end: float = 5e-5
+    """Adam's learning rate falls linearly from start to end."""
+    clip_norm: float = 0.5
+    """Largest norm of the gradient."""
+
+    def trainer(self, world: World, reward: Reward, seed: int) -> Cloning:
+        """A trainer at its first frame."""
+        return Cloning(world, self, reward, seed)
+
+
+class Cloning:
+    """Learns a policy for a world from its shortest paths.
+
+    Args:
+        world: tables of the scenes and targets; must hold features.
+        learner: the settings.
+        reward: what episodes earn, which nothing is learnt from.
+        seed: of parameters, environments and actions.
+
+    Raises:
+        RunError: the seed is out of range, features are missing or not finite, or a scene has no environment.
+    """
+
+    def __init__(self, world: World, learner: BC, reward: Reward, seed: int) -> None:
+        check_seed(seed)
+        if learner.envs < world.scene_count:
+            raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments (envs)")
+        self.feature_map, features = network_input(world, learner)
+        self.world, self.learner = world, learner
+        self.frames, self.updates = 0, 0
+        scene = torch.arange(learner.envs, device=world.device) * world.scene_count // learner.envs
+        envs_per_scene = torch.bincount(scene, minlength=world.scene_count).tolist()
+        self.rows_per_scene = tuple(count * learner.rollout_steps for count in envs_per_scene)
+        heads = learner.head_count(world.scene_count)
+        shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
+        self.network = SiameseActorCritic(shape, seed).to(world.device)
+        most_seen = learner.envs * (learner.history_length + learner.rollout_steps)
+        self.lookup = LookupNetwork(self.network, features, world.target_state, most_seen=most_seen)
+        self.optimiser = Adam(dict(self.network.named_parameters()))
+        seeds = torch.arange(learner.envs, dtype=torch.int64, device=world.device) + (seed << 32)
+        self.navigation = Navigation(
+            world,
+            learner.paid(reward),
+            seeds,
+            choice=TargetChoice.by_scene(world, scene),
+            step_limit=learner.step_limit,
+            history_length=learner.history_length,
+        )
+        self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
+        self.action_stream = Streams(seeds, ACTION_STREAM)
+        self.collector = Collector(
+            self.navigation, self.lookup, self.action_stream, envs_per_scene, learner.rollout_steps, keep_hidden=True
+        )
+        self.distances = world.distance_table()
+        self.navigation.reset()
+
+    @property
+    def finished(self) -> bool:
+        """All frames of the settings are used."""
+        return self.frames >= self.learner.frames
+
+    def update(self) -> Figures:
+        """Gather one rollout and learn from it; returns figures of it, see docs/metrics.md.
+
+        Raises:
+            RunError: the loss or a gradient is not finite.
+        """
+        lr = linear(self.learner.lr_start, self.learner.lr_end, self.frames, self.learner.frames)
+        self.lookup.refresh()
+        rollout = self.collector.collect()
+        self.statistics.add(rollout)
+        history, target = as_rows(rollout.history), as_rows(rollout.target)
+        right = shortest_path_actions(self.world, self.distances, history[:, -1], target)
+        told = []
+        for number in range(self.learner.epochs):
+            if number:
+                self.lookup.refresh(few_rows=False)
+            told.append(self._step(history, target, right, None if number else rollout.kept, lr))
+        self.frames += len(target)
+        self.updates += 1
+        means = torch.stack(told).mean(0).tolist()
+        result = {**dict(zip(("loss", "agreement", "gradient_norm"), means, strict=True)), "lr": lr}
+        check_finite(result, self.frames)
+        return result
+
+    def _step(self, history: Tensor, target: Tensor, right: Tensor, kept: Activations | None, lr: float) -> Tensor:
+        """One step of the optimiser; returns loss, agreement and the gradient's norm before clipping, (3,).
+
+        kept: the activations of these rows, where the parameters are still those of the rollout.
+        """
+        known = history, target, self.rows_per_scene
+        activations = kept or self.lookup.forward(*known)
+        loss, agreement, gradient = cloning_loss(activations.output, right)
+        self.lookup.backward(*known, activations, gradient)
+        self.lookup.siamese_gradient()
+        norm = clip_gradients(self.network.layer_gradients(), self.learner.clip_norm, each_tensor=False)
+        self.optimiser.step(lr)
+        return torch.stack([loss, agreement, norm])
+
+    def fixed_tensors(self) -> dict[str, Tensor]:
+        """The map that prepares features."""
+        return joined({"features": self.feature_map.tensors()})
+
+    def close(self) -> None:
+        """Nothing is held that would have to be given back; see `Learning` in `train`."""
+
+    def tensors(self) -> dict[str, Tensor]:
+        """All that `load_tensors` needs to go on bit for bit, besides `frames` and `updates`."""
+        parts: dict[str, dict[str, Tensor]] = {
+            "network": {name: p.data for name, p in self.network.named_parameters()},
+            "optimiser": self.optimiser.tensors(),
+            "navigation": self.navigation.tensors(),
+            "statistics": self.statistics.tensors(),
+            "actions": {"drawn": self.action_stream.drawn},
+        }
+        return {name: tensor.detach() for name, tensor in joined(parts).items()}
+
+    @torch.no_grad()
+    def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
+        """Go on from where `tensors` was called, after that many frames and updates."""
+        for name, parameter in self.network.named_parameters():
+            parameter.copy_(tensors[f"network.{name}"])
+        self.optimiser.load_tensors(part_of(tensors, "optimiser"))
+        self.navigation.load_tensors(part_of(tensors, "navigation"))
+        self.statistics.load_tensors(part_of(tensors, "statistics"))
+        self.action_stream.seek(tensors["actions.drawn"].to(self.world.device).clone())
+        self.frames, self.updates = frames, updates
+
+
+def cloning_loss(output: Tensor, right: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The loss, the mean probability of right actions, and the loss's gradient with respect to the outputs.
+
+    Args:
+        output: (B, A + 1) action scores, then the value, of which nothing is learnt.
+        right: (B, A) bool, actions that begin a shortest path; rows without one count for nothing.
+
+    Returns:
+        Two scalars and (B, A + 1).
+    """
+    leaf = output.detach().requires_grad_()
+    told = right.any(1)
+    with torch.enable_grad():
+        log_pi = torch.log_softmax(leaf[:, :ACTION_COUNT], 1)
+        on_right = torch.logsumexp(log_pi.masked_fill(~right, -torch.inf)[told], 1)
+        loss = -on_right.sum() / max(len(on_right), 1)
+        (gradient,) = torch.autograd.grad(loss, leaf)
+    return loss.detach(), on_right.detach().exp().sum() / max(len(on_right), 1), gradient

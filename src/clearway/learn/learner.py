@@ -1,0 +1,165 @@
+"""What the settings of all algorithms have in common: `Learner`, an algorithm with its settings.
+
+An algorithm is a file: a frozen dataclass of its settings, derived from `Learner`, and what it learns with. Settings of
+the same name mean the same in all of them. The names are in `algorithms`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import TYPE_CHECKING, ClassVar
+
+from clearway.errors import RunError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from clearway.envs.world import World
+    from clearway.learn.load import Acting
+    from clearway.learn.run_folder import RunRecord
+    from clearway.learn.train import Learning
+    from clearway.reward import Reward
+
+AT_LEAST_ONE = {"frames", "envs", "rollout_steps", "step_limit", "epochs", "minibatches", "width"}
+AT_LEAST_ONE |= {"scene_updates", "history_length"}
+MORE_THAN_ZERO = {
+    "entropy_start",
+    "entropy_end",
+    "lr_start",
+    "siamese_lr",
+    "clip_norm",
+    "reward_scale",
+    "lookahead_temperature",
+}
+AT_LEAST_ZERO = {
+    "scenes_at_once",
+    "lr_end",
+    "balance",
+    "log_barrier",
+    "lookahead",
+    "ratio_clip",
+    "value_weight",
+    "feature_basis",
+}
+ZERO_TO_ONE = {"discount", "gae_lambda", "step_size", "explore_start", "explore_end"}
+BELOW_ONE = {"settle"}
+
+
+@dataclass(frozen=True)
+class Learner:
+    """An algorithm with its settings: everything that shapes learning apart from scenes, targets, reward and seed.
+
+    Attributes:
+        algorithm: its name.
+        acts_on: the part of the trainer's tensors that an agent needs to act.
+    """
+
+    algorithm: ClassVar[str]
+    acts_on: ClassVar[str] = "network"
+
+    frames: int = 3_000_000
+    """Training frames over all environments; schedules end here."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that cannot work.
+
+        Raises:
+            RunError: a value is out of range.
+        """
+        for name, value in asdict(self).items():
+            _check_range(name, value)
+
+    @property
+    def clip_rewards(self) -> bool:
+        """Whether rewards are clipped to [-1, 1]."""
+        return False
+
+    @property
+    def reward_scale(self) -> float:
+        """What rewards are multiplied by."""
+        return 1.0
+
+    @property
+    def history_length(self) -> int:
+        """Poses that the agent knows, the present one among them."""
+        return 1
+
+    @property
+    def heads_by_scene(self) -> bool:
+        """Whether the agent has a part of its own for every scene, so that it acts in its own scenes alone."""
+        return True
+
+    def head_count(self, scenes: int) -> int:
+        """Heads of a network for so many scenes."""
+        return scenes if self.heads_by_scene else 1
+
+    def paid(self, reward: Reward) -> Reward:
+        """The reward as training pays it: clipped, where it or these settings say so."""
+        return replace(reward, clip=reward.clip or self.clip_rewards)
+
+    def trainer(self, world: World, reward: Reward, seed: int) -> Learning:
+        """A trainer at its first frame.
+
+        Raises:
+            RunError: the seed or the settings do not fit the world.
+        """
+        raise NotImplementedError
+
+    def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> Acting:
+        """The agent of a run from the tensors of its checkpoint, after that many frames.
+
+        Raises:
+            LookupError, RuntimeError, ValueError: the tensors do not fit the run.
+        """
+        from clearway.learn.load import network_agent
+
+        return network_agent(record, tensors, frames)
+
+
+@dataclass(frozen=True)
+class OnFeatures:
+    """Settings of what learns a network on the scenes' features."""
+
+    centre_features: bool = True
+    """Centre features and give them a root mean square of 1, by one global factor."""
+    whiten_features: bool = True
+    """Scale directions down in which features vary more than on average; see `FeatureMap.fitted`."""
+    feature_basis: int = 0
+    """Express features in so many leading principal directions; 0 keeps them. S poses span at most S directions, so a
+    basis of that size loses nothing and costs less where poses are few."""
+    width: int = 512
+    history_length: int = 4
+
+
+def linear(start: float, end: float, frames: int, all_frames: int) -> float:
+    """A setting that goes linearly from start to end over all frames, after some of them."""
+    return start + (end - start) * min(frames / all_frames, 1.0)
+
+
+def geometric(start: float, end: float, frames: int, all_frames: int) -> float:
+    """A setting that goes geometrically from start to end over all frames, after some of them."""
+    return start * (end / start) ** min(frames / all_frames, 1.0)
+
+
+def setting_names(kind: type[Learner]) -> tuple[str, ...]:
+    """Names of an algorithm's settings."""
+    return tuple(field.name for field in fields(kind))
+
+
+def _check_range(name: str, value: object) -> None:
+    if not isinstance(value, int | float):
+        return
+    if not math.isfinite(value):
+        raise RunError(f"{name} is {value}, expected a finite figure. Give a large one instead")
+    if name in AT_LEAST_ONE and value < 1:
+        raise RunError(f"{name} is {value}, expected at least 1. Give a larger {name}")
+    if name in ZERO_TO_ONE and not 0 <= value <= 1:
+        raise RunError(f"{name} is {value}, expected 0 to 1. Give a value in that range")
+    if name in MORE_THAN_ZERO and not value > 0:
+        raise RunError(f"{name} is {value}, expected more than 0. Give a positive {name}")
+    if name in AT_LEAST_ZERO and not value >= 0:
+        raise RunError(f"{name} is {value}, expected at least 0. Give a larger {name}")
+    if name in BELOW_ONE and not 0 <= value < 1:
+        raise RunError(f"{name} is {value}, expected 0 to 1, 1 excluded. Give a value in that range")

@@ -1,0 +1,142 @@
+"""Settings of what `trainer` learns with: those that PPO and A2C share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from clearway.choices import MatmulPrecision
+from clearway.learn.learner import Learner, OnFeatures, geometric, linear
+
+if TYPE_CHECKING:
+    from clearway.envs.world import World
+    from clearway.learn.trainer import Trainer
+    from clearway.reward import Reward
+
+
+@dataclass(frozen=True)
+class OnPolicy(OnFeatures, Learner):
+    """A synchronous actor-critic: all environments walk a rollout, then the network learns from it."""
+
+    # How much experience, and how it is gathered
+    envs: int = 400
+    """Environments side by side, another number being another experiment whatever the seed."""
+    envs_by: Literal["states", "scenes"] = "states"
+    """How environments are divided: in proportion to the scenes' states, or as many for each scene."""
+    rollout_steps: int = 20
+    """Steps of every environment between updates."""
+    step_limit: int = 40
+    """Steps after which a training episode is cut."""
+    scenes_at_once: int = 0
+    """Scenes that are walked at the same time, in turn with the others, see `rotation`; 0: all. With few, training on
+    hundreds of scenes is as fast as on few, and needs no environment for every scene."""
+    scene_updates: int = 2
+    """Updates after which other scenes have their turn."""
+    bootstrap_cut: bool = True
+    """Add the value of the pose where an episode was cut; False treats the cut as an end, as Zhu's code does."""
+
+    # What is learnt from
+    clip_rewards: bool = False
+    """Clip rewards to [-1, 1] (before scaling), as Zhu's training loop does."""
+    reward_scale: float = 0.1
+    """Rewards are multiplied by this, so that the target is worth 1 without clipping."""
+    discount: float = 0.97
+    gae_lambda: float = 0.95
+    """Lambda of generalised advantage estimation; 1 gives n-step returns."""
+    hindsight: bool = True
+    """Learn also from passing other targets of the scene by, with truncated importance ratios."""
+    lookahead: float = 0.04
+    """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better, at the start;
+    falls linearly to 0, see `settle`. 0: none."""
+    lookahead_temperature: float = 0.005
+    """How much better counts: probabilities grow by exp(advantage / temperature) at most."""
+    balance: float = 0.0
+    """A target's weight at reset is 1 + balance * (1 - its recent success); 0 draws all alike."""
+
+    # The loss
+    siamese_lr: float = 2.0
+    """Learning rate of the first layer's weight as a multiple of the others'."""
+    value_weight: float = 0.5
+    """Factor of the mean squared value error, halved: weight * 0.5 * (R - V)^2."""
+    entropy_start: float = 0.02
+    entropy_end: float = 0.002
+    """The entropy bonus falls geometrically from start to end."""
+    log_barrier: float = 1e-3
+    """Weight of the mean log-probability of all actions at the start; falls linearly to 0, see `settle`. It keeps
+    every action possible, where the entropy bonus lets one become certain (Agarwal et al., JMLR 2021, section 5.2)."""
+    settle: float = 0.15
+    """The last share of the frames, in which look-ahead and barrier are 0, so that idle actions die out."""
+    sum_loss: bool = False
+    """Sum the loss over a batch, as A3C does, rather than average it."""
+
+    # The step
+    optimiser: Literal["adam", "rmsprop"] = "adam"
+    """rmsprop is the paper's: epsilon inside the root, mean square starting at 1."""
+    lr_start: float = 5e-4
+    lr_end: float = 5e-5
+    """The learning rate falls linearly from start to end."""
+    clip_norm: float = 0.5
+    """Largest norm of the gradient."""
+    clip_each_tensor: bool = False
+    """Clip every parameter tensor by itself, as Zhu's code does, rather than all together."""
+
+    # The network
+    matmul_precision: MatmulPrecision = "medium"
+    """highest: all arithmetic is float32; medium: factors of matrix products are rounded to bfloat16, and activations
+    kept in it, on devices with instructions for it (elsewhere float32). Sums, outputs, parameters and what the
+    optimiser keeps are float32."""
+    heads: Literal["scene", "shared"] = "scene"
+    """Whether every scene has a last hidden layer and outputs of its own, as published, or all share one. Of 1,000
+    scenes they would be 265 million parameters, stepped with every minibatch."""
+
+    @property
+    def epochs(self) -> int:
+        """Passes over each rollout."""
+        return 1
+
+    @property
+    def minibatches(self) -> int:
+        """Parts that each pass is divided into."""
+        return 1
+
+    @property
+    def siamese_step(self) -> Literal["minibatch", "pass"]:
+        """When the first layer's weight moves: with every minibatch, or once a pass."""
+        return "pass"
+
+    @property
+    def ratio_clip(self) -> float:
+        """Clip of the probability ratio; infinite where nothing is clipped."""
+        return math.inf
+
+    @property
+    def heads_by_scene(self) -> bool:
+        """Whether every scene has a head of its own."""
+        return self.heads == "scene"
+
+    def lr_at(self, frames: int) -> float:
+        """Learning rate after that many frames."""
+        return linear(self.lr_start, self.lr_end, frames, self.frames)
+
+    def entropy_weight_at(self, frames: int) -> float:
+        """Weight of the entropy bonus after that many frames."""
+        return geometric(self.entropy_start, self.entropy_end, frames, self.frames)
+
+    def barrier_weight_at(self, frames: int) -> float:
+        """Weight of the log barrier after that many frames."""
+        return self.log_barrier * self._left_at(frames)
+
+    def lookahead_weight_at(self, frames: int) -> float:
+        """Weight of look-ahead after that many frames."""
+        return self.lookahead * self._left_at(frames)
+
+    def _left_at(self, frames: int) -> float:
+        """What is left of the aids that fall to 0, from 1 to 0."""
+        return 1 - min(frames / ((1 - self.settle) * self.frames), 1.0)
+
+    def trainer(self, world: World, reward: Reward, seed: int) -> Trainer:
+        """A trainer at its first frame."""
+        from clearway.learn.trainer import Trainer
+
+        return Trainer(world, self, reward, seed)

@@ -1,0 +1,54 @@
+"""`clearway train --algorithm`: every algorithm from its name to a table, and what it refuses."""
+
+import json
+
+import pytest
+
+from clearway.learn.algorithms import ALGORITHMS
+from clearway.learn.run_folder import RunFolder
+
+SETTINGS = ("--frames", 400, "--threads", 1, "--set", "envs=10")
+
+
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, name):
+    width = () if name == "q-learning" else ("width=16",)
+    words = ("train", trained.scene, "--out", tmp_path, "--algorithm", name, *SETTINGS, "rollout_steps=8", *width)
+    answer = clearway(*words)
+    assert answer.code == 0, answer
+    record = json.loads((tmp_path / "run.json").read_text())
+    assert (record["learner"]["algorithm"], record["learner"]["envs"]) == (name, 10)
+    assert isinstance(RunFolder(tmp_path).read_record().learner, ALGORITHMS[name])
+    found = clearway("evaluate", tmp_path, "--episodes", 1, "--step-cap", 20, "--json").json
+    assert {"random", "shortest path"} <= {other["agent"] for other in found["others"]}
+    assert clearway("evaluate", tmp_path, "--episodes", 1, "--step-cap", 20, "--pictures", tmp_path / "p").code == 0
+
+
+@pytest.mark.parametrize("command", ["export", "view", "serve", "video"])
+def test_what_needs_a_network_says_that_a_table_has_none(clearway, trained, tmp_path, command):
+    run = tmp_path / "run"
+    assert clearway("train", trained.scene, "--out", run, "--algorithm", "q-learning", *SETTINGS).code == 0
+    out = () if command in ("view", "serve") else ("--out", tmp_path / "out.onnx")
+    assert clearway(command, run, *out).refusal("an agent of q-learning has no network")
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("--algorithm", "a3c", "--set", "hindsight=true"), ("hindsight=true", "a3c's settings", "clip_norm")),
+        (("--algorithm", "q-learning", "--feature-basis", 8), ("feature_basis=8", "q-learning's settings")),
+        (("--preset", "paper", "--set", "epochs=2"), ("epochs=2", "a2c's settings")),
+        (("--algorithm", "bc", "--set", "ratio_clip=0.1"), ("ratio_clip=0.1", "bc's settings")),
+    ],
+)
+def test_a_setting_that_the_algorithm_lacks_is_refused(clearway, trained, tmp_path, words, parts):
+    assert clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(*parts)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_preset_s_settings_go_with_another_algorithm(clearway, trained, tmp_path):
+    words = ("--preset", "paper", "--algorithm", "a3c", "--frames", 200, "--threads", 1, "--set", "envs=7", "width=16")
+    assert clearway("train", trained.scene, "--out", tmp_path, *words).code == 0
+    learner = json.loads((tmp_path / "run.json").read_text())["learner"]
+    assert (learner["algorithm"], learner["clip_norm"], learner["envs"]) == ("a3c", 40.0, 7)
+    assert not {"epochs", "hindsight", "optimiser"} & set(learner)

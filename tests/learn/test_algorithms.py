@@ -1,0 +1,40 @@
+"""The algorithms by name, and settings carried from one to another."""
+
+from dataclasses import asdict, replace
+
+import pytest
+
+from clearway.errors import RunError
+from clearway.learn.a2c import A2C
+from clearway.learn.a3c.config import A3C
+from clearway.learn.algorithms import ALGORITHMS, algorithm, carried_over
+from clearway.learn.bc import BC
+from clearway.learn.ppo import PPO
+from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
+from clearway.learn.q_learning import QLearning
+
+
+def test_algorithms_are_found_by_name() -> None:
+    assert {"ppo": PPO, "a2c": A2C, "a3c": A3C, "bc": BC, "q-learning": QLearning} == ALGORITHMS
+    assert algorithm("a3c") is A3C
+    with pytest.raises(RunError, match=r"algorithm 'dqn': expected one of ppo, a2c, a3c, bc, q-learning"):
+        algorithm("dqn")
+
+
+def test_a_setting_that_an_algorithm_lacks_it_has_nowhere() -> None:
+    assert asdict(PPO()).keys() - asdict(A2C()).keys() == {"epochs", "minibatches", "siamese_step", "ratio_clip"}
+    assert asdict(A3C()).keys() < asdict(A2C()).keys()
+    for name in ("hindsight", "lookahead", "balance", "optimiser", "heads", "matmul_precision", "reward_scale"):
+        assert name not in asdict(A3C())
+    for settings in (BC(), QLearning()):
+        assert not asdict(settings).keys() & {"gae_lambda", "entropy_start", "hindsight", "reward_scale"}
+
+
+def test_settings_of_the_same_name_are_carried_over() -> None:
+    assert carried_over(DEFAULT, A2C) == A2C()
+    assert carried_over(PAPER_A2C, A3C) == replace(PAPER_A3C, envs=100)
+    assert carried_over(PAPER_A3C, A2C).envs == 20
+    assert carried_over(replace(DEFAULT, frames=77, width=33), BC) == replace(
+        carried_over(DEFAULT, BC), frames=77, width=33
+    )
+    assert carried_over(PAPER_A2C, PAPER_A2C.__class__) == PAPER_A2C
