@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from clearway.scenes.scene import Scene
-from made import corridor_scene, grid_scene
+from made import corridor_scene, grid_scene, with_depth
 
 
 def full_scene() -> Scene:
@@ -24,7 +24,7 @@ def full_scene() -> Scene:
         },
     )
     made_by = replace(scene.made_by, notes={"light": {"lamps": 3}, "remark": "ä"})
-    return replace(scene, encoder=encoder, made_by=made_by, cell_size_m=0.5)
+    return with_depth(replace(scene, encoder=encoder, made_by=made_by, cell_size_m=0.5))
 
 
 def published_dump(path: Path, change: Callable[[h5py.File], None] | None = None, axis: int = 10) -> Scene:

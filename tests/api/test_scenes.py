@@ -6,7 +6,7 @@ import pytest
 import clearway
 from clearway.errors import ArgumentError
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene
+from made import corridor_scene, grid_scene, with_depth
 
 
 @pytest.fixture
@@ -62,17 +62,21 @@ def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
 
     calls = []
 
-    def stand_in(name, seed, *, workers, progress):
-        calls.append((name, seed, workers, progress))
-        return grid_scene(seed, name=name, picture_size=(32, 32))
+    def stand_in(name, seed, *, sensors, workers, progress):
+        calls.append((name, seed, sensors, workers, progress))
+        return with_depth(grid_scene(seed, name=name, picture_size=(32, 32)))
 
     monkeypatch.setattr(library, "cached_room_scene", stand_in)
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     out = tmp_path / "rooms/bathroom.h5"
     scene = clearway.build_room("bathroom", np.int64(2), encoder="random-resnet50", out=str(out))
-    assert calls == [("bathroom", 2, None, False)]
+    assert calls == [("bathroom", 2, ("rgb",), None, False)]
     assert scene.encoder_name == "random-resnet50"
     assert np.array_equal(clearway.load_scene(out).features, scene.features)
+    seen = clearway.build_room("bathroom", sensors=["rgb", "depth"], encoder="depth-grid")
+    assert calls[1:] == [("bathroom", 0, ("rgb", "depth"), None, False)]
+    assert seen.features.shape == (seen.state_count, 108)
+    assert seen.seen_by("depth")[:].shape == (seen.state_count, 32, 32)
 
 
 @pytest.mark.parametrize(
@@ -83,10 +87,13 @@ def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
         ({"name": "bathroom", "seed": 1.5}, r"seed=1\.5: expected a whole number"),
         ({"name": "bathroom", "out": "room.txt"}, r"ends in \.h5 or \.hdf5"),
         ({"name": "bathroom", "encoder_seed": -3}, "encoder_seed=-3"),
+        ({"name": "bathroom", "sensors": "rgb"}, r"'rgb' is a text\. Give names"),
+        ({"name": "bathroom", "sensors": ["sonar"]}, r"there is no 'sonar'\. Choose among rgb, depth"),
+        ({"name": "bathroom", "encoder": "depth-grid"}, "depth-grid sees depth, and it is not rendered"),
     ],
 )
 def test_build_room_refuses_before_it_builds(arguments, part) -> None:
-    with pytest.raises(ArgumentError, match=part):
+    with pytest.raises(clearway.ClearwayError, match=part):
         clearway.build_room(**arguments)
 
 
@@ -107,6 +114,23 @@ def test_an_encoder_of_one_s_own_encodes_and_its_features_can_be_trained_on(tmp_
     run = clearway.train(tmp_path / "grid.h5", [5], frames=400, envs=10, rollout_steps=8, width=16, out=tmp_path / "r")
     with pytest.raises(clearway.ClearwayError, match="Brightness: a program of its own made the features"):
         clearway.Navigator(run.folder)
+
+
+class Nearest:
+    identity = "nearest-1"
+    feature_count = 1
+    sensor = "depth"
+
+    def encode(self, depth_m):
+        return depth_m.min((1, 2))[:, None]
+
+
+def test_an_encoder_of_one_s_own_may_take_depth() -> None:
+    (scene,) = clearway.encode_scenes(with_depth(grid_scene(1)), Nearest())
+    np.testing.assert_array_equal(scene.features[:, 0], scene.seen_by("depth")[:].min((1, 2)))
+    assert scene.encoder.settings["sensor"] == "depth"
+    with pytest.raises(clearway.ClearwayError, match="grid: has rgb, but no depth"):
+        clearway.encode_scenes(grid_scene(1), Nearest())
 
 
 class Other(Brightness):

@@ -37,6 +37,7 @@ def digest(scene: Scene) -> str:
     if scene.observations is not None:
         starts = range(0, scene.observations.shape[0], BLOCK_PICTURES)
         arrays += [scene.observations[start : start + BLOCK_PICTURES] for start in starts]
+    arrays += [readings[:] for readings in scene.further]
     for array in arrays:
         found.update(f"{array.shape} {array.dtype}".encode())
         found.update(np.ascontiguousarray(array).data if array.size else b"")
@@ -44,6 +45,7 @@ def digest(scene: Scene) -> str:
     texts = [
         asdict(scene.made_by),
         scene.cell_size_m,
+        [asdict(readings.sensor) for readings in scene.further],
         view and [view.x_min_m, view.x_max_m, view.z_min_m, view.z_max_m],
         encoder and [encoder.name, encoder.identity, encoder.settings, sorted(encoder.arrays)],
     ]
@@ -210,6 +212,31 @@ def bomb(name: str, size: int) -> Change:
     return change
 
 
+def sensed(shape: tuple[int, ...] = (16, 12, 16), change: Change | None = None, **storage: object) -> Change:
+    """A depth sensor, of zeros where no storage is named and else never written; then another change of the file."""
+
+    def all_of_it(file: h5py.File) -> None:
+        values = None if storage else np.zeros(shape, np.uint16)
+        dataset = file.create_dataset("sensors/depth", shape, np.uint16, data=values, **storage)
+        dataset.attrs.update({"dtype": "float32", "unit": "m", "low": 0.0, "high": 20.0, "step": 0.001})
+        if change is not None:
+            change(file)
+
+    return all_of_it
+
+
+def unpack_depth_without_end(file: h5py.File) -> None:
+    file["sensors/depth"].id.write_direct_chunk((0, 0, 0), zeros_deflated(GIB))
+
+
+def link_the_sensors_out(file: h5py.File) -> None:
+    file["sensors"] = h5py.ExternalLink("other.h5", "/sensors")
+
+
+def link_depth_out(file: h5py.File) -> None:
+    file["sensors/depth"] = h5py.ExternalLink("other.h5", "/depth")
+
+
 def zeros_deflated(size: int) -> bytes:
     """A zlib stream of so many zero bytes (whole MiB), put together from the same MiB again and again."""
     packer = zlib.compressobj(6, zlib.DEFLATED, -zlib.MAX_WBITS)
@@ -353,6 +380,16 @@ FAULTS: dict[str, tuple[Change, str]] = {
     "a graph that unpacks to a GiB": (bomb("graph", GIB), "dataset 'graph': is damaged (the chunk at (0, 0)"),
     "features that unpack to a GiB": (bomb("resnet_feature", GIB), "dataset 'resnet_feature': is damaged"),
     "pictures that unpack to a GiB": (bomb("observation", GIB), "dataset 'observation': is damaged"),
+    "depth": (sensed(), ""),
+    "depth never written": (sensed(chunks=(1, 12, 16)), UNWRITTEN),
+    "depth of too few poses": (sensed((15, 12, 16)), "dataset 'sensors/depth': has shape (15, 12, 16)"),
+    "7 TiB of depth": (sensed((16, 700_000, 300_000), chunks=(1, 64, 64)), "sides up to"),
+    "depth that unpacks to a GiB": (
+        sensed(change=unpack_depth_without_end, chunks=(16, 12, 16), compression="gzip"),
+        "dataset 'sensors/depth': is damaged",
+    ),
+    "sensors in another file": (link_the_sensors_out, "dataset 'sensors': is not a group"),
+    "depth in another file": (link_depth_out, "dataset 'depth': is a link"),
     "a GiB of zeros": (fill_the_encoder_with_zeros, "dataset 'encoder/zeros': would take 1,073,741,824 bytes"),
     "packed twice": (pack_twice, "dataset 'graph': is packed in an odd order"),
     "packed by scale and offset": (pack_by_scale_and_offset, "dataset 'graph': is packed with the filter 6"),

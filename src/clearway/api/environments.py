@@ -20,7 +20,7 @@ def make_env(scenes: Scenes, num_envs: int | None = None, **options: Any) -> gym
     Args:
         scenes: a scene, a scene file, a folder of them, or several.
         num_envs: None gives a single environment, a number a vector environment of so many.
-        options: `targets`, `reward`, `observations`, `max_episode_steps` (500 by default), `history_length`,
+        options: `targets`, `reward`, `observations`, `sensors`, `max_episode_steps` (500 by default), `history_length`,
             `zone_level`, `render_mode`, and of a batch `autoreset_mode`; see `clearway.envs.single.ImageGoalEnv`.
 
     Raises:

@@ -148,7 +148,7 @@ def encode_scenes(
         encoded, done = [], 0
         with workers_for(work, workers=workers, ray=ray) as crew:
             for scene in scenes:
-                pictures = _pictures(scene, sensor_of(record))
+                pictures = pictures_of(scene, sensor_of(record))
                 key = joint_key(content_key(pictures), record.identity, shaped_by)
                 make = partial(_encode_all, crew, pictures, batch, show_done, done)
                 features = cached("features", key, make).arrays["features"]
@@ -208,7 +208,8 @@ def _encode_all(
     return Entry({"features": np.concatenate(parts)})
 
 
-def _pictures(scene: Scene, sensor: str = RGB) -> Observations:
+def pictures_of(scene: Scene, sensor: str = RGB) -> Observations:
+    """What a sensor saw of a scene, to be encoded. Raises EncoderError where there is nothing of it."""
     if not scene.sensors:
         raise EncoderError(f"scene {scene.name} has no pictures to encode. Use the features that its file holds")
     try:
@@ -221,7 +222,7 @@ def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessin
     """The record of a random ResNet calibrated on the scenes, from the cache if it was fitted before."""
     if not scenes:
         raise EncoderError(f"encoder {RANDOM} is calibrated on the scenes' pictures, and there are none. Name a scene")
-    by_key = {content_key(_pictures(scene)): _pictures(scene) for scene in scenes}
+    by_key = {content_key(pictures_of(scene)): pictures_of(scene) for scene in scenes}
     ordered = [by_key[key] for key in sorted(by_key)]
 
     def make() -> Entry:
