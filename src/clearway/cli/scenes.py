@@ -30,7 +30,8 @@ class Build:
     seed: int = 0
     """Seed 0 gives the default rooms, another one other colours, textures, pictures and small furniture."""
     encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), or a Hugging Face model."""
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), one of another package (clearway
+    plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None

@@ -12,6 +12,7 @@ That of a program's own cannot say how: its scenes can be trained on, but new pi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
@@ -87,7 +88,7 @@ def own_encoder(made: Any) -> CheckedEncoder:
 
 
 def _checked(
-    made: Any, name: str, fixed: dict[str, object], told: dict[str, object], what: str, remedy: str
+    made: Any, name: str, fixed: Mapping[str, object], told: Mapping[str, object], what: str, remedy: str
 ) -> CheckedEncoder:
     """The encoder, if it has all parts; `told` is kept in its record but is no part of its identity."""
     identity, count = getattr(made, "identity", None), getattr(made, "feature_count", None)
