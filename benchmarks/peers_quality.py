@@ -124,12 +124,7 @@ def tuned_ppo_outcome(world: World, scenes: Sequence[Scene], seed: int, cap_s: f
     """SB3's PPO with the values of our recipe."""
     recipe = DEFAULT
     scale = recipe.reward_scale
-    reward = COLLISION_AWARE.with_changes(
-        alpha=scale * COLLISION_AWARE.alpha,
-        beta=scale * COLLISION_AWARE.beta,
-        gamma=scale * COLLISION_AWARE.gamma,
-        terminal=scale * COLLISION_AWARE.terminal,
-    )
+    reward = COLLISION_AWARE.with_changes(**{name: scale * value for name, value in COLLISION_AWARE.parameters.items()})
     with closing(vec_env("batched", scenes, recipe.envs, reward, recipe.step_limit)) as made:
         model = PPO(
             SiamesePolicy,

@@ -141,7 +141,7 @@ class Bench:
             "targets": {name: list(states) for name, states in self.targets.items()},
             "encoder": encoder_names(self.scenes),
             "learner": asdict(self.learner),
-            "reward": asdict(self.reward),
+            "reward": self.reward.to_json(),
             "criteria": asdict(CRITERIA),
             "every_frames": self.options.every,
             "check_episodes": self.options.episodes,

@@ -5,10 +5,13 @@ State numbering: state = 4 * cell + heading / 90, so the four headings of a cell
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene, TopView
+from clearway.scenes.sensors import Readings, depth
 
 CELL_SIZE_M = 0.5
 STEP_OF_HEADING = np.array([[0, 1], [1, 0], [0, -1], [-1, 0]])  # x and z, for headings 0 to 270
@@ -70,6 +73,12 @@ def scene_of_cells(
         cell_size_m=CELL_SIZE_M,
         top_view=made_up_top_view(cells),
     )
+
+
+def with_depth(scene: Scene) -> Scene:
+    """The scene with made-up depth of the size of its pictures: red as a share of 8 m, in whole millimetres."""
+    sensor = depth(*scene.observations.shape[1:3])
+    return replace(scene, further=(Readings(sensor, sensor.kept(scene.observations[..., 0] * (8 / 255))),))
 
 
 def graph_of_cells(cells: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Small agents and three scenes for the tests of the viewer; one scene has twelve headings and no pictures."""
+"""Small agents and three scenes for the tests of the viewer; one has depth, one twelve headings and no pictures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from clearway.scenes.importers.pose_graph import recorded_pose_graph
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.thor_v1 import write_scene
 from clearway.view.stage import Stage, run_stage
-from made import made_up_features
+from made import made_up_features, with_depth
 from small_runs import FEATURES, small_learner, small_request, small_scenes, small_targets
 
 L_SHAPE = np.array([[0, 0], [0, 1], [0, 2], [1, 2], [2, 2]])
@@ -37,8 +37,9 @@ def bare_scene() -> Scene:
 
 
 def stage_scenes() -> list[Scene]:
-    """A corridor, a grid and the bare L."""
-    return [*small_scenes(), bare_scene()]
+    """A corridor with depth, a grid and the bare L."""
+    corridor, *others = small_scenes()
+    return [with_depth(corridor), *others, bare_scene()]
 
 
 def write_scenes(folder: Path, scenes: list[Scene] | None = None) -> list[Path]:

@@ -9,9 +9,10 @@ import numpy as np
 from clearway.deploy.card import Card
 from clearway.deploy.model import Step
 from clearway.deploy.onnx_file import shifted
+from clearway.scenes.sensors import rgb
 
 NAMES = ("move forward", "turn right", "turn left", "move backward")
-CARD = Card("attic", NAMES, 4, 2, True, {"name": "sums"}, {}, (3, 4), {})
+CARD = Card("attic", NAMES, 4, 2, True, {"name": "sums"}, {}, (3, 4), {}, rgb(3, 4).to_json())
 
 
 class Sums:

@@ -25,6 +25,7 @@ ORDER = (
     {"scenes"},
     {"perception"},
     {"zones"},
+    {"clearance"},
     {"reward"},
     {"envs"},
     {"model"},

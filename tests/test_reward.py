@@ -1,46 +1,205 @@
+from dataclasses import dataclass, replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from clearway.reward import BUMP, COLLISION_AWARE, REWARDS, SHORTEST, Reward
+from clearway.reward import (
+    BUMP,
+    CLEARANCE,
+    COLLISION_AWARE,
+    REWARDS,
+    SHORTEST,
+    Arrival,
+    Clearance,
+    Moves,
+    Reward,
+    RewardError,
+    Term,
+    Time,
+    Zones,
+    reward_from_json,
+    reward_named,
+)
 
 NOT_REACHED, REACHED = 0, 1
-MOVED, BLOCKED = 0, 1
+MOVED, BLOCKED = 0, 1  # actions of the poses below
+FREE, PRECOLLISION, COLLISION = 0, 1, 2  # poses below, by their zones
+
+MOVES = Moves(
+    next_state=np.array([[FREE, FREE], [PRECOLLISION, PRECOLLISION], [COLLISION, COLLISION]]),
+    blocked=np.array([[False, True]] * 3),
+    zone=np.array([0, 1, 2]),
+    clearance_m=np.array([np.inf, 0.4, 0.1]),
+)
+
+
+def steps(reward: Reward, action: int = MOVED) -> list[float]:
+    """What steps into the three poses earn."""
+    return reward.table(MOVES)[NOT_REACHED, :, action].tolist()
+
+
+@dataclass(frozen=True)
+class Doubled(Term):
+    """A term of one's own: all costs times a factor."""
+
+    factor: float = 2.0
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        return self.factor * earned
+
+
+MINE = Reward("mine", (Time(-0.02), Doubled(3.0), Arrival(5.0)))
 
 
 def test_collision_aware_pays_by_the_zone_of_arrival() -> None:
-    table = COLLISION_AWARE.table()
-    assert table.shape == (2, 2, 3)
-    assert table[NOT_REACHED, MOVED].tolist() == [-0.01, -0.011, -0.02]  # free, precollision, collision
-    assert table[NOT_REACHED, BLOCKED].tolist() == [-0.01, -0.011, -0.02]
+    assert COLLISION_AWARE.table(MOVES).shape == (2, 3, 2)
+    assert steps(COLLISION_AWARE) == steps(COLLISION_AWARE, BLOCKED) == [-0.01, -0.011, -0.02]
+
+
+def test_what_counts_is_where_a_step_ends_not_where_it_begins() -> None:
+    onward = replace(MOVES, next_state=np.array([[1, 0], [2, 1], [0, 2]]))
+    assert COLLISION_AWARE.table(onward)[NOT_REACHED, :, MOVED].tolist() == [-0.011, -0.02, -0.01]
+    assert CLEARANCE.table(onward)[NOT_REACHED, :, MOVED].tolist() == pytest.approx([-0.014, -0.026, -0.01])
 
 
 def test_shortest_charges_every_step_alike() -> None:
-    assert SHORTEST.table()[NOT_REACHED].tolist() == [[-0.01] * 3] * 2
+    assert steps(SHORTEST) == steps(SHORTEST, BLOCKED) == [-0.01] * 3
 
 
 def test_bump_charges_a_blocked_move_whatever_the_zone() -> None:
-    table = BUMP.table()
-    assert table[NOT_REACHED, MOVED].tolist() == [-0.01] * 3
-    assert table[NOT_REACHED, BLOCKED].tolist() == [-0.1] * 3
+    assert (steps(BUMP), steps(BUMP, BLOCKED)) == ([-0.01] * 3, [-0.1] * 3)
+
+
+def test_clearance_charges_more_the_nearer_an_obstacle_is() -> None:
+    assert steps(CLEARANCE) == pytest.approx([-0.01, -0.01 - 0.02 * 0.2, -0.01 - 0.02 * 0.8])
+    touching = replace(MOVES, clearance_m=np.array([0.0, 0.5, 0.6]))
+    assert CLEARANCE.table(touching)[NOT_REACHED, :, MOVED].tolist() == pytest.approx([-0.03, -0.01, -0.01])
 
 
 @pytest.mark.parametrize("reward", REWARDS.values(), ids=REWARDS)
 def test_the_target_comes_before_all_zones(reward: Reward) -> None:
-    assert (reward.table()[REACHED] == 10.0).all()
+    assert (reward.table(MOVES)[REACHED] == 10.0).all()
 
 
 @pytest.mark.parametrize("reward", REWARDS.values(), ids=REWARDS)
 def test_clipping_changes_the_target_alone(reward: Reward) -> None:
-    clipped = reward.with_changes(clip=True).table()
-    assert (clipped[REACHED] == 1.0).all()
-    assert np.array_equal(clipped[NOT_REACHED], reward.table()[NOT_REACHED])
+    clipped = reward.with_changes(clip=True)
+    assert (clipped.table(MOVES)[REACHED] == 1.0).all()
+    assert steps(clipped) == steps(reward)
 
 
 def test_clipping_works_downwards_too() -> None:
-    assert Reward("harsh", beta=-3.0, clip=True).table()[NOT_REACHED, MOVED].tolist() == [-0.01, -0.011, -1.0]
+    assert steps(COLLISION_AWARE.with_changes(beta=-3.0, clip=True)) == [-0.01, -0.011, -1.0]
 
 
-def test_with_changes_leaves_what_is_none() -> None:
+def test_changes_leave_what_is_none_and_change_the_name() -> None:
     changed = COLLISION_AWARE.with_changes(beta=-0.5, gamma=None)
-    assert (changed.alpha, changed.beta, changed.gamma, changed.terminal) == (-0.01, -0.5, -0.011, 10.0)
-    assert COLLISION_AWARE.beta == -0.02
+    assert changed.parameters == {"alpha": -0.01, "beta": -0.5, "gamma": -0.011, "terminal": 10.0}
+    assert (changed.name, COLLISION_AWARE.name) == ("collision-aware, beta -0.5", "collision-aware")
+    assert COLLISION_AWARE.parameters["beta"] == -0.02
+    assert COLLISION_AWARE.with_changes(beta=-0.02) == COLLISION_AWARE  # nothing is another
+
+
+def test_a_parameter_of_a_term_that_a_reward_lacks_adds_the_term() -> None:
+    changed = SHORTEST.with_changes(beta=-0.5, clearance=0.04)
+    assert changed.terms == (Time(-0.01), Zones(beta=-0.5), Clearance(0.04, 0.5), Arrival(10.0))
+    assert changed.name == "shortest, beta -0.5, clearance 0.04"
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"delta": 1.0}, "no parameter delta. Choose among alpha, beta"),
+        ({"alpha": float("nan")}, "--alpha is nan, expected a finite number"),
+        ({"clearance_m": 0.0}, "--clearance-m is 0.0, expected more than 0"),
+    ],
+)
+def test_changes_that_cannot_be(parameters: dict, message: str) -> None:
+    with pytest.raises(RewardError, match=message):
+        SHORTEST.with_changes(**parameters)
+
+
+@pytest.mark.parametrize(
+    ("terms", "message"),
+    [
+        ((Time(),), "nothing is earned at the target"),
+        ((Time(), Time(), Arrival()), "a term occurs twice"),
+        ((abs, Arrival()), "is no term"),
+    ],
+)
+def test_terms_that_make_no_reward(terms: tuple, message: str) -> None:
+    with pytest.raises(RewardError, match=message):
+        Reward("wrong", terms)
+
+
+def test_terms_that_earn_nonsense() -> None:
+    with pytest.raises(RewardError, match="NaN or Inf in its term Time"):
+        Reward("wrong", (Time(float("nan")), Arrival())).table(MOVES)
+
+    @dataclass(frozen=True)
+    class Flat(Term):
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned[0]
+
+    with pytest.raises(RewardError, match=r"Flat gives float64 \(2,\), expected \(S, A\)"):
+        Reward("wrong", (Flat(), Arrival())).table(MOVES)
+
+
+def test_a_term_of_one_s_own() -> None:
+    assert steps(MINE) == pytest.approx([-0.06] * 3)
+    assert (MINE.table(MOVES)[REACHED] == 5.0).all()
+    assert str(MINE) == "alpha -0.02, terminal 5, Doubled"
+
+
+@pytest.mark.parametrize("reward", [*REWARDS.values(), BUMP.with_changes(terminal=3.0, clip=True)])
+def test_a_reward_comes_back_from_json(reward: Reward) -> None:
+    assert reward_from_json(reward.to_json()) == reward
+
+
+def test_a_term_of_one_s_own_is_told_in_json_and_not_loaded_from_it() -> None:
+    kept = MINE.to_json()
+    assert kept["terms"] == {f"{__name__}:Doubled": {"factor": 3.0}}
+    read = reward_from_json(kept)
+    assert (read.to_json(), read.is_known, MINE.is_known) == (kept, False, True)
+    assert str(read) == str(MINE)
+    with pytest.raises(RewardError, match="Doubled, which is not loaded"):
+        read.table(MOVES)
+
+
+def test_rewards_that_version_0_1_wrote() -> None:
+    old = {"alpha": -0.01, "beta": -0.01, "gamma": -0.01, "terminal": 10.0, "blocked": None, "clip": False}
+    assert reward_from_json({"name": "shortest", **old}) == SHORTEST
+    assert reward_from_json({"name": "bump", **old, "blocked": -0.1}) == BUMP
+    aware = {**old, "beta": -0.02, "gamma": -0.011}
+    assert reward_from_json({"name": "collision-aware", **aware}) == COLLISION_AWARE
+    changed = reward_from_json({"name": "collision-aware", **aware, "beta": -0.5})
+    assert changed == COLLISION_AWARE.with_changes(beta=-0.5)
+    assert steps(reward_from_json({"name": "other", **aware, "blocked": -0.3}), BLOCKED) == [-0.3] * 3
+
+
+@pytest.mark.parametrize("wrong", [{"alpha": "low"}, {"delta": 1.0}, {"clip": 1}, {"name": 3}])
+def test_json_that_is_no_reward(wrong: dict) -> None:
+    with pytest.raises((KeyError, TypeError)):
+        reward_from_json({**SHORTEST.to_json(), **wrong})
+
+
+def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "their_rewards.py").write_text(
+        "from clearway.reward import Arrival, Reward, Time\n"
+        "slow = Reward('slow', (Time(-0.5), Arrival()))\n"
+        "def made():\n    return slow\n"
+        "nothing = 3\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert reward_named("bump") is BUMP
+    assert reward_named("their_rewards:slow").name == "slow"
+    assert reward_named("their_rewards:made").name == "slow"
+    for name, message in (
+        ("bumps", "'bumps' is unknown. Use one of 'collision-aware'"),
+        ("their_rewards:fast", "cannot be loaded"),
+        ("no_such_module:fast", "cannot be loaded"),
+        ("their_rewards:nothing", "gives 3, expected a clearway.Reward"),
+    ):
+        with pytest.raises(RewardError, match=message):
+            reward_named(name)

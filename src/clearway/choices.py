@@ -2,14 +2,14 @@
 
 from typing import Literal
 
-RewardName = Literal["collision-aware", "shortest", "bump"]
-"""See `clearway.reward.REWARDS`."""
-
 ZoneLevel = Literal["pose", "cell"]
 """See `clearway.zones`."""
 
 RoomName = Literal["bathroom", "bedroom", "living_room", "kitchen"]
 """See `clearway.scenes.rooms`."""
+
+SensorName = Literal["rgb", "depth"]
+"""See `clearway.scenes.sensors`."""
 
 ExperimentName = Literal["table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis"]
 """See `clearway.experiments.catalogue`."""

@@ -1,72 +1,345 @@
-"""The reward, as one table (paper, equation 1).
+"""The reward: a list of named terms, each a small function of tables (paper, equation 1, and more).
 
     f(s_t) = 10 at the target, alpha on an ordinary step, beta in the collision zone, gamma in the precollision zone,
 
-by the pose the agent arrives in; a blocked move arrives in the pose it left.
+by the pose the agent arrives in; a blocked move arrives in the pose it left. A term takes what the terms before it let
+every action of every pose earn, (S, A), and gives back what it earns now; `Arrival` says what reaching the target earns
+in place of all that. `Reward.table` is the only place where a step's earnings are computed: environments, hindsight,
+look-ahead and the exact oracles look them up there.
+
+The module is light, so that the command line can read names and parameters from it. Axis letters: S states, A actions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import importlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
+from clearway.errors import ClearwayError
 
-from clearway.zones import ZONE_COUNT, Zone
+if TYPE_CHECKING:
+    import numpy as np
+
+CLIP = 1.0
+
+
+class RewardError(ClearwayError, ValueError):
+    """A reward that does not exist or cannot be used."""
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Tables of a world that terms look at.
+
+    Attributes:
+        next_state: (S, A) int64, where each action leads; a blocked move leads back to its own state.
+        blocked: (S, A) bool.
+        zone: (S,) int, see `zones.Zone`.
+        clearance_m: (S,) float64, distance to the nearest obstacle, see `clearance`.
+    """
+
+    next_state: np.ndarray
+    blocked: np.ndarray
+    zone: np.ndarray
+    clearance_m: np.ndarray
+
+
+def parameter(default: float | None, meaning: str) -> Any:
+    """A parameter of a term: a dataclass field that says what it means, for the command line's help."""
+    return field(default=default, metadata={"help": meaning})
+
+
+@dataclass(frozen=True)
+class Term:
+    """A part of a reward. One of your own is a frozen dataclass whose fields are its parameters."""
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """What every action earns with this term, (S, A) float64, from what it earned before it."""
+        raise NotImplementedError(f"{type(self).__name__} does not say what it earns")
+
+
+@dataclass(frozen=True)
+class Time(Term):
+    """What every step costs."""
+
+    alpha: float = parameter(-0.01, "Reward of an ordinary step.")
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """Added everywhere."""
+        return earned + self.alpha
+
+
+@dataclass(frozen=True)
+class Zones(Term):
+    """What a step near an obstacle earns instead, by the zone of the pose that it ends in; None: as elsewhere."""
+
+    beta: float | None = parameter(None, "Reward of a step into the collision zone.")
+    gamma: float | None = parameter(None, "Reward of a step into the precollision zone.")
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """In place of what was earned."""
+        import numpy as np
+
+        from clearway.zones import Zone
+
+        zone = moves.zone[moves.next_state]
+        for value, where in ((self.beta, Zone.COLLISION), (self.gamma, Zone.PRECOLLISION)):
+            earned = earned if value is None else np.where(zone == where, value, earned)
+        return earned
+
+
+@dataclass(frozen=True)
+class Bump(Term):
+    """What a blocked move earns instead, whatever the zone."""
+
+    blocked: float = parameter(-0.1, "Reward of a blocked move.")
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """In place of what was earned."""
+        import numpy as np
+
+        return np.where(moves.blocked, self.blocked, earned)
+
+
+@dataclass(frozen=True)
+class Clearance(Term):
+    """What a step costs that ends close to an obstacle: all of it at the obstacle, linearly less up to a distance.
+
+    earned - clearance * max(0, 1 - distance / clearance_m)
+    """
+
+    clearance: float = parameter(0.02, "Cost of a step that ends at an obstacle, falling to nothing at clearance_m.")
+    clearance_m: float = parameter(0.5, "Distance from which an obstacle costs nothing, metres.")
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """Subtracted near obstacles."""
+        import numpy as np
+
+        near = np.maximum(0.0, 1.0 - moves.clearance_m / self.clearance_m)
+        return earned - self.clearance * near[moves.next_state]
+
+
+@dataclass(frozen=True)
+class Arrival(Term):
+    """What reaching the target earns, in place of all that a step earns else."""
+
+    terminal: float = parameter(10.0, "Reward of reaching the target.")
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """The same wherever the target is."""
+        import numpy as np
+
+        return np.full_like(earned, self.terminal)
+
+
+TERMS: dict[str, type[Term]] = {"time": Time, "zones": Zones, "bump": Bump, "clearance": Clearance, "arrival": Arrival}
+"""Terms of ours by name, in the order in which they apply; terms of your own come before `arrival`."""
+TERM_OF = {own.name: kind for kind in TERMS.values() for own in fields(kind)}
+"""The term that each parameter belongs to; no two terms share a name."""
+
+
+@dataclass(frozen=True)
+class _Unknown(Term):
+    """A term of somebody's own, as a run's record tells of it: its code is not loaded because a file names it."""
+
+    path: str
+    parameters: tuple[tuple[str, Any], ...]
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        """Raises RewardError."""
+        raise RewardError(f"the reward has the term {self.path}, which is not loaded. Name the reward itself")
 
 
 @dataclass(frozen=True)
 class Reward:
-    """What the agent earns for arriving in a pose."""
+    """What the agent earns.
+
+    Attributes:
+        name: in tables.
+        terms: in the order in which they apply; `Arrival` applies last, at the target alone.
+        clip: clip to [-1, 1] as Zhu's training loop does, so that the target is worth 1.
+    """
 
     name: str
-    alpha: float = -0.01
-    """A step into the free zone."""
-    beta: float = -0.02
-    """A step that ends in the collision zone."""
-    gamma: float = -0.011
-    """A step that ends in the precollision zone."""
-    terminal: float = 10.0
-    """Arriving at the target, whatever its zone."""
-    blocked: float | None = None
-    """A blocked move, in place of the zone's value; None: the zone's value stands."""
+    terms: tuple[Term, ...] = (Time(), Arrival())
     clip: bool = False
-    """Clip to [-1, 1] as Zhu's training loop does, so that the target is worth 1."""
 
-    def table(self) -> np.ndarray:
-        """The reward by what happened, (2, 2, 3) float64: [reached the target, blocked, zone of arrival]."""
-        table = np.empty((2, 2, ZONE_COUNT))
-        table[0, :, Zone.FREE] = self.alpha
-        table[0, :, Zone.PRECOLLISION] = self.gamma
-        table[0, :, Zone.COLLISION] = self.beta
-        if self.blocked is not None:
-            table[0, 1] = self.blocked
-        table[1] = self.terminal
-        return np.clip(table, -1.0, 1.0) if self.clip else table
+    CLIPPED: ClassVar[str] = "clip"
 
-    def with_changes(
-        self,
-        alpha: float | None = None,
-        beta: float | None = None,
-        gamma: float | None = None,
-        terminal: float | None = None,
-        clip: bool | None = None,
-    ) -> Reward:
-        """The same reward with the given values changed; None changes nothing."""
-        return replace(
-            self,
-            alpha=self.alpha if alpha is None else alpha,
-            beta=self.beta if beta is None else beta,
-            gamma=self.gamma if gamma is None else gamma,
-            terminal=self.terminal if terminal is None else terminal,
-            clip=self.clip if clip is None else clip,
-        )
+    def __post_init__(self) -> None:
+        """Refuse what is no term.
+
+        Raises:
+            RewardError: a term is none, a kind of term occurs twice, or there is no `Arrival`.
+        """
+        for term in self.terms:
+            if not isinstance(term, Term) or not is_dataclass(term):
+                raise RewardError(f"reward {self.name}: {term!r:.60} is no term. Give dataclasses derived from Term")
+        kinds = [type(term) for term in self.terms if not isinstance(term, _Unknown)]
+        if len(set(kinds)) < len(kinds):
+            raise RewardError(f"reward {self.name}: a term occurs twice. Give every kind of term once")
+        if Arrival not in kinds:
+            raise RewardError(f"reward {self.name}: nothing is earned at the target. Add the term Arrival")
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters of our own terms by name; those that are None are left out."""
+        own = [term for term in self.terms if type(term) in TERMS.values()]
+        found = {own.name: getattr(term, own.name) for term in own for own in fields(term)}
+        return {name: value for name, value in found.items() if value is not None}
+
+    @property
+    def is_known(self) -> bool:
+        """All terms can be computed here."""
+        return not any(isinstance(term, _Unknown) for term in self.terms)
+
+    def table(self, moves: Moves) -> np.ndarray:
+        """What every action earns, (2, S, A) float64: [the target is reached, state, action].
+
+        Raises:
+            RewardError: a term gives something else than (S, A) finite numbers, or is not loaded.
+        """
+        import numpy as np
+
+        step = np.zeros(moves.next_state.shape)
+        for term in self.terms:
+            if not isinstance(term, Arrival):
+                step = self._checked(term, term(step, moves))
+        (arrival,) = (term for term in self.terms if isinstance(term, Arrival))
+        table = np.stack([step, self._checked(arrival, arrival(step, moves))])
+        return np.clip(table, -CLIP, CLIP) if self.clip else table
+
+    def _checked(self, term: Term, earned: np.ndarray) -> np.ndarray:
+        import numpy as np
+
+        found = np.asarray(earned)
+        kind = type(term).__name__
+        if found.ndim != 2 or found.dtype.kind != "f":
+            problem = f"the term {kind} gives {found.dtype} {found.shape}"
+            raise RewardError(f"reward {self.name}: {problem}, expected (S, A) float64. Correct the term")
+        if not np.isfinite(found).all():
+            raise RewardError(f"reward={self.name} holds NaN or Inf in its term {kind}. Give finite values")
+        return found
+
+    def with_changes(self, *, clip: bool | None = None, **parameters: float | None) -> Reward:
+        """The same reward with parameters of our terms changed, under a name that says so; None changes nothing.
+
+        A term that the reward lacks is added.
+
+        Raises:
+            RewardError: there is no such parameter, or it is no finite number.
+        """
+        changes = {name: value for name, value in parameters.items() if value is not None}
+        terms: dict[type[Term], Term] = {type(term): term for term in self.terms}
+        for name, value in changes.items():
+            if name not in TERM_OF:
+                raise RewardError(f"reward: no parameter {name}. Choose among {', '.join(TERM_OF)}")
+            if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+                raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
+            if name.endswith("_m") and value <= 0:
+                raise RewardError(f"--{name.replace('_', '-')} is {value}, expected more than 0. Give a distance")
+            kind = TERM_OF[name]
+            terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
+        changed = Reward(self.name, _in_order(terms), self.clip if clip is None else clip)
+        told = [f"{name} {value:g}" for name, value in changes.items() if self.parameters.get(name) != value]
+        return replace(changed, name=", ".join([self.name, *told]))
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands."""
+        others = {}
+        for term in self.terms:
+            if isinstance(term, _Unknown):
+                others[term.path] = dict(term.parameters)
+            elif type(term) not in TERMS.values():
+                path = f"{type(term).__module__}:{type(term).__qualname__}"
+                others[path] = {own.name: getattr(term, own.name) for own in fields(term)}
+        return {"name": self.name, **self.parameters, self.CLIPPED: self.clip, **({"terms": others} if others else {})}
+
+    def __str__(self) -> str:
+        """Its parameters, as tables print them."""
+        told = [f"{name} {value:g}" for name, value in self.parameters.items()]
+        others = [term for term in self.terms if type(term) not in TERMS.values()]
+        told += [term.path.rpartition(":")[2] if isinstance(term, _Unknown) else type(term).__name__ for term in others]
+        return ", ".join(told) + (", clipped to [-1, 1]" if self.clip else "")
 
 
-COLLISION_AWARE = Reward("collision-aware")
+def reward_from_json(content: Mapping[str, Any]) -> Reward:
+    """The reward that `to_json` was called of, or that version 0.1 wrote.
+
+    Raises:
+        KeyError, TypeError: it is none.
+    """
+    name, clip = content["name"], content["clip"]
+    values = {key: value for key, value in content.items() if key not in ("name", "clip", "terms")}
+    for key, value in values.items():
+        if key not in TERM_OF:
+            raise KeyError(key)
+        if not (value is None or (isinstance(value, int | float) and not isinstance(value, bool))):
+            raise TypeError(f"{key} is {value!r:.40}")
+    if not isinstance(name, str) or not isinstance(clip, bool):
+        raise TypeError(f"name is {name!r:.40}, clip {clip!r:.40}")
+    if "blocked" in values and "beta" in values and name in REWARDS:
+        return _of_version_0_1(REWARDS[name], values, clip)
+    terms: dict[type[Term], Term] = {}
+    for key, value in values.items():
+        if value is not None:
+            kind = TERM_OF[key]
+            terms[kind] = replace(terms.get(kind, kind()), **{key: value})
+    others = [_Unknown(path, tuple(sorted(own.items()))) for path, own in content.get("terms", {}).items()]
+    ordered = _in_order(terms)
+    return Reward(name, (*ordered[:-1], *others, ordered[-1]), clip)
+
+
+def _of_version_0_1(base: Reward, values: Mapping[str, float | None], clip: bool) -> Reward:
+    """A named reward, whose zones' values stood there even where they were those of an ordinary step."""
+    usual: dict[str, float | None] = {"beta": base.parameters["alpha"], "gamma": base.parameters["alpha"]}
+    usual |= base.parameters
+    return base.with_changes(clip=clip, **{key: value for key, value in values.items() if value != usual.get(key)})
+
+
+def _in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:
+    """Ours as in `TERMS`, others before `Arrival`."""
+    ours = [terms[kind] for kind in TERMS.values() if kind in terms and kind is not Arrival]
+    others = [term for kind, term in terms.items() if kind not in TERMS.values()]
+    return (*ours, *others, *(term for kind, term in terms.items() if kind is Arrival))
+
+
+COLLISION_AWARE = Reward("collision-aware", (Time(-0.01), Zones(beta=-0.02, gamma=-0.011), Arrival(10.0)))
 """The paper's reward."""
-SHORTEST = Reward("shortest", beta=-0.01, gamma=-0.01)
+SHORTEST = Reward("shortest", (Time(-0.01), Arrival(10.0)))
 """What Zhu et al. train with: every step costs the same."""
-BUMP = Reward("bump", beta=-0.01, gamma=-0.01, blocked=-0.1)
+BUMP = Reward("bump", (Time(-0.01), Bump(-0.1), Arrival(10.0)))
 """Zhu's environment class: a blocked move costs 0.1. Their training loop overwrites it; public ports keep it."""
+CLEARANCE = Reward("clearance", (Time(-0.01), Clearance(0.02, 0.5), Arrival(10.0)))
+"""The closer to an obstacle a step ends, the more it costs."""
 
-REWARDS: dict[str, Reward] = {reward.name: reward for reward in (COLLISION_AWARE, SHORTEST, BUMP)}
+REWARDS: dict[str, Reward] = {reward.name: reward for reward in (COLLISION_AWARE, SHORTEST, BUMP, CLEARANCE)}
+
+
+def reward_named(name: str | Reward) -> Reward:
+    """The reward of a name: one of `REWARDS`, or a user's own as `package.module:name`.
+
+    There stands a `Reward`, or a function without arguments that gives one.
+
+    Raises:
+        RewardError: there is none.
+    """
+    if isinstance(name, Reward):
+        return name
+    if isinstance(name, str) and name in REWARDS:
+        return REWARDS[name]
+    module, colon, attribute = name.partition(":") if isinstance(name, str) else ("", "", "")
+    if not colon or not module or not attribute:
+        choices = ", ".join(map(repr, REWARDS))
+        raise RewardError(f"reward={name!r:.80} is unknown. Use one of {choices}, a Reward, or package.module:name")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as fault:
+        raise RewardError(f"reward={name!r}: cannot be loaded ({fault}). Check the module and the name") from fault
+    made = found() if callable(found) else found
+    if not isinstance(made, Reward):
+        raise RewardError(f"reward={name!r}: gives {made!r:.60}, expected a clearway.Reward. Correct it")
+    return made

@@ -115,7 +115,7 @@ def test_evaluate_prints_the_agreed_json(evaluated, trained):
         assert 1 <= row["shortest_path_steps"] <= row["steps"] <= 300
     assert [scene["scene"] for scene in content["scenes"]] == ["bathroom_02"]
     assert content["average"]["steps"] == pytest.approx(np.mean([row["steps"] for row in content["targets"]]))
-    assert (content["agent"], content["action_selection"]) == ("collision-aware", "sampled")
+    assert (content["agent"], content["action_selection"]) == ("collision-aware, alpha -0.02, gamma -0.015", "sampled")
     assert content["encoder"] == "from file (24 features)"
     assert json.loads((run / "evaluation.json").read_text()) == content
     assert "| shortest path | 5/5 |" in (run / "evaluation.md").read_text()

@@ -14,13 +14,14 @@ def plans(tmp_path: Path) -> Path:
 def test_a_plan_becomes_a_furnished_room(clearway, tmp_path, monkeypatch):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     (tmp_path / "nook.txt").write_text(".#\n..\n")
-    words = ("--cell-size", 0.5, "--encoder", "random-resnet50", "--out", tmp_path / "scenes")
-    answer = clearway("scenes", "import", "floor-plan", tmp_path / "nook.txt", *words)
+    words = ("--cell-size", 0.5, "--encoder", "random-resnet50", "--sensors", "rgb", "depth")
+    answer = clearway("scenes", "import", "floor-plan", tmp_path / "nook.txt", *words, "--out", tmp_path / "scenes")
     assert answer.code == 0, answer
     assert "nook.h5: 12 states, 3 cells" in answer.err
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "nook.h5", "--json").json
     assert (found["states"], found["encoder"], found["source"]) == (12, "random-resnet50", "floor_plan")
     assert found["picture_size"] == [300, 400]
+    assert found["sensors"][1] == "depth (300 x 400 float32, 0 to 20 m)"
     assert found["closest_cosine_distance"] > 0.001
 
 
@@ -29,6 +30,20 @@ def test_a_plan_too_large_to_render_is_refused_before_any_is_rendered(clearway, 
     np.savez(path, hall=np.array([[0, 0]]), street=np.array([[0, 0], [500, 0]]))
     answer = clearway("scenes", "import", "floor-plan", path, "--out", tmp_path / "scenes")
     assert answer.refusal("plans.npz", "'street'", "spans 125.2 x 0.2 m", "made-up features")
+    assert not (tmp_path / "scenes").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--sensors", "depth"), ("'depth' leaves out rgb", "Name each once")),
+        (("--encoder", "depth-grid"), ("depth-grid sees depth", "Add --sensors rgb depth")),
+        (("--sensors", "rgb", "depth", "--features", 8), ("--features renders nothing", "Leave out one of them")),
+    ],
+)
+def test_sensors_that_cannot_be_had_are_refused(clearway, plans, tmp_path, words, said):
+    answer = clearway("scenes", "import", "floor-plan", plans, *words, "--out", tmp_path / "scenes")
+    assert answer.refusal(*said)
     assert not (tmp_path / "scenes").exists()
 
 

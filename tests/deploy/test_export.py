@@ -1,5 +1,7 @@
 """Exported files compute what the trained network computes."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +11,14 @@ import pytest
 import torch
 from torch.nn.functional import interpolate
 
-from clearway.deploy.from_run import load_scene_agent
+from clearway.deploy.card import card_from_json
+from clearway.deploy.from_run import load_scene_agent, picture_encoder
 from clearway.deploy.graph import resize_weights
 from clearway.deploy.onnx_file import OnnxModel
-from clearway.errors import DeployError, RunError
+from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
-from clearway.perception import encoder_from_record
+from clearway.perception import depth_grid, encoder_from_record
+from made import with_depth
 
 CLOSE = {"rtol": 0, "atol": 1e-5}
 
@@ -101,6 +105,8 @@ def test_the_card_says_what_the_agent_is(deployed) -> None:
     assert (card.scene, card.takes_pictures, card.history_length, card.feature_count) == ("cellar", True, 4, 16)
     assert card.actions == ("move forward", "turn right", "turn left", "move backward")
     assert card.picture_size == (12, 16)
+    colour = {"name": "rgb", "shape": [12, 16, 3], "dtype": "uint8", "unit": "", "low": 0, "high": 255}
+    assert card.observation == colour
     assert card.encoder["identity"] == deployed.scenes[1].encoder.identity
     assert card.normalisation["pixels"]["height"] == 16 and card.normalisation["pixels"]["width"] == 20
     assert card.normalisation["features"]["directions"] == 12
@@ -128,3 +134,22 @@ def test_the_scene_is_chosen_by_name_and_is_the_first_otherwise(deployed) -> Non
         load_scene_agent(deployed.run, "den")
     with pytest.raises(RunError, match="no run here"):
         load_scene_agent(deployed.run.parent)
+
+
+def test_an_encoder_of_depth_is_not_deployed(deployed) -> None:
+    scene = replace(deployed.chosen.scene, encoder=depth_grid.find_record())
+    with pytest.raises(EncoderError, match="depth-grid sees depth, and deployed agents take colour pictures"):
+        picture_encoder(replace(deployed.chosen, scene=scene))
+
+
+def test_the_card_of_an_agent_that_sees_depth_says_so(deployed) -> None:
+    scene = with_depth(replace(deployed.chosen.scene, encoder=depth_grid.find_record()))
+    card = replace(deployed.chosen, scene=scene).card(None)
+    depth = {"name": "depth", "shape": [12, 16], "dtype": "float32", "unit": "m", "low": 0, "high": 20}
+    assert card_from_json(card.to_json(), "here").observation == depth
+
+
+def test_a_card_of_before_observations_were_described_is_read(deployed) -> None:
+    kept = json.loads(OnnxModel(deployed.agent).card.to_json()) | {"format_version": 1}
+    del kept["observation"]
+    assert card_from_json(json.dumps(kept), "here").observation is None

@@ -77,7 +77,7 @@ def test_a_card_round_trip() -> None:
         ('{"format_version": 1}', "metadata cannot be read"),
         (json.dumps({**json.loads(CARD.to_json()), "picture_size": [1]}), "metadata cannot be read"),
         (json.dumps({**json.loads(CARD.to_json()), "colour": 1}), "metadata cannot be read"),
-        (json.dumps({**json.loads(CARD.to_json()), "format_version": 2}), "written by a newer clearway (format 2)"),
+        (json.dumps({**json.loads(CARD.to_json()), "format_version": 3}), "written by a newer clearway (format 3)"),
     ],
 )
 def test_cards_that_cannot_be_read(text, part) -> None:

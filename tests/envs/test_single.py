@@ -13,7 +13,7 @@ from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import EnvError
 from clearway.scenes.actions import Action
-from made import corridor_scene, grid_scene
+from made import corridor_scene, grid_scene, with_depth
 
 
 @pytest.mark.parametrize("observations", ["features", "pictures"])
@@ -21,6 +21,15 @@ from made import corridor_scene, grid_scene
 def test_gymnasiums_own_check_finds_nothing(observations: str, render_mode: str | None) -> None:
     env = gymnasium.make(ENV_ID, scenes=grid_scene(0), observations=observations, render_mode=render_mode)
     check_env(env.unwrapped)  # warnings are errors here
+
+
+def test_gymnasiums_own_check_finds_nothing_where_depth_is_seen() -> None:
+    asked = {"observations": "pictures", "sensors": ("rgb", "depth")}
+    env = gymnasium.make(ENV_ID, scenes=with_depth(grid_scene(0)), **asked)
+    check_env(env.unwrapped)
+    assert list(env.observation_space.spaces) == ["depth", "observation", "target", "target_depth"]
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, scenes=with_depth(grid_scene(0)), **asked)
+    assert envs.observation_space["depth"].shape == (2, 4, 12, 16)
 
 
 def test_spaces_and_values() -> None:

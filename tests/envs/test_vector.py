@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import ClearwayError, EnvError, SceneError
-from clearway.reward import Reward
+from clearway.reward import Arrival, Reward, RewardError, Time
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene
+from made import corridor_scene, grid_scene, with_depth
 
 INFO_KEYS = {"collision", "cost", "zone", "distance_to_go", "scene", "state", "target"}
 MODES = list(AutoresetMode)
@@ -207,6 +208,35 @@ def test_unseeded_environments_differ() -> None:
     assert starts[0] != starts[1]
 
 
+def far_and_near() -> list[Scene]:
+    """Two scenes whose depth cameras reach differently far."""
+    far, near = with_depth(grid_scene(0)), with_depth(grid_scene(1, name="near"))
+    shorter = replace(near.further[0], sensor=replace(near.further[0].sensor, high=9.0))
+    return [far, replace(near, further=(shorter,))]
+
+
+def test_depth_is_seen_beside_colour(tmp_path: Path) -> None:
+    scenes = [with_depth(scene) for scene in two_scenes()]
+    for scene in scenes:
+        write_scene(scene, tmp_path / f"{scene.name}.h5")
+    paths = [tmp_path / f"{scene.name}.h5" for scene in scenes]
+    asked = {"num_envs": 3, "observations": "pictures", "max_episode_steps": 9}
+    colour = ImageGoalVectorEnv(scenes, **asked)
+    envs = ImageGoalVectorEnv(paths, sensors=("rgb", "depth"), **asked)
+    assert envs.single_observation_space["depth"] == Box(0, 20, (4, 12, 16), np.float32)
+    assert envs.single_observation_space["target_depth"] == Box(0, 20, (12, 16), np.float32)
+    (observation, info), (without, _) = envs.reset(seed=0), colour.reset(seed=0)
+    for action in random_actions(30, 3):
+        assert observation in envs.observation_space
+        assert without.keys() == {"observation", "target"}
+        assert all(np.array_equal(observation[key], without[key]) for key in without)
+        for env, (index, state, target) in enumerate(zip(info["scene"], info["state"], info["target"], strict=True)):
+            depth_m = scenes[index].seen_by("depth")
+            assert np.array_equal(observation["depth"][env, -1], depth_m[int(state)])
+            assert np.array_equal(observation["target_depth"][env], depth_m[int(target)])
+        (observation, *_, info), (without, *_) = envs.step(action), colour.step(action)
+
+
 @pytest.mark.parametrize("observations", ["features", "pictures"])
 def test_it_goes_on_after_pickling(observations: str) -> None:
     envs = ImageGoalVectorEnv(two_scenes(), num_envs=3, observations=observations, max_episode_steps=9)
@@ -317,7 +347,7 @@ def test_episodes_that_a_reset_left_out_stay_over() -> None:
 
 BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] = [
     (lambda: {"scenes": []}, EnvError, "scenes is empty"),
-    (lambda: {"reward": "generous"}, EnvError, "'collision-aware', 'shortest', 'bump'"),
+    (lambda: {"reward": "generous"}, RewardError, "'collision-aware', 'shortest', 'bump'"),
     (lambda: {"observations": "sounds"}, EnvError, "'features', 'pictures'"),
     (lambda: {"render_mode": "human"}, EnvError, "rgb_array, ansi"),
     (lambda: {"num_envs": 0}, EnvError, "at least 1 environment"),
@@ -329,7 +359,7 @@ BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] =
     (lambda: {"autoreset_mode": "never"}, EnvError, "autoreset_mode='never' is unknown. Use one of NextStep"),
     (lambda: {"scenes": 5}, EnvError, "scenes: 5 is neither a scene nor"),
     (lambda: {"scenes": [grid_scene(0), None]}, EnvError, "scenes: None is neither a scene nor"),
-    (lambda: {"reward": Reward("mine", alpha=float("nan"))}, EnvError, "holds NaN or Inf"),
+    (lambda: {"reward": Reward("mine", (Time(float("nan")), Arrival()))}, RewardError, "holds NaN or Inf"),
     (lambda: {"targets": [5]}, EnvError, r"targets=\[5\]: expected state ids by scene name"),
     (lambda: {"targets": {"grid": 5}}, EnvError, r"targets\['grid'\]=5: expected state ids"),
     (lambda: {"targets": {"grid": [True]}}, SceneError, "target True is no state id"),
@@ -340,6 +370,19 @@ BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] =
         lambda: {"scenes": replace(corridor_scene(3), observations=None), "observations": "pictures"},
         EnvError,
         "observations='features'",
+    ),
+    (lambda: {"observations": "pictures", "sensors": "rgb"}, EnvError, "sensors='rgb': expected names, each once"),
+    (lambda: {"observations": "pictures", "sensors": ()}, EnvError, "expected names, each once"),
+    (lambda: {"sensors": ("rgb", "depth")}, EnvError, "features are of one encoder. Ask for observations='pictures'"),
+    (
+        lambda: {"observations": "pictures", "sensors": ("rgb", "depth")},
+        EnvError,
+        "grid: has rgb, but no depth. Build or import it again with --sensors rgb depth",
+    ),
+    (
+        lambda: {"scenes": far_and_near(), "observations": "pictures", "sensors": ("depth",)},
+        EnvError,
+        "near: its sensor is depth .* 0 to 9 m.*that of grid is depth .* 0 to 20 m",
     ),
     (
         lambda: {"scenes": [grid_scene(0), grid_scene(1, name="b", picture_size=(8, 8))], "observations": "pictures"},
@@ -413,7 +456,7 @@ def test_zones_of_cells_are_paid_where_they_are_asked_for() -> None:
 def test_features_are_held_once_and_not_at_all_where_pictures_are_seen() -> None:
     scene = grid_scene(1)
     envs = ImageGoalVectorEnv(scene)
-    assert np.shares_memory(envs._source._table, envs._world.features.numpy())
+    assert np.shares_memory(envs._sources["observation", "target"]._table, envs._world.features.numpy())
     assert ImageGoalVectorEnv(scene, observations="pictures")._world.features is None
 
 

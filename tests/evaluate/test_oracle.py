@@ -59,7 +59,7 @@ def test_where_walking_on_earns_more_than_arriving_no_episode_ends(alpha: float)
     """A step in the open that earns something for ever is worth more than a target that ends it."""
     scene = grid_scene(1, width=5, depth=5)
     world = make_world([scene], {scene.name: [0]})
-    reward = replace(COLLISION_AWARE, alpha=alpha, clip=True)
+    reward = COLLISION_AWARE.with_changes(alpha=alpha, clip=True)
     (found,) = world_yardsticks(world, reward)
     assert found.yardstick.optimal.steps == found.yardstick.soft.steps == np.inf
     assert found.to_json()["optimal"] == {"steps": None, "collision_visits": None, "precollision_visits": None}

@@ -1,6 +1,5 @@
 """Evaluation of a run: what stands beside its agent, and what is said of it."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -14,13 +13,14 @@ from clearway.reward import COLLISION_AWARE
 from made import grid_scene
 from small_runs import small_learner, small_request
 
+NAME = "collision-aware, beta -0.5"
 SCENE = grid_scene(3, width=9, depth=9, feature_count=12)
 
 
 def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> None:
     request = small_request(
         learner=small_learner(frames=160, clip_rewards=True),
-        reward=replace(COLLISION_AWARE, beta=-0.5),
+        reward=COLLISION_AWARE.with_changes(beta=-0.5),
         zone_level="cell",
     )
     agent = load_agent(train(request, tmp_path / "run").path)
@@ -28,10 +28,10 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
     found = sampled.to_json()["trained"]
     assert found["frames"] == 160 and found["seed"] == 3 and found["zone_level"] == "cell"
     assert found["reward"]["beta"] == -0.5 and found["reward"]["clip"]
-    told = "collision-aware: 160 frames, seed 3, reward alpha -0.01, beta -0.5, gamma -0.011, terminal 10, clipped to "
+    told = f"{NAME}: 160 frames, seed 3, reward alpha -0.01, beta -0.5, gamma -0.011, terminal 10, clipped to "
     assert markdown_table([sampled, *others]).count(f"{told}[-1, 1], zones of cells.") == 1
-    assert "optimum (collision-aware)" in [other.agent for other in others]  # not the unclipped one
-    assert [other.agent for other in others if other.trained] == ["collision-aware"] * 2  # the other ways to choose
+    assert f"optimum ({NAME})" in [other.agent for other in others]  # not the unclipped one
+    assert [other.agent for other in others if other.trained] == [NAME] * 2  # the other ways to choose
 
 
 def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:

@@ -26,7 +26,7 @@ def test_a_scene_s_path_does_not_matter_its_content_does() -> None:
         {"seed": 1},
         {"targets": ((1, 3),)},
         {"reward": COLLISION_AWARE},
-        {"reward": replace(SHORTEST, alpha=-0.02)},
+        {"reward": SHORTEST.with_changes(alpha=-0.02)},
         {"learner": small_learner(lr_end=1e-6)},
     ],
 )

@@ -12,7 +12,7 @@ from clearway.learn.hindsight import find_segments, hindsight_batch
 from clearway.learn.losses import Batch
 from clearway.learn.rollout import Rollout
 from clearway.model.lookup import Activations, LookupNetwork
-from clearway.reward import COLLISION_AWARE, Reward
+from clearway.reward import BUMP, COLLISION_AWARE, Reward
 from clearway.scenes.actions import Action
 from small_runs import corridor_world, small_learner, small_network, small_trainer
 
@@ -160,7 +160,7 @@ def told_value(world: World, batch: Batch) -> Tensor:
 def test_clipped_and_bump_rewards_are_told_as_they_are() -> None:
     world = corridor_world()
     rollout = acted(world, [(9, 2, [FORWARD, LEFT, RIGHT, RIGHT])])  # blocked, looking across; then onto 8
-    reward = Reward("bump", beta=-0.03, blocked=-0.1, clip=True)
+    reward = BUMP.with_changes(beta=-0.03, gamma=-0.011, clip=True)
     batch = told_by(world, rollout, torch.full((4, 1), -100.0), reward, trace_lambda=1.0)
     arrives = 1 * SCALE
     assert batch.value_target.tolist() == pytest.approx([-0.1 * SCALE + GAMMA * arrives, arrives], rel=1e-6)

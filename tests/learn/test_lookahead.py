@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 import torch
 from torch import Tensor
@@ -15,7 +13,8 @@ SHARP = 0.05  # a temperature
 @pytest.fixture
 def trainer() -> Trainer:
     """A trainer on the corridor and the grid that knows half of all transitions."""
-    trainer = small_trainer(small_learner(matmul_precision="highest"), reward=replace(COLLISION_AWARE, blocked=-0.5))
+    reward = COLLISION_AWARE.with_changes(blocked=-0.5)
+    trainer = small_trainer(small_learner(matmul_precision="highest"), reward=reward)
     state, action = torch.meshgrid(torch.arange(trainer.world.state_count), torch.arange(4), indexing="ij")
     taken = torch.rand(state.shape, generator=torch.Generator().manual_seed(1)) < 0.5
     trainer.observed.add(state[taken], action[taken], trainer.world.next_state[taken])
@@ -71,7 +70,7 @@ def test_against_one_row_and_action_at_a_time(trainer: Trainer, temperature: flo
                 assert after == int(world.next_state[here, action])
                 reached = after == int(world.target_state[goal])
                 known_at_goal += reached
-                gain = 0.1 * float(table[int(reached), int(world.blocked[here, action]), world.zone[after]])
+                gain = 0.1 * float(table[int(reached), here, action])
                 if not reached:
                     seen, wanted = features[[after] * 4][None], features[world.target_state[goal]][None]
                     with torch.no_grad():

@@ -47,7 +47,7 @@ def test_as_rows_keeps_each_environment_s_steps_together_and_by_step_undoes_it()
 
 def check_steps(rollout: Rollout, world: World, history_before: Tensor) -> None:
     """Every step follows from the world's tables and the step before."""
-    reward = torch.from_numpy(COLLISION_AWARE.table()).float()
+    reward = torch.from_numpy(COLLISION_AWARE.table(world.moves())).float()
     history = history_before
     for t in range(len(rollout.action)):
         assert torch.equal(rollout.history[t], history)
@@ -58,7 +58,7 @@ def check_steps(rollout: Rollout, world: World, history_before: Tensor) -> None:
         assert torch.equal(rollout.reached[t], reached)
         blocked = world.blocked[here, action]
         assert torch.equal(rollout.blocked[t], blocked)
-        assert torch.equal(rollout.reward[t], reward[reached.long(), blocked.long(), world.zone[arrived]])
+        assert torch.equal(rollout.reward[t], reward[reached.long(), here, action])
         assert not (rollout.truncated[t] & reached).any()
         after = torch.cat([history[:, 1:], arrived[:, None]], 1)
         assert torch.equal(rollout.last_history[t], after)

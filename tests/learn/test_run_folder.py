@@ -1,7 +1,7 @@
 import json
 import subprocess
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +44,7 @@ def test_the_same_experiment_may_run_elsewhere_but_not_with_other_settings() -> 
     others = [
         replace(record, seed=record.seed + 1),
         replace(record, zone_level="cell"),
-        replace(record, reward=replace(BUMP, blocked=-0.2)),
+        replace(record, reward=BUMP.with_changes(blocked=-0.2)),
         replace(record, learner=replace(PAPER_A2C, envs=99)),
         replace(record, scenes=scenes[:1]),
         replace(record, scenes=(replace(scenes[0], digest="0"), scenes[1])),
@@ -105,7 +105,7 @@ def renamed(content: dict, name: str) -> str:
 
 def test_a_run_json_that_is_damaged_foreign_or_newer_is_refused(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
-    content = {"format_version": 1, **asdict(made_record())}
+    content = {"format_version": 1, **made_record().to_json()}
     cases = [
         ("", "not readable"),
         ("{", "not readable"),
@@ -167,7 +167,7 @@ def test_metrics_that_are_no_rows_of_figures_are_refused(line: bytes, message: s
 
 
 def test_settings_of_another_clearway_are_told_apart_from_damage(tmp_path: Path) -> None:
-    content = {"format_version": 1, **asdict(made_record())}
+    content = {"format_version": 1, **made_record().to_json()}
     content["learner"] |= {"magic": 1}
     (tmp_path / "run.json").write_text(json.dumps(content))
     with pytest.raises(RunError, match=r"magic.*Restore it"):

@@ -14,12 +14,14 @@ from clearway.learn.load import Agent
 from clearway.live.agent import live_policy
 from clearway.live.episodes import LiveProtocol
 from clearway.live.room import LiveRoom
-from clearway.live.run import Stage, check_alike, finish_live, walk_setting
+from clearway.live.run import Stage, check_alike, finish_live, stages, walk_setting
 from clearway.live.settings import Perturbations, Setting
+from clearway.perception import depth_grid
 from clearway.perception.encode import encoder_from_record
 from clearway.scenes.actions import Action
 from clearway.scenes.rooms.camera import eye_view
 from clearway.scenes.rooms.render import studio
+from made import corridor_scene
 from small_live import state_at
 from small_runs import small_request, small_world
 
@@ -113,3 +115,12 @@ def test_agents_that_differ_in_what_they_walk_to_are_not_compared(agent) -> None
     for other in others:
         with pytest.raises(RunError, match="differ in their scenes, targets or history length"):
             check_alike({"one": agent, "other": replace(agent, record=other)})
+
+
+def test_an_encoder_of_depth_is_refused_before_a_room_is_built(agent) -> None:
+    scene = replace(corridor_scene(5), encoder=depth_grid.find_record())
+    with (
+        pytest.raises(RunError, match="corridor: its encoder depth-grid sees depth, and live"),
+        stages({"a": agent}, [scene]),
+    ):
+        pass

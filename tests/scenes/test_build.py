@@ -42,6 +42,30 @@ def test_a_room_becomes_a_scene(small_room):
     assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy", "scipy"}
 
 
+def test_a_room_is_rendered_in_depth_on_request(small_room):
+    colour = build_scene("bathroom", workers=1)
+    scene = build_scene("bathroom", sensors=("rgb", "depth"), workers=1)
+    assert [sensor.name for sensor in colour.sensors] == ["rgb"]
+    assert [sensor.name for sensor in scene.sensors] == ["rgb", "depth"]
+    np.testing.assert_array_equal(scene.observations, colour.observations)
+    ahead_m = scene.seen_by("depth")[np.array([1, 5, 9])][:, 150, 200]  # at heading 90 the post at x = 3 is ahead
+    np.testing.assert_allclose(ahead_m, [2.75, 2.25, 1.75], atol=0.0011)
+    check_scene(scene)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "problem"),
+    [
+        (("rgb", "sonar"), "'sonar'. Choose among rgb, depth"),
+        (("depth",), "leaves out rgb"),
+        (("rgb", "rgb"), "names one twice"),
+    ],
+)
+def test_sensors_that_cannot_be_had_are_refused(sensors, problem):
+    with pytest.raises(SceneError, match=problem):
+        build_scene("bathroom", sensors=sensors)
+
+
 def test_the_default_room_has_the_rooms_name(small_room):
     assert build_scene("bathroom", workers=1).name == "bathroom"
 

@@ -6,7 +6,7 @@ import pytest
 
 from clearway.scenes.inspect import mean_shortest_path_steps, summary
 from clearway.scenes.spread import feature_spread
-from made import corridor_scene, grid_scene, scene_of_cells
+from made import corridor_scene, grid_scene, scene_of_cells, with_depth
 
 
 def test_a_corridor_in_figures() -> None:
@@ -17,6 +17,11 @@ def test_a_corridor_in_figures() -> None:
     assert figures.encoder == "made-up"
     assert figures.feature_count == 16
     assert figures.picture_size == (12, 16)
+    assert figures.sensors == ("rgb (12 x 16 x 3 uint8, 0 to 255)",)
+
+
+def test_sensors_are_named_with_unit_and_range() -> None:
+    assert summary(with_depth(corridor_scene(2))).sensors[1] == "depth (12 x 16 float32, 0 to 20 m)"
 
 
 def test_mean_shortest_path_by_hand() -> None:

@@ -5,6 +5,7 @@ import random
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def note(line):
     if line == {slow_when!r}:
         time.sleep({seconds})
 
-def build(name, seed, *, workers, ray, progress):
+def build(name, seed, *, sensors, workers, ray, progress):
     note("built")
     scene = grid_scene(seed)
     return replace(scene, observations=SlowPictures(scene.observations))
@@ -61,7 +62,9 @@ class CountingBuilder:
     def __init__(self) -> None:
         self.built = 0
 
-    def __call__(self, name: str, seed: int, *, workers: int | None, ray: str | None, progress: bool) -> Scene:
+    def __call__(
+        self, name: str, seed: int, *, sensors: Sequence[str], workers: int | None, ray: str | None, progress: bool
+    ) -> Scene:
         self.built += 1
         return grid_scene(seed)
 
@@ -93,6 +96,7 @@ def test_a_scene_is_built_once_and_comes_back_whole(cache):
 def test_another_room_seed_version_or_source_is_another_scene(cache, monkeypatch, tmp_path):
     build = CountingBuilder()
     paths = {scene_path("kitchen", 0), scene_path("kitchen", 1), scene_path("bathroom", 0)}
+    paths.add(scene_path("kitchen", 0, ("rgb", "depth")))
     cached_room_scene("kitchen", 0, build=build)
     monkeypatch.setattr(library, "shaping_versions", lambda: {"mujoco": "99"})
     paths.add(scene_path("kitchen", 0))
@@ -105,12 +109,12 @@ def test_another_room_seed_version_or_source_is_another_scene(cache, monkeypatch
     paths.add(scene_path("kitchen", 0))
     (package / "furniture" / "sofa.py").write_text("colour = 'blue'\n")
     paths.add(scene_path("kitchen", 0))
-    for module in (library.building, library.grid, library.floor_plans):
+    for module in (library.building, library.grid, library.floor_plans, library.sensing):
         changed = tmp_path / f"{module.__name__.rpartition('.')[2]}.py"
         changed.write_text("pass\n")
         monkeypatch.setattr(module, "__file__", str(changed))
         paths.add(scene_path("kitchen", 0))
-    assert len(paths) == 9
+    assert len(paths) == 11
     assert all(path.parent == cache for path in paths)
     assert build.built == 2
 
@@ -177,7 +181,7 @@ def test_names_cannot_lead_out_of_the_cache(cache):
 def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     built = []
 
-    def build(plan, seed, *, workers, ray, progress):
+    def build(plan, seed, *, sensors, workers, ray, progress):
         built.append((plan.name, seed))
         return replace(grid_scene(seed), name=plan.name)
 
@@ -187,6 +191,8 @@ def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     assert built == [("hall", 2)] and first.name == again.name == "hall"
     assert np.array_equal(first.observations[:], again.observations[:])
     assert [path.name for path in cache.glob("*.h5")] == [plan_path(plan, 2).name]
+    cached_plan_scene(plan, 2, sensors=("rgb", "depth"))
+    assert len(built) == 2  # without depth is another file
 
 
 def test_another_plan_has_another_file(cache):

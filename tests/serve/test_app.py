@@ -125,7 +125,9 @@ def test_wrong_tokens(called, service, token) -> None:
     for other in (f"Basic {TOKEN}", TOKEN):
         assert fault(client.get("/agent", headers={"authorization": other})) == "401 unauthorised"
     assert client.get("/health").json() == {"status": "ok"}  # says nothing else
-    assert client.get("/agent", headers={"authorization": f"bearer {TOKEN}"}).status_code == 200
+    agent = client.get("/agent", headers={"authorization": f"bearer {TOKEN}"})
+    assert agent.status_code == 200
+    assert agent.json()["observation"] == CARD.observation
 
 
 @pytest.mark.parametrize("token", WRONG_TOKENS)

@@ -230,6 +230,20 @@ def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[...,
     shown(page, "1 / 1")
 
 
+def test_depth_is_a_switch_away_where_the_scene_has_it(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor&start=1&target=8")
+    picture = page.locator('[data-walker="aware"] .picture img')
+    expect(picture).to_have_attribute("src", "scenes/0/views/1.jpg")
+    page.get_by_label("Seen by").select_option("depth, 0 to 20 m")
+    expect(picture).to_have_attribute("src", "scenes/0/depth/1.jpg")
+    expect(page.locator("#goal-picture")).to_have_attribute("src", "scenes/0/depth/8.jpg")
+    expect(page.locator("#targets img").first).to_have_attribute("src", re.compile("scenes/0/depth/"))
+    assert page.evaluate("[...document.images].every((image) => image.decode())")
+    page.locator("#scene").select_option("grid")
+    expect(page.get_by_label("Seen by")).to_be_hidden()
+    expect(picture).to_have_attribute("src", re.compile("scenes/1/views/"))
+
+
 def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Callable[..., Page]) -> None:
     page = opened("scene=bare&start=59&target=30")
     page.locator("#scene").select_option("corridor")

@@ -79,6 +79,11 @@ def test_the_page_and_all_that_it_names_are_there(address: str) -> None:
         "scenes/0/views/-1.jpg",
         "scenes/2/views/0.jpg",  # no pictures
         "scenes/2/above.jpg",
+        "scenes/0/depth/20.jpg",
+        "scenes/3/depth/0.jpg",
+        "scenes/1/depth/0.jpg",  # no depth
+        "scenes/0/rgb/0.jpg",
+        "scenes/0/touch/0.jpg",
     ],
 )
 def test_nothing_else_is_there(address: str, path: str) -> None:
@@ -94,6 +99,8 @@ def test_the_stage_and_its_maps(address: str, stage: Stage) -> None:
     assert corridor["extent_m"] == [-0.25, 0.25, -0.25, 2.25]
     assert corridor["zones"][:4] == [2, 2, 2, 2] and corridor["zones"][8] == 0
     assert (corridor["has_pictures"], corridor["picture_shape"], corridor["has_above"]) == (True, [12, 16], True)
+    depth = {"name": "depth", "shape": [12, 16], "dtype": "float32", "unit": "m", "low": 0, "high": 20}
+    assert corridor["sensors"] == [depth]
     bare = json.loads(get(address, "scenes/2/map.json")[1])
     assert (bare["turn_deg"], bare["has_pictures"], bare["has_above"]) == (30, False, False)
     assert bare["extent_m"] == pytest.approx([-0.35, 1.35, -0.35, 1.35])
@@ -114,6 +121,19 @@ def test_pictures_are_those_of_the_scene(address: str, stage: Stage) -> None:
         found = np.asarray(Image.open(io.BytesIO(content)))
         assert found.shape == expected.shape
         assert np.abs(found.astype(int) - expected).mean() < 6
+
+
+def test_depth_is_shown_in_grey_from_near_to_far(address: str, stage: Stage) -> None:
+    answer, content = get(address, "scenes/0/depth/7.jpg")
+    assert answer.headers["content-type"] == "image/jpeg"
+    found = np.asarray(Image.open(io.BytesIO(content))).astype(int)
+    assert found.shape == (12, 16, 3)
+    metres = stage.scenes[0].seen_by("depth")[7]
+    expected = 255 * (1 - np.log1p(metres) / np.log(21))
+    assert np.ptp(expected) > 20
+    assert np.abs(found - expected[..., None]).mean() < 6
+    sensor = stage.scenes[0].sensors[1]
+    assert server.grey(np.array([0.0, 20.0], np.float32), sensor).tolist() == [255, 0]
 
 
 def test_an_episode_over_the_socket(address: str) -> None:

@@ -3,9 +3,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from clearway.errors import RunError, SceneError
-from clearway.view.stage import Stage, _has, agent_world, run_stage, scene_stage
+from clearway.reward import Reward
+from clearway.view.stage import Stage, _has, run_stage, scene_stage
 from made import corridor_scene, grid_scene
 from small_runs import FEATURES
 from small_stage import small_agent, write_scenes
@@ -55,13 +57,32 @@ def test_runs_of_one_name_are_told_apart_by_their_paths(tmp_path: Path) -> None:
     assert [agent.name for agent in shown.agents] == [str(run) for run in runs]
 
 
-def test_an_agent_s_world_has_the_target_asked_for(stage: Stage) -> None:
-    world, index = agent_world(stage.agents[1], "grid", 7)
+def test_an_agent_s_world_has_the_target_asked_for_alone_and_shares_its_tables(stage: Stage) -> None:
+    shown = stage.agents[1]
+    world = shown.place("grid", 7)
     assert world.scene_names == ("corridor", "grid", "bare")
-    assert world.scene_names[int(world.target_scene[index])] == "grid"
-    assert world.scene_state(index) == 7
+    assert [world.scene_names[scene] for scene in world.target_scene.tolist()] == ["grid"]
+    assert world.scene_state(0) == 7
+    assert world.features is shown.world.features
+    assert world.next_state is shown.world.next_state
     with pytest.raises(SceneError, match="99"):
-        agent_world(stage.agents[0], "corridor", 99)
+        shown.place("corridor", 99)
+
+
+def test_an_agent_thinks_of_a_target_as_if_it_had_been_there_from_the_beginning(stage: Stage) -> None:
+    shown = stage.agents[0]
+    for scene, target in (("grid", 7), ("corridor", 3)):
+        placed = shown.place(scene, target)
+        history = placed.start_state[:, None].expand(-1, shown.agent.record.learner.history_length)
+        goal = torch.zeros(len(history), dtype=torch.int64)
+        expected = shown.agent.critic(placed)(history, goal)
+        for found, wanted in zip(shown.critic(placed)(history, goal), expected, strict=True):
+            torch.testing.assert_close(found, wanted)
+
+
+def paid(reward: Reward, stage: Stage) -> float:
+    """The most that a step earns."""
+    return reward.table(stage.agents[0].world.moves()).max()
 
 
 def test_values_and_rewards_are_of_one_scale(stage: Stage) -> None:
@@ -69,8 +90,8 @@ def test_values_and_rewards_are_of_one_scale(stage: Stage) -> None:
     shown = stage.agents[0]
     record = shown.agent.record
     clipping = replace(record, learner=replace(record.learner, clip_rewards=True))
-    assert shown.reward.table().max() == 10
-    assert replace(shown, agent=replace(shown.agent, record=clipping)).reward.table().max() == 1
+    assert paid(shown.reward, stage) == 10
+    assert paid(replace(shown, agent=replace(shown.agent, record=clipping)).reward, stage) == 1
 
 
 def test_the_map_shows_the_zones_that_the_first_agent_learnt_from(stage: Stage) -> None:

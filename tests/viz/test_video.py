@@ -24,10 +24,10 @@ def episode(agent: Agent, scene: str | None = None, target: int | None = None, s
 
 
 def test_the_frames_follow_the_episode(agent: Agent) -> None:
-    world, index, trajectory = episode(agent, "grid", 3)
-    assert world.scene_names[int(world.target_scene[index])] == "grid"
-    assert world.scene_state(index) == 3  # not trained on
-    shown = walked(world, agent.policy(world), index, trajectory, 4)
+    world, trajectory = episode(agent, "grid", 3)
+    assert world.scene_names[int(world.target_scene[0])] == "grid"
+    assert world.scene_state(0) == 3  # not trained on
+    shown = walked(world, agent.policy(world), 0, trajectory, 4)
     assert shown.probabilities.shape == (len(trajectory.states), 4)
     np.testing.assert_allclose(shown.probabilities.sum(1), 1, rtol=1e-5)
     pictures = list(frames(small_scenes(), shown))
@@ -37,25 +37,25 @@ def test_the_frames_follow_the_episode(agent: Agent) -> None:
 
 
 def test_the_policy_is_asked_with_the_history_that_it_walked_with(agent: Agent) -> None:
-    world, index, trajectory = episode(agent)
+    world, trajectory = episode(agent)
     asked = []
 
     def policy(history, target):
         asked.append((history, target))
         return agent.policy(world)(history, target)
 
-    walked(world, policy, index, trajectory, 4)
+    walked(world, policy, 0, trajectory, 4)
     ((history, target),) = asked
     states = trajectory.states.tolist()
     assert history[0].tolist() == [states[0]] * 4
     assert history[5].tolist() == states[2:6]
-    assert set(target.tolist()) == {index}
+    assert set(target.tolist()) == {0}
 
 
 @pytest.mark.parametrize("name", ["film.mp4", "film.gif"])
 def test_a_film_can_be_read_again(agent: Agent, tmp_path: Path, name: str) -> None:
-    world, index, trajectory = episode(agent, step_cap=4)
-    pictures = list(frames(small_scenes(), walked(world, agent.policy(world), index, trajectory, 4)))
+    world, trajectory = episode(agent, step_cap=4)
+    pictures = list(frames(small_scenes(), walked(world, agent.policy(world), 0, trajectory, 4)))
     write_video(tmp_path / name, iter(pictures), frames_per_s=2)
     expected = len(pictures) + LAST_FRAME_TIMES
     if name.endswith(".gif"):
@@ -96,8 +96,8 @@ def test_a_gif_faster_than_viewers_show_is_refused(tmp_path: Path) -> None:
 
 
 def test_another_ending_is_refused_and_leaves_nothing(agent: Agent, tmp_path: Path) -> None:
-    world, index, trajectory = episode(agent, step_cap=2)
-    pictures = frames(small_scenes(), walked(world, agent.policy(world), index, trajectory, 4))
+    world, trajectory = episode(agent, step_cap=2)
+    pictures = frames(small_scenes(), walked(world, agent.policy(world), 0, trajectory, 4))
     with pytest.raises(ClearwayError, match=r"film\.avi.*\.mp4 or \.gif"):
         write_video(tmp_path / "film.avi", pictures)
     assert not list(tmp_path.iterdir())

@@ -12,8 +12,7 @@ from typing import Any, TypeAlias, get_args
 
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
-from clearway.choices import FeatureStore, RewardName, ZoneLevel
-from clearway.envs.arguments import chosen_reward
+from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
 from clearway.learn.config import DEFAULT, PAPER_A3C, PRESETS, Learner
 from clearway.learn.load import Agent, load_agent
@@ -21,7 +20,7 @@ from clearway.learn.run_folder import RunRecord
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.markdown import table_lines
-from clearway.reward import Reward
+from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 from clearway.torch_threads import torch_threads
@@ -87,7 +86,7 @@ def train(
     scenes: Scenes,
     targets: Targets = None,
     *,
-    reward: RewardName | Reward = "collision-aware",
+    reward: str | Reward = "collision-aware",
     algorithm: str | Learner = "ppo",
     frames: int | None = None,
     seed: int = 0,
@@ -105,7 +104,7 @@ def train(
     Args:
         scenes: a scene, a scene file, a folder of them, or several. All with features of one encoder.
         targets: state ids by scene name, or state ids alone for a single scene; five seeded ones where there are none.
-        reward: "collision-aware", "shortest", "bump", or a `Reward`.
+        reward: one of `clearway.reward.REWARDS` by its name, a `Reward`, or package.module:name.
         algorithm: "ppo" (our recipe), "a2c" (our recipe with one update a rollout) or "a3c" (as published); "paper"
             is the published settings, synchronous; or a `Learner`.
         frames: training frames, instead of the algorithm's own.
@@ -137,7 +136,7 @@ def train(
         scenes=loaded,
         targets=_chosen_targets(loaded, targets, number),
         learner=learner,
-        reward=chosen_reward(reward),
+        reward=reward_named(reward),
         seed=number,
         zone_level=as_choice("zone_level", zone_level, get_args(ZoneLevel)),  # type: ignore[arg-type]
         paths=by_name(pairs),

@@ -1,4 +1,4 @@
-"""What several commands read from the command line alike: numbers, scene files, targets, rewards."""
+"""What several commands read from the command line alike: numbers, scene files, targets."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clearway.choices import RewardName
 from clearway.errors import ClearwayError
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 
 if TYPE_CHECKING:
-    from clearway.reward import Reward
     from clearway.scenes.scene import Scene
 
 __all__ = [
@@ -23,7 +21,6 @@ __all__ = [
     "check_named",
     "check_positive",
     "check_seeds",
-    "chosen_reward",
     "chosen_targets",
     "scene_files",
 ]
@@ -100,22 +97,3 @@ def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> 
         except ValueError as error:
             raise ClearwayError(f"--targets {word}: expected state numbers such as 26,37,43. Correct it") from error
     return {scene.name: named.get(scene.name) or default_targets(scene, seed) for scene in scenes}
-
-
-def chosen_reward(
-    name: RewardName,
-    alpha: float | None,
-    beta: float | None,
-    gamma: float | None,
-    terminal: float | None,
-    clip: bool | None = None,
-) -> Reward:
-    """The reward of a name with single values changed; None changes nothing.
-
-    Raises:
-        ClearwayError: a value is NaN or infinite.
-    """
-    from clearway.reward import REWARDS
-
-    check_finite(alpha=alpha, beta=beta, gamma=gamma, terminal=terminal)
-    return REWARDS[name].with_changes(alpha, beta, gamma, terminal, clip)

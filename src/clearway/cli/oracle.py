@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import RewardName, ZoneLevel
-from clearway.cli.arguments import check_finite, check_seeds, chosen_reward, chosen_targets, scene_files
+from clearway.choices import ZoneLevel
+from clearway.cli.arguments import check_finite, check_seeds, chosen_targets, scene_files
 from clearway.cli.console import print_json, stdout_console
+from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
 from clearway.errors import ClearwayError
 from clearway.terminal import noted
 
@@ -29,16 +30,8 @@ class Oracle:
     """Scene files, or folders of them."""
     targets: tuple[str, ...] = ()
     """Target states, as for clearway train."""
-    reward: RewardName = "collision-aware"
-    """The reward."""
-    alpha: float | None = None
-    """Reward of an ordinary step, instead of the reward's own."""
-    beta: float | None = None
-    """Reward of a step into the collision zone, instead of the reward's own."""
-    gamma: float | None = None
-    """Reward of a step into the precollision zone, instead of the reward's own."""
-    terminal: float | None = None
-    """Reward of reaching the target, instead of the reward's own."""
+    reward: RewardChoice = "collision-aware"
+    parameters: RewardParameters = field(default_factory=RewardParameters)
     clip: bool = True
     """Clip rewards to [-1, 1], so that the target is worth 1, as in Zhu's training loop."""
     zones: ZoneLevel = "pose"
@@ -66,7 +59,7 @@ class Oracle:
             raise ClearwayError(f"--entropy is {self.entropy}, expected more than 0. Give a positive weight")
         scenes = [replace(read_scene(path), features=None) for path in scene_files(self.files)]
         world = make_world(scenes, chosen_targets(scenes, self.targets, self.seed), self.zones)
-        reward = chosen_reward(self.reward, self.alpha, self.beta, self.gamma, self.terminal, self.clip)
+        reward = chosen_reward(self.reward, self.parameters, self.clip)
         found = world_yardsticks(world, reward, discount=self.discount, entropy_weight=self.entropy)
         if self.json:
             print_json([one.to_json() for one in found])

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from clearway.choices import RoomName
+from clearway.choices import RoomName, SensorName
 from clearway.cli.arguments import SCENE_SUFFIXES, check_at_least, check_ending, check_seeds, scene_files
 from clearway.cli.console import print_json, say, stdout_console
 from clearway.cli.imports.writing import replaces, write_and_say
@@ -29,9 +29,11 @@ class Build:
     """Which room."""
     seed: int = 0
     """Seed 0 gives the default rooms, another one other colours, textures, pictures and small furniture."""
+    sensors: tuple[SensorName, ...] = ("rgb",)
+    """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), one of another package (clearway
-    plugins), or a Hugging Face model."""
+    """resnet50, random-resnet50, auto (the first if it can be had, else the second), depth-grid (needs --sensors rgb
+    depth), one of another package (clearway plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None
@@ -42,12 +44,15 @@ class Build:
 
     def run(self) -> None:
         """Build and write."""
-        from clearway.perception import encode_scenes
+        from clearway.perception import check_sees, encode_scenes
         from clearway.scenes.library import cached_room_scene
         from clearway.scenes.rooms import ROOM_NAMES
+        from clearway.scenes.sensors import check_names
 
         check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)
         check_at_least(1, workers=self.workers)
+        check_names(self.sensors)
+        check_sees(self.encoder, self.sensors)
         in_folder = self.out.is_dir() or self.out.suffix.lower() not in SCENE_SUFFIXES
         if self.room == "all" and not in_folder:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")
@@ -56,7 +61,10 @@ class Build:
         names = ROOM_NAMES if self.room == "all" else (self.room,)
         workers, ray = self.workers, self.ray
         with kept_connected(ray, workers):
-            scenes = [cached_room_scene(name, self.seed, workers=workers, ray=ray, progress=True) for name in names]
+            scenes = [
+                cached_room_scene(name, self.seed, sensors=self.sensors, workers=workers, ray=ray, progress=True)
+                for name in names
+            ]
             encoded = encode_scenes(
                 scenes, self.encoder, seed=self.encoder_seed, progress=True, workers=workers, ray=ray
             )
@@ -136,6 +144,13 @@ def _print_table(content: dict[str, object]) -> None:
 
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for key, value in content.items():
-        text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else str(value)
-        table.add_row(key.replace("_", " "), Text(printable(text)))
+        table.add_row(key.replace("_", " "), Text(printable(_cell(value))))
     stdout_console().print(table)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{k} {v}" for k, v in value.items())
+    if isinstance(value, tuple) and all(isinstance(one, str) for one in value):
+        return ", ".join(value)
+    return str(value)

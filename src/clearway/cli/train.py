@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from clearway.choices import FeatureStore, RewardName, ZoneLevel
-from clearway.cli.arguments import check_at_least, check_seeds, chosen_reward, chosen_targets, scene_files
+from clearway.choices import FeatureStore, ZoneLevel
+from clearway.cli.arguments import check_at_least, check_seeds, chosen_targets, scene_files
 from clearway.cli.console import say
+from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
 from clearway.learn.config import PRESETS, Algorithm, Learner, PresetName
 from clearway.learn.settings import with_settings
 
@@ -29,16 +30,8 @@ class Train:
     targets: tuple[str, ...] = ()
     """Target states: "26 37 43" for one scene, "bathroom=26,37 kitchen=90,136" for several. By default the published
     targets for the paper's four scenes, five seeded ones elsewhere."""
-    reward: RewardName = "collision-aware"
-    """The paper's reward, or one of two baselines."""
-    alpha: float | None = None
-    """Reward of an ordinary step, instead of the reward's own."""
-    beta: float | None = None
-    """Reward of a step into the collision zone, instead of the reward's own."""
-    gamma: float | None = None
-    """Reward of a step into the precollision zone, instead of the reward's own."""
-    terminal: float | None = None
-    """Reward of reaching the target, instead of the reward's own."""
+    reward: RewardChoice = "collision-aware"
+    parameters: RewardParameters = field(default_factory=RewardParameters)
     zones: ZoneLevel = "pose"
     """Whether zones are those of poses or of whole cells."""
     algorithm: Algorithm | None = None
@@ -78,7 +71,7 @@ class Train:
             scenes=scenes,
             targets=chosen_targets(scenes, self.targets, self.seed),
             learner=self._learner(),
-            reward=chosen_reward(self.reward, self.alpha, self.beta, self.gamma, self.terminal),
+            reward=chosen_reward(self.reward, self.parameters),
             seed=self.seed,
             zone_level=self.zones,
             paths={scene.name: path for scene, path in zip(scenes, files, strict=True)},

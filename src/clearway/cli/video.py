@@ -48,9 +48,9 @@ class Video:
         check_seeds(seed=self.seed)
         agent = load_agent(self.folder)
         scenes = run_scenes(agent.record, scene_files(self.scenes) if self.scenes else None)
-        world, index, trajectory = single_episode(
+        world, trajectory = single_episode(
             agent, scenes, self.scene, self.target, selection=self.selection, step_cap=self.most_steps, seed=self.seed
         )
-        shown = walked(world, agent.policy(world), index, trajectory, agent.record.learner.history_length)
+        shown = walked(world, agent.policy(world), 0, trajectory, agent.record.learner.history_length)
         write_video(self.out, frames(scenes, shown), self.frames_per_s)
         say(f"film: {self.out}, {len(trajectory.actions)} steps")

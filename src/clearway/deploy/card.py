@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 from clearway.errors import DeployError
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 2 since there is `observation`
 EXPORT_AGAIN = "Export it again with clearway export"
 
 
@@ -26,6 +26,8 @@ class Card:
         normalisation: what is done to pictures and features, all of it inside the agent (JSON values).
         picture_size: (height, width) in pixels of the pictures that it was trained on, or None where that is unknown.
         training: what the agent was trained with, for the record (JSON values).
+        observation: what a picture of the scene is to the encoder, as `Sensor.to_json` has it: name, shape, dtype, unit
+            and range; None where that is unknown.
     """
 
     scene: str
@@ -37,6 +39,7 @@ class Card:
     normalisation: Mapping[str, object]
     picture_size: tuple[int, int] | None
     training: Mapping[str, object]
+    observation: Mapping[str, object] | None = None
 
     def to_json(self) -> str:
         """As JSON text, for `card_from_json`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +16,10 @@ from clearway.deploy.onnx_file import shifted
 from clearway.errors import DeployError, EncoderError
 from clearway.learn.load import Agent, load_agent, run_scenes
 from clearway.perception import Encoder, encoder_from_record
-from clearway.perception.encoder import NetworkEncoder
+from clearway.perception.encoder import NetworkEncoder, sensor_of
 from clearway.scenes.actions import ACTION_NAMES
 from clearway.scenes.scene import EncoderRecord, Scene
+from clearway.scenes.sensors import RGB
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class SceneAgent:
         """The agent's card; with or without its encoder inside."""
         record, made_by, shape = self.agent.record, self.encoder_record, self.agent.network.shape
         pictures = self.scene.observations
+        seen = next((one for one in self.scene.sensors if one.name == sensor_of(made_by)), None)
         return Card(
             scene=self.scene.name,
             actions=ACTION_NAMES,
@@ -56,7 +58,8 @@ class SceneAgent:
             encoder={"name": made_by.name, "identity": made_by.identity, "settings": dict(made_by.settings)},
             normalisation=self._normalisation(encoder),
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
-            training={"seed": record.seed, "reward": asdict(record.reward), "versions": dict(record.versions)},
+            training={"seed": record.seed, "reward": record.reward.to_json(), "versions": dict(record.versions)},
+            observation=None if seen is None else seen.to_json(),
         )
 
     def _normalisation(self, encoder: Encoder | None) -> dict[str, object]:
@@ -98,13 +101,26 @@ def load_scene_agent(
     return SceneAgent(agent, run_scenes(agent.record, files)[index], index, names)
 
 
-def exportable_encoder(chosen: SceneAgent) -> NetworkEncoder:
-    """The encoder that made the features of an agent's scene, as a network; see `encoder_from_record` for its errors.
+def picture_encoder(chosen: SceneAgent) -> Encoder:
+    """The encoder that made the features of an agent's scene.
 
     Raises:
-        EncoderError: it is one of another package, which may be no network.
+        EncoderError: as of `encoder_from_record`, or it takes no colour pictures.
     """
-    encoder = encoder_from_record(chosen.encoder_record)
+    seen = sensor_of(chosen.encoder_record)
+    if seen != RGB:
+        problem = f"encoder {chosen.encoder_record.name} sees {seen}, and deployed agents take colour pictures"
+        raise EncoderError(f"{problem}. Train on features of another encoder")
+    return encoder_from_record(chosen.encoder_record)
+
+
+def exportable_encoder(chosen: SceneAgent) -> NetworkEncoder:
+    """The encoder that made the features of an agent's scene, as a network.
+
+    Raises:
+        EncoderError: as of `picture_encoder`, or it is one of another package, which may be no network.
+    """
+    encoder = picture_encoder(chosen)
     if not isinstance(encoder, NetworkEncoder):
         problem = f"encoder {encoder.record.name}: is another package's, which a file cannot hold"
         raise EncoderError(f"{problem}. Use the run folder itself")
@@ -122,7 +138,7 @@ class RunModel:
     """
 
     def __init__(self, chosen: SceneAgent) -> None:
-        self._encoder = encoder_from_record(chosen.encoder_record)
+        self._encoder = picture_encoder(chosen)
         self._policy = PolicyGraph(chosen.agent, chosen.index)
         self.card: Card = chosen.card(self._encoder)
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from clearway.choices import RewardName
 from clearway.envs.render import RENDER_MODES
 from clearway.errors import EnvError
-from clearway.reward import REWARDS, Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
@@ -36,17 +34,6 @@ def _read(path: str | Path) -> Scene:
     from clearway.scenes.thor_v1 import read_scene
 
     return read_scene(Path(path))
-
-
-def chosen_reward(reward: RewardName | Reward) -> Reward:
-    """The reward itself, or the one of that name."""
-    if isinstance(reward, Reward):
-        if not np.isfinite(reward.table()).all():
-            raise EnvError(f"reward={reward} holds NaN or Inf. Give finite values")
-        return reward
-    if not isinstance(reward, str) or reward not in REWARDS:
-        raise EnvError(f"reward={reward!r} is unknown. Use a Reward or one of {', '.join(map(repr, REWARDS))}")
-    return REWARDS[reward]
 
 
 def check_numbers(num_envs: int, history_length: int, max_episode_steps: int | None, render_mode: str | None) -> None:

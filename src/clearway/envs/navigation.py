@@ -117,7 +117,7 @@ class Navigation:
         count = len(seeds)
         self.world, self.reward, self.step_limit = world, reward, step_limit
         self.choice = choice or TargetChoice.uniform(world, count)
-        self.reward_table = torch.from_numpy(reward.table()).to(world.device, reward_dtype)
+        self.reward_table = torch.from_numpy(reward.table(world.moves())).to(world.device, reward_dtype)
         seeds = seeds.to(world.device)
         self.start_stream, self.target_stream = Streams(seeds, START_STREAM), Streams(seeds, TARGET_STREAM)
         self.history = torch.zeros(count, history_length, dtype=torch.int64, device=world.device)
@@ -173,8 +173,12 @@ class Navigation:
         self.history = torch.cat([self.history[:, 1:], arrived[:, None]], 1)
         self.elapsed += 1
         limit_met = torch.zeros_like(reached) if self.step_limit is None else self.elapsed >= self.step_limit
-        reward = self.reward_table[reached.long(), blocked.long(), zone]
+        reward = self.earned(here, action, reached)
         return Transition(arrived, reward, reached, limit_met & ~reached, blocked, zone)
+
+    def earned(self, state: Tensor, action: Tensor, reached: Tensor) -> Tensor:
+        """What actions (B,) earn in states (B,) int64, both, where they reach the target or not, (B,) bool."""
+        return self.reward_table[reached.long(), state, action]
 
     def _draw_start(self, uniform: Tensor, target: Tensor) -> Tensor:
         rank = (uniform * self.world.start_count[target]).long()

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from clearway.choices import RewardName, ZoneLevel
+from clearway.choices import ZoneLevel
 from clearway.envs.arguments import SceneSource, seed_words
 from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.options import RESET_MASK
@@ -18,6 +18,7 @@ from clearway.envs.spaces import ObservationKind
 from clearway.envs.vector import ImageGoalVectorEnv, Info, Observation
 from clearway.errors import EnvError
 from clearway.reward import Reward
+from clearway.scenes.sensors import RGB
 
 
 class ImageGoalEnv(gymnasium.Env[Observation, int]):
@@ -52,14 +53,17 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | `observation` | `(K, F)` | `(K, H, W, 3)` | the last K poses, newest last; a blocked move repeats one   |
     | `target`      | `(F,)`   | `(H, W, 3)`    | the picture to find the place of                            |
 
-    Features are bounded by the power of two above the largest of the scenes.
+    Features are bounded by the power of two above the largest of the scenes. Further sensors that `sensors` names,
+    where the scenes have them, add two boxes each, of the sensor's dtype, unit and range: with
+    `observations="pictures", sensors=("rgb", "depth")` `depth` `(K, H, W)` and `target_depth` `(H, W)`, float32 metres.
 
     ## Rewards
 
     By the pose the agent arrives in: 10 at the target, -0.02 in the collision zone (moving forward or backward is
     blocked there), -0.011 in the precollision zone (one such move leads into the collision zone), -0.01 elsewhere. A
     blocked move arrives in the pose it left. With `reward="shortest"` every step costs 0.01, with `"bump"` a blocked
-    move 0.1; a `clearway.reward.Reward` sets each number, and clipping to [-1, 1].
+    move 0.1, with `"clearance"` the more the closer to an obstacle a step ends; a `clearway.reward.Reward` is made of
+    terms with parameters of their own, and can clip to [-1, 1].
 
     `info["cost"]` is 1.0 on a blocked move and 0.0 otherwise, for algorithms with constraints.
 
@@ -86,8 +90,9 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     |---------------------|---------------------|--------------------------------------------------------------------|
     | `scenes`            | required            | a `Scene` or scene file, or several of one encoder                 |
     | `targets`           | `None`              | state ids by scene name; None: `scenes.targets.default_targets`    |
-    | `reward`            | `"collision-aware"` | or `"shortest"`, `"bump"`, or a `Reward`                           |
+    | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name |
     | `observations`      | `"features"`        | or `"pictures"`                                                    |
+    | `sensors`           | `("rgb",)`          | whose pictures, for example `("rgb", "depth")`                     |
     | `zone_level`        | `"pose"`            | or `"cell"`: a cell is in a zone where any of its headings is      |
     | `max_episode_steps` | `None`              | steps until truncation; None for no limit (`make` sets 500)        |
     | `history_length`    | `4`                 | K                                                                  |
@@ -112,8 +117,9 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         scenes: SceneSource | Sequence[SceneSource],
         *,
         targets: Mapping[str, Sequence[int]] | None = None,
-        reward: RewardName | Reward = "collision-aware",
+        reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
+        sensors: Sequence[str] = (RGB,),
         zone_level: ZoneLevel = "pose",
         max_episode_steps: int | None = None,
         history_length: int = HISTORY_LENGTH,
@@ -124,6 +130,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
             targets=targets,
             reward=reward,
             observations=observations,
+            sensors=sensors,
             zone_level=zone_level,
             max_episode_steps=max_episode_steps,
             history_length=history_length,

@@ -1,4 +1,4 @@
-"""What the agent sees: observation spaces, and the features or pictures of any set of states.
+"""What the agent sees: observation spaces, and the features or the sensors' pictures of any set of states.
 
 States are numbered through all scenes, as in `World`. K poses of history, F features, pictures of height H and width W.
 """
@@ -12,8 +12,9 @@ import numpy as np
 from gymnasium import spaces
 
 from clearway.envs.world import World
-from clearway.errors import EnvError
+from clearway.errors import EnvError, SceneError
 from clearway.scenes.scene import Observations, Scene
+from clearway.scenes.sensors import RGB, Sensor
 
 ObservationKind = Literal["features", "pictures"]
 OBSERVATION_KINDS = ("features", "pictures")
@@ -50,36 +51,47 @@ class Features:
 
 
 class Pictures:
-    """The first-person pictures of states, read from the scenes when they are asked for.
+    """The first-person pictures of states by one sensor, read from the scenes when they are asked for.
 
     The pictures of the last call are kept, since an agent's history repeats them: a step reads one new picture.
 
+    Args:
+        scenes: in the order of the world's.
+        sensor: name of the sensor.
+
     Attributes:
-        shape: (H, W, 3).
+        sensor: what its pictures are.
+        shape: of one of them, for example (H, W, 3).
 
     Raises:
-        EnvError: a scene has no pictures, or pictures of another size than the first.
+        EnvError: a scene has no pictures of the sensor, or others than the first, in size, unit or range.
     """
 
-    def __init__(self, scenes: Sequence[Scene]) -> None:
-        self._sources = [_pictures_of(scene) for scene in scenes]
+    def __init__(self, scenes: Sequence[Scene], sensor: str = RGB) -> None:
+        self._sources = [_pictures_of(scene, sensor) for scene in scenes]
+        self.sensor, *others = [_sensor_of(scene, sensor) for scene in scenes]
         self._offsets = np.cumsum([0, *(scene.state_count for scene in scenes)])
         self.shape = tuple(self._sources[0].shape[1:])
         for scene, source in zip(scenes, self._sources, strict=True):
             if tuple(source.shape[1:]) != self.shape:
                 sizes = f"pictures of {source.shape[1:]}, those of {scenes[0].name} are {self.shape}"
                 raise EnvError(f"{scene.name}: {sizes}. Put scenes of one picture size in an environment")
+        for scene, other in zip(scenes[1:], others, strict=True):
+            if other != self.sensor:
+                problem = f"its sensor is {other.described()}, that of {scenes[0].name} is {self.sensor.described()}"
+                raise EnvError(f"{scene.name}: {problem}. Put scenes of one sensor in an environment")
         self._kept = np.empty(0, np.int64)
-        self._pictures = np.empty((0, *self.shape), np.uint8)
+        self._pictures = np.empty((0, *self.shape), self.sensor.dtype)
 
     def space(self, *leading: int) -> spaces.Box:
-        """Space of arrays of pictures, (*leading, H, W, 3)."""
-        return spaces.Box(0, 255, (*leading, *self.shape), np.uint8)
+        """Space of arrays of pictures, (*leading, *shape), bounded by the sensor's range."""
+        sensor = self.sensor
+        return spaces.Box(sensor.low, sensor.high, (*leading, *self.shape), np.dtype(sensor.dtype).type)
 
     def read(self, states: np.ndarray) -> np.ndarray:
-        """Pictures of states (...) int64, (..., H, W, 3) uint8."""
+        """Pictures of states (...) int64, (..., *shape) of the sensor's dtype and in its unit."""
         wanted, position = np.unique(states, return_inverse=True)
-        pictures = np.empty((len(wanted), *self.shape), np.uint8)
+        pictures = np.empty((len(wanted), *self.shape), self.sensor.dtype)
         _, here, there = np.intersect1d(wanted, self._kept, assume_unique=True, return_indices=True)
         pictures[here] = self._pictures[there]
         missing = np.setdiff1d(np.arange(len(wanted)), here, assume_unique=True)
@@ -91,10 +103,17 @@ class Pictures:
         return pictures[position.reshape(np.shape(states))]
 
 
-def _pictures_of(scene: Scene) -> Observations:
-    if scene.observations is None:
+def _pictures_of(scene: Scene, sensor: str) -> Observations:
+    if not scene.sensors:
         raise EnvError(f"{scene.name}: the scene has no pictures. Ask for observations='features'")
-    return scene.observations
+    try:
+        return scene.seen_by(sensor)
+    except SceneError as fault:
+        raise EnvError(str(fault)) from fault
+
+
+def _sensor_of(scene: Scene, name: str) -> Sensor:
+    return next(sensor for sensor in scene.sensors if sensor.name == name)
 
 
 def _power_of_two_above(values: np.ndarray) -> float:
@@ -105,17 +124,36 @@ def _power_of_two_above(values: np.ndarray) -> float:
     return float(2.0 ** np.ceil(np.log2(max(largest, 1.0))))
 
 
-def observation_source(scenes: Sequence[Scene], kind: ObservationKind, world: World) -> Features | Pictures:
-    """Where observations of a kind come from.
+Sources = dict[tuple[str, str], Features | Pictures]
+"""Where observations come from, by the keys of the poses' and of the target's."""
+
+
+def observation_sources(
+    scenes: Sequence[Scene], kind: ObservationKind, sensors: Sequence[str], world: World
+) -> Sources:
+    """Where observations of a kind come from: features, or the pictures of each sensor.
 
     Raises:
-        EnvError: the kind is unknown, or the scenes do not hold it.
+        EnvError: the kind is unknown, sensors are asked for beside features, or the scenes do not hold them.
     """
     if kind not in OBSERVATION_KINDS:
         raise EnvError(f"observations={kind!r} is unknown. Use one of {', '.join(map(repr, OBSERVATION_KINDS))}")
-    return Features(world) if kind == "features" else Pictures(scenes)
+    if isinstance(sensors, str) or not sensors or len(set(sensors)) < len(sensors):
+        raise EnvError(f"sensors={sensors!r}: expected names, each once, such as ('rgb', 'depth')")
+    if kind == "pictures":
+        return {_keys(name): Pictures(scenes, name) for name in sensors}
+    if tuple(sensors) != (RGB,):
+        raise EnvError(f"sensors={sensors!r}: features are of one encoder. Ask for observations='pictures'")
+    return {_keys(RGB): Features(world)}
 
 
-def observation_space(source: Features | Pictures, history_length: int) -> spaces.Dict:
-    """Space of one environment's observations: `observation` (K, ...), newest last, and `target` (...)."""
-    return spaces.Dict(observation=source.space(history_length), target=source.space())
+def _keys(sensor: str) -> tuple[str, str]:
+    return ("observation", "target") if sensor == RGB else (sensor, f"target_{sensor}")
+
+
+def observation_space(sources: Sources, history_length: int) -> spaces.Dict:
+    """Space of one environment's observations: of the poses (K, ...), newest last, and of the target (...)."""
+    boxes: dict[str, spaces.Space] = {}
+    for (poses, target), source in sources.items():
+        boxes |= {poses: source.space(history_length), target: source.space()}
+    return spaces.Dict(boxes)

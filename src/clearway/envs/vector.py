@@ -14,7 +14,7 @@ from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from clearway.choices import RewardName, ZoneLevel
+from clearway.choices import ZoneLevel
 from clearway.envs.arguments import (
     NO_LIMIT,
     SceneSource,
@@ -22,7 +22,6 @@ from clearway.envs.arguments import (
     check_numbers,
     checked_actions,
     chosen_autoreset,
-    chosen_reward,
     chosen_targets,
     loaded_scenes,
     seed_words,
@@ -31,10 +30,11 @@ from clearway.envs.navigation import HISTORY_LENGTH, Navigation, TargetChoice
 from clearway.envs.options import EpisodeChoice, environments_to_reset, episode_choice
 from clearway.envs.record import EpisodeRecord
 from clearway.envs.render import RENDER_MODES, Renderer
-from clearway.envs.spaces import ObservationKind, observation_source, observation_space
+from clearway.envs.spaces import ObservationKind, observation_sources, observation_space
 from clearway.envs.world import make_world
-from clearway.reward import Reward
+from clearway.reward import Reward, reward_named
 from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.sensors import RGB
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
@@ -50,7 +50,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     `MultiDiscrete([4] * N)`: one action an agent.
 
     ## Observation Space
-    `Dict(observation, target)` with a leading axis N.
+    `Dict(observation, target)`, and two boxes more for each further sensor, with a leading axis N.
 
     ## Rewards
     (N,) float64. In the mode NEXT_STEP the step that resets an environment earns 0.
@@ -92,8 +92,9 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         scenes: SceneSource | Sequence[SceneSource],
         *,
         targets: Mapping[str, Sequence[int]] | None = None,
-        reward: RewardName | Reward = "collision-aware",
+        reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
+        sensors: Sequence[str] = (RGB,),
         zone_level: ZoneLevel = "pose",
         max_episode_steps: int | None = None,
         history_length: int = HISTORY_LENGTH,
@@ -111,15 +112,15 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         seen = loaded if observations == "features" else [replace(scene, features=None) for scene in loaded]
         self._world = make_world(seen, chosen, zone_level)
         self._distances = self._world.distance_table()
-        self._source = observation_source(loaded, observations, self._world)
-        self.single_observation_space = observation_space(self._source, history_length)
+        self._sources = observation_sources(loaded, observations, sensors, self._world)
+        self.single_observation_space = observation_space(self._sources, history_length)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = Discrete(ACTION_COUNT)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
         self._navigation = Navigation(
             self._world,
-            chosen_reward(reward),
+            reward_named(reward),
             torch.from_numpy(np.random.default_rng().integers(2**63, size=num_envs)),
             step_limit=None if max_episode_steps == NO_LIMIT else max_episode_steps,
             history_length=history_length,
@@ -228,8 +229,13 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     def _observe(self) -> Observation:
         history, target = self._navigation.history, self._world.target_state[self._navigation.target]
-        seen = self._source.read(torch.cat([history, target[:, None]], 1).numpy())  # (N, K + 1, ...)
-        return {"observation": np.ascontiguousarray(seen[:, :-1]), "target": np.ascontiguousarray(seen[:, -1])}
+        states = torch.cat([history, target[:, None]], 1).numpy()  # (N, K + 1)
+        observation = {}
+        for (poses_key, target_key), source in self._sources.items():
+            seen = source.read(states)  # (N, K + 1, ...)
+            observation[poses_key] = np.ascontiguousarray(seen[:, :-1])
+            observation[target_key] = np.ascontiguousarray(seen[:, -1])
+        return observation
 
     def _info(self, collision: np.ndarray, where: np.ndarray) -> Info:
         """The info of the environments in where (N,) bool; zeros elsewhere, as Gymnasium fills them."""

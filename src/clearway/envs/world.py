@@ -1,4 +1,7 @@
-"""`World`: the look-up tables of a scene set and its targets. States of all scenes share one numbering.
+"""`World`: the look-up tables of a scene set, and the targets that are walked to in it.
+
+States of all scenes share one numbering. Tables are made once; `World.with_targets` gives them other targets and shares
+everything else.
 
 Axis letters: S states of all scenes, A actions, F features, M targets, C scenes.
 """
@@ -8,21 +11,21 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from numbers import Integral
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from clearway.choices import FeatureStore, ZoneLevel
+from clearway.clearance import scene_clearance_m
 from clearway.envs.feature_store import LARGEST_FLOAT16, empty_store
+from clearway.envs.targets import Starts, checked_states, starts_to
 from clearway.errors import SceneError
+from clearway.reward import Moves
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import Scene
 from clearway.zones import scene_zones
-
-LEAST_SHARE = 0.5  # of the scene's largest component, from which a target must be reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,8 @@ class World:
         next_state: (S, A) int64; a blocked move leads back to its own state.
         blocked: (S, A) bool.
         zone: (S,) int64 (`zones.Zone`).
+        clearance_m: (S,) float64, distance to the nearest obstacle, see `clearance`.
+        largest_part: (C,) int64, states of each scene's largest strongly connected component.
         features: (S, F) float32, or as `feature_store` says; None where the scenes have none.
         target_state: (M,) int64, in the numbering of all scenes.
         target_scene: (M,) int64, ascending.
@@ -49,6 +54,8 @@ class World:
     next_state: Tensor
     blocked: Tensor
     zone: Tensor
+    clearance_m: Tensor
+    largest_part: Tensor
     features: Tensor | None
     target_state: Tensor
     target_scene: Tensor
@@ -87,6 +94,52 @@ class World:
     def distance_table(self) -> DistanceTable:
         """Steps from states to targets, to be looked up."""
         return DistanceTable(self)
+
+    def moves(self) -> Moves:
+        """What a reward's terms look at."""
+        tables = (self.next_state, self.blocked, self.zone, self.clearance_m)
+        return Moves(*(table.cpu().numpy() for table in tables))
+
+    def graph(self, scene: int) -> np.ndarray:
+        """Moves of one scene in its own numbering, (S of the scene, A) int64; -1 where one is blocked."""
+        first, last = self.scene_offset[scene : scene + 2].tolist()
+        onward = (self.next_state[first:last] - first).cpu().numpy()
+        return np.where(self.blocked[first:last].cpu().numpy(), BLOCKED, onward)
+
+    def with_targets(self, targets: Mapping[str, Sequence[int]]) -> World:
+        """The same tables, shared, with other targets; scenes that are not named have none.
+
+        Args:
+            targets: state ids by scene name, in the scene's own numbering; at least one.
+
+        Raises:
+            SceneError: a scene is not there, or a target is no state id, out of range, repeated or out of reach.
+        """
+        _check_names(self.scene_names, targets)
+        starts: list[Starts] = []
+        state, scene = [], []
+        for index, name in enumerate(self.scene_names):
+            if name not in targets:
+                continue
+            first, last = self.scene_offset[index : index + 2].tolist()
+            own = checked_states(name, targets[name], last - first)
+            starts += starts_to(name, self.graph(index), own, first, int(self.largest_part[index]))
+            state += [first + one for one in own]
+            scene += [index] * len(own)
+        count = np.array([len(one.state) for one in starts], np.int64)
+
+        def table(values: np.ndarray) -> Tensor:
+            return torch.from_numpy(values).to(self.device)
+
+        return replace(
+            self,
+            target_state=table(np.array(state, np.int64)),
+            target_scene=table(np.array(scene, np.int64)),
+            start_state=table(np.concatenate([one.state for one in starts])),
+            start_steps=table(np.concatenate([one.steps for one in starts])),
+            start_offset=table(np.cumsum(count) - count),
+            start_count=table(count),
+        )
 
     def scene_state(self, target: int) -> int:
         """The target's state in its own scene's numbering."""
@@ -130,7 +183,7 @@ def make_world(
     zone_level: ZoneLevel = "pose",
     feature_store: FeatureStore = "memory",
 ) -> World:
-    """The tables of some scenes with their targets.
+    """The tables of some scenes, with targets in each of them.
 
     Args:
         scenes: scenes with distinct names.
@@ -144,70 +197,56 @@ def make_world(
             the store.
         RunError: there is no room for the features.
     """
-    _check_set(scenes, targets)
+    names = [scene.name for scene in scenes]
+    _check_distinct(names)
+    _check_names(names, targets)
+    for name in names:
+        checked_states(name, targets.get(name, ()), scenes[names.index(name)].state_count)
+    return scene_tables(scenes, zone_level, feature_store).with_targets(targets)
+
+
+def scene_tables(
+    scenes: Sequence[Scene], zone_level: ZoneLevel = "pose", feature_store: FeatureStore = "memory"
+) -> World:
+    """The tables of some scenes, without targets; arguments and errors as of `make_world`."""
+    _check_distinct([scene.name for scene in scenes])
     offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
     graph = np.concatenate([_shifted(scene.graph, first) for scene, first in zip(scenes, offset, strict=False)])
-    starts = [_starts(scene, targets[scene.name]) for scene in scenes]
-    counts = np.array([len(state) for scene_starts in starts for state, _ in scene_starts], np.int64)
-    per_scene = [len(targets[scene.name]) for scene in scenes]
+    none = torch.empty(0, dtype=torch.int64)
     return World(
         scene_names=tuple(scene.name for scene in scenes),
         scene_offset=torch.from_numpy(offset),
         next_state=torch.from_numpy(next_states(graph)),
         blocked=torch.from_numpy(graph == BLOCKED),
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
+        clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
+        largest_part=torch.tensor([np.count_nonzero(scene.components == 0) for scene in scenes]),
         features=_joined_features(scenes, feature_store),
-        target_state=_joined([np.asarray(targets[s.name]) + o for s, o in zip(scenes, offset, strict=False)]),
-        target_scene=torch.from_numpy(np.repeat(np.arange(len(scenes)), per_scene)),
-        start_state=_joined([state + o for st, o in zip(starts, offset, strict=False) for state, _ in st]),
-        start_steps=_joined([steps for scene_starts in starts for _, steps in scene_starts]),
-        start_offset=torch.from_numpy(np.cumsum(counts) - counts),
-        start_count=torch.from_numpy(counts),
+        target_state=none,
+        target_scene=none,
+        start_state=none,
+        start_steps=none,
+        start_offset=none,
+        start_count=none,
         feature_store=feature_store,
     )
-
-
-def _joined(parts: list[np.ndarray]) -> Tensor:
-    return torch.from_numpy(np.concatenate(parts).astype(np.int64))
 
 
 def _shifted(graph: np.ndarray, first: int) -> np.ndarray:
     return np.where(graph == BLOCKED, BLOCKED, graph.astype(np.int64) + first)
 
 
-def _starts(scene: Scene, targets: Sequence[int]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For each target: the states from which it can be reached (itself excluded) and their distances."""
-    found = []
-    for target, steps in zip(targets, scene.distances_to(np.asarray(targets)), strict=True):
-        state = np.flatnonzero(steps > 0)
-        if len(state) < max(1, LEAST_SHARE * (np.count_nonzero(scene.components == 0) - 1)):
-            problem = f"only {len(state)} of {scene.state_count} states lead to target {target}"
-            raise SceneError(scene.name, problem, "Choose a target in the scene's largest component", "graph")
-        found.append((state, steps[state]))
-    return found
-
-
-def _check_set(scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]) -> None:
-    names = [scene.name for scene in scenes]
+def _check_distinct(names: Sequence[str]) -> None:
     for name, count in Counter(names).items():
         if count > 1:
             raise SceneError(name, "two scenes have this name", "Rename one of the files")
+
+
+def _check_names(names: Sequence[str], targets: Mapping[str, Sequence[int]]) -> None:
     for name in targets:
         if name not in names:
             problem = "targets are given for this scene, which is not among the scenes"
             raise SceneError(name, problem, f"Name targets of {', '.join(names)} alone, or add the scene")
-    for scene in scenes:
-        chosen = list(targets.get(scene.name, ()))
-        if not chosen:
-            raise SceneError(scene.name, "the scene has no target", "Give at least one state id as its target")
-        for target in chosen:
-            if not isinstance(target, Integral) or isinstance(target, bool):
-                raise SceneError(scene.name, f"target {target!r} is no state id", "Give whole numbers as targets")
-            if not 0 <= target < scene.state_count:
-                valid = f"states are 0 to {scene.state_count - 1}"
-                raise SceneError(scene.name, f"target {target} is out of range ({valid})", "Choose another target")
-        if len(set(chosen)) < len(chosen):
-            raise SceneError(scene.name, "a target is named twice", "Name every target once")
 
 
 def _joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | None:

@@ -12,7 +12,6 @@ from clearway.envs.world import World
 from clearway.evaluate.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, make_task, yardstick
 from clearway.model.policy import Policy
 from clearway.reward import Reward
-from clearway.scenes.actions import BLOCKED
 
 OPTIMUM, SOFT_FIXED_POINT = "optimum", "soft fixed point"  # names of the two policies in tables
 
@@ -56,13 +55,12 @@ def world_yardsticks(
         entropy_weight: see there.
         starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
     """
-    graph = torch.where(world.blocked, BLOCKED, world.next_state).cpu().numpy()
-    zone = world.zone.cpu().numpy()
+    zone, clearance_m = world.zone.cpu().numpy(), world.clearance_m.cpu().numpy()
     found = []
     for target, scene in enumerate(world.target_scene.tolist()):
         first, last = world.scene_offset[scene : scene + 2].tolist()
-        local = np.where(graph[first:last] == BLOCKED, BLOCKED, graph[first:last] - first)
-        task = make_task(local, zone[first:last], world.scene_state(target), reward)
+        tables = zone[first:last], world.scene_state(target), reward, clearance_m[first:last]
+        task = make_task(world.graph(scene), *tables)
         exact = yardstick(task, discount, entropy_weight, None if starts is None else starts[target] - first)
         found.append(TargetYardstick(world.scene_names[scene], task.target, exact))
     return found

@@ -22,8 +22,9 @@ import numpy as np
 from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import splu
 
+from clearway.envs.targets import Starts
 from clearway.errors import SceneError
-from clearway.reward import Reward
+from clearway.reward import Moves, Reward
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED
 from clearway.scenes.graph import distances_to, next_states
 from clearway.zones import Zone
@@ -89,20 +90,30 @@ class Yardstick:
     soft_policy: np.ndarray
 
 
-def make_task(graph: np.ndarray, zone: np.ndarray, target: int, reward: Reward) -> Task:
-    """The decision problem of reaching `target` in a graph (S, A) with zones (S,).
+def make_task(
+    graph: np.ndarray, zone: np.ndarray, target: int, reward: Reward, clearance_m: np.ndarray | None = None
+) -> Task:
+    """The decision problem of reaching `target` in a graph (S, A) with zones (S,), under a reward.
+
+    Args:
+        graph: next state by action, -1 where a move is blocked.
+        zone: of each pose.
+        target: state.
+        reward: is earned.
+        clearance_m: (S,) float64, of each pose; None: there is no obstacle anywhere near.
 
     Raises:
         SceneError: no state leads to the target.
     """
     after = next_states(graph)
     blocked = graph == BLOCKED
+    clearance_m = np.full(len(graph), np.inf) if clearance_m is None else clearance_m
     steps = distances_to(graph, np.array([target]))[0]
-    starts = np.flatnonzero(steps > 0)
+    starts = Starts.of(steps).state
     if not len(starts):
         raise SceneError("graph", f"no state leads to target {target}", "Choose a target in the largest component")
-    reached = (after == target).astype(np.int64)
-    earned = reward.table()[reached, blocked.astype(np.int64), zone[after]]
+    step, arrival = reward.table(Moves(after, blocked, zone, clearance_m))
+    earned = np.where(after == target, arrival, step)
     return Task(target, after, blocked, earned, zone, starts, steps)
 
 

@@ -6,7 +6,7 @@ Axis letters: J metrics, M targets, C scenes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,10 +47,11 @@ class Trained:
     zone_level: ZoneLevel
 
     def __str__(self) -> str:
-        values = {name: value for name, value in asdict(self.reward).items() if name not in ("name", "clip")}
-        told = ", ".join(f"{name} {value:g}" for name, value in values.items() if value is not None)
-        clipped = ", clipped to [-1, 1]" if self.reward.clip else ""
-        return f"{self.frames:,} frames, seed {self.seed}, reward {told}{clipped}, zones of {self.zone_level}s"
+        return f"{self.frames:,} frames, seed {self.seed}, reward {self.reward}, zones of {self.zone_level}s"
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values."""
+        return {**vars(self), "reward": self.reward.to_json()}
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ class Evaluation:
         return {
             "agent": self.agent,
             "encoder": self.encoder,
-            **({"trained": asdict(self.trained)} if self.trained else {}),
+            **({"trained": self.trained.to_json()} if self.trained else {}),
             "episodes_per_target": self.protocol.episodes_per_target,
             "step_cap": self.protocol.step_cap,
             "seed": self.protocol.seed,

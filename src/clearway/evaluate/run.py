@@ -78,7 +78,7 @@ def evaluate_runs(
 def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
     """What would be best under each reward, exactly, and where the published loss comes to rest (see `oracle`)."""
     found: dict[str, Policy] = {}
-    for reward in dict.fromkeys(rewards):
+    for reward in dict.fromkeys(reward for reward in rewards if reward.is_known):
         exact = world_yardsticks(world, reward)
         best, soft = optimum_policies(world, exact)
         if not reward.clip:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from clearway.envs.world import World, make_world
+from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.evaluate.episodes import Trajectory, run_episodes
 from clearway.evaluate.selection import ActionSelection
-from clearway.learn.load import Agent
+from clearway.learn.load import Agent, run_tables
 from clearway.scenes.scene import Scene
 
 
@@ -21,8 +21,8 @@ def single_episode(
     selection: ActionSelection,
     step_cap: int,
     seed: int,
-) -> tuple[World, int, Trajectory]:
-    """The episode, with the world it was walked in and the index of its target there.
+) -> tuple[World, Trajectory]:
+    """The episode, with the world it was walked in, which has its target alone.
 
     Args:
         agent: who walks.
@@ -42,8 +42,7 @@ def single_episode(
     if wanted not in trained:
         raise RunError(f"scene {wanted}: not of this run, which has {', '.join(trained)}. Give one of these")
     goal = trained[wanted][0] if target is None else target
-    targets = {name: (goal,) if name == wanted else own[:1] for name, own in trained.items()}
-    world = make_world(scenes, targets, agent.record.zone_level)
+    world = run_tables(agent.record, scenes).with_targets({wanted: (goal,)})
     table = run_episodes(
         world,
         agent.policy(world),
@@ -54,6 +53,5 @@ def single_episode(
         record=True,
         history_length=agent.record.learner.history_length,
     )
-    index = list(trained).index(wanted)  # one target a scene, in the scenes' order
     assert table.trajectories is not None
-    return world, index, table.trajectories[index]
+    return world, table.trajectories[0]

@@ -23,7 +23,7 @@ from clearway.experiments.kept import keep, kept
 from clearway.experiments.plan import Job
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
-from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
+from clearway.reward import COLLISION_AWARE, Reward
 
 FILE = "analysis.json"
 BETAS = (-0.01, -0.02, -0.05, -0.1, -0.2)
@@ -51,10 +51,11 @@ class Point:
     @property
     def reward(self) -> Reward:
         """The reward of the setting."""
-        return replace(COLLISION_AWARE, name="grid", beta=self.beta, gamma=self.gamma, clip=self.clip)
+        return COLLISION_AWARE.with_changes(beta=self.beta, gamma=self.gamma, clip=self.clip)
 
 
-PAPERS_POINT = Point(COLLISION_AWARE.beta, COLLISION_AWARE.gamma, ENTROPY_WEIGHT, True, "pose")
+PAPER = COLLISION_AWARE.parameters
+PAPERS_POINT = Point(PAPER["beta"], PAPER["gamma"], ENTROPY_WEIGHT, True, "pose")
 
 
 def grid(whole: bool) -> Iterator[Point]:
@@ -68,9 +69,9 @@ def grid(whole: bool) -> Iterator[Point]:
     """
     for beta in BETAS if whole else BETAS[:2]:
         for share in GAMMA_SHARES if whole else GAMMA_SHARES[1:2]:
-            gamma = round(COLLISION_AWARE.alpha + share * (beta - COLLISION_AWARE.alpha), 6)
+            gamma = round(PAPER["alpha"] + share * (beta - PAPER["alpha"]), 6)
             yield replace(PAPERS_POINT, beta=beta, gamma=gamma)
-    for beta, gamma in ((SHORTEST.beta, SHORTEST.gamma), (PAPERS_POINT.beta, PAPERS_POINT.gamma)):
+    for beta, gamma in ((PAPER["alpha"], PAPER["alpha"]), (PAPERS_POINT.beta, PAPERS_POINT.gamma)):
         for entropy in ENTROPIES:
             for clip in (True, False):
                 for level in LEVELS:

@@ -113,7 +113,5 @@ def hindsight_batch(
 
 def _reward(rollout: Rollout, rows: Segments, navigation: Navigation) -> Tensor:
     """(R,) the reward each step would have earned with the target passed by."""
-    world = navigation.world
     here, action = rollout.history[rows.step, rows.env, -1], rollout.action[rows.step, rows.env]
-    zone = world.zone[rollout.arrived[rows.step, rows.env]]
-    return navigation.reward_table[rows.hit.long(), world.blocked[here, action].long(), zone]
+    return navigation.earned(here, action, rows.hit)

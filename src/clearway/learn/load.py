@@ -8,7 +8,7 @@ from pathlib import Path
 
 from torch import Tensor
 
-from clearway.envs.world import World, make_world
+from clearway.envs.world import World, make_world, scene_tables
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
 from clearway.learn.named_tensors import part_of
@@ -39,13 +39,18 @@ class Agent:
 
     def policy(self, world: World) -> Policy:
         """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
-        return network_policy(self._lookup(world), world)
+        return network_policy(self.lookup(world), world)
 
     def critic(self, world: World) -> Critic:
         """As `policy`, with the values (B,) too."""
-        return network_critic(self._lookup(world), world)
+        return network_critic(self.lookup(world), world)
 
-    def _lookup(self, world: World) -> LookupNetwork:
+    def lookup(self, world: World) -> LookupNetwork:
+        """The network on the states of a world with the run's scenes, for its targets.
+
+        Raises:
+            RunError: the world has other scenes, or other features or none.
+        """
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")
         names = tuple(scene.name for scene in self.record.scenes)
@@ -127,3 +132,8 @@ def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Sc
 def run_world(record: RunRecord, scenes: Sequence[Scene]) -> World:
     """The world of a run."""
     return make_world(scenes, record.targets, record.zone_level)
+
+
+def run_tables(record: RunRecord, scenes: Sequence[Scene]) -> World:
+    """The tables of a run's scenes, without targets; `World.with_targets` gives them any."""
+    return scene_tables(scenes, record.zone_level)

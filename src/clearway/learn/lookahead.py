@@ -75,8 +75,7 @@ def better_policy(
     start_value = network.start_values(state, goal, rows_per_scene)  # (P,)
     reached = state == world.target_state[goal]
     worth = discount * torch.where(reached, 0.0, start_value)
-    blocked = arrived == history[row, -1]
-    reward = navigation.reward_table[reached[pair_of].long(), blocked.long(), world.zone[arrived]] * reward_scale
+    reward = navigation.earned(history[row, -1], action, reached[pair_of]) * reward_scale
     advantage = torch.zeros_like(log_pi)
     advantage[row, action] = reward + worth[pair_of] - value[row]
     return torch.softmax(log_pi + advantage / temperature, 1)

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -26,13 +26,12 @@ from clearway.errors import RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.config import ADDED_LATER, Learner
 from clearway.learn.provenance import hardware, package_versions
-from clearway.reward import Reward
+from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
 
 FORMAT_VERSION = 1
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
-Settings = TypeVar("Settings", Learner, Reward)
 
 
 @dataclass(frozen=True)
@@ -77,12 +76,16 @@ class RunRecord:
         """The reward as training paid it."""
         return self.learner.paid(self.reward)
 
+    def to_json(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {**asdict(self), "reward": self.reward.to_json()}
+
     def same_experiment(self, other: RunRecord) -> bool:
         """Both would give the same agent: all but versions, hardware, paths and command agree."""
 
         def essence(run: RunRecord) -> tuple:
             scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
-            return run.learner, run.reward, run.seed, run.zone_level, scenes
+            return run.learner, run.reward.to_json(), run.seed, run.zone_level, scenes
 
         return essence(self) == essence(other)
 
@@ -176,7 +179,7 @@ class RunFolder:
 
     def write_record(self, record: RunRecord) -> None:
         """Write run.json."""
-        content = {"format_version": FORMAT_VERSION, **asdict(record)}
+        content = {"format_version": FORMAT_VERSION, **record.to_json()}
         with written_whole(self.path / RUN_FILE) as part:
             part.write_text(json.dumps(content, indent=2) + "\n")
 
@@ -247,7 +250,7 @@ def _record_from(content: Mapping[str, Any]) -> RunRecord:
             raise TypeError(f"{name} is {content[name]!r:.40}")
     return RunRecord(
         learner=_settings(Learner, {**ADDED_LATER, **content["learner"]}),
-        reward=_settings(Reward, content["reward"]),
+        reward=reward_from_json(content["reward"]),
         seed=content["seed"],
         zone_level=content["zone_level"],
         scenes=tuple(_scene_record(scene) for scene in content["scenes"]),
@@ -263,7 +266,7 @@ def _maker(content: Mapping[str, Any]) -> str:
     return str(versions.get("clearway", __version__))[:40] if isinstance(versions, dict) else __version__
 
 
-def _settings(kind: type[Settings], content: Mapping[str, Any]) -> Settings:
+def _settings(kind: type[Learner], content: Mapping[str, Any]) -> Learner:
     """A settings object from JSON that has exactly its fields."""
     expected = {field.name for field in fields(kind)}
     if set(content) != expected:

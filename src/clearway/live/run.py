@@ -18,10 +18,11 @@ from clearway.live.room import LiveRoom, live_room
 from clearway.live.settings import Setting
 from clearway.live.tables import markdown_tables
 from clearway.perception.encode import encoder_from_record
-from clearway.perception.encoder import Encoder
+from clearway.perception.encoder import Encoder, sensor_of
 from clearway.scenes.rooms.camera import eye_view
 from clearway.scenes.rooms.render import Camera, studio
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import EncoderRecord, Scene
+from clearway.scenes.sensors import RGB
 
 JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
 JSON_PART, MARKDOWN_PART = "live.part.json", "live.part.md"
@@ -73,18 +74,29 @@ def stages(agents: Mapping[str, Agent], scenes: Sequence[Scene]) -> Iterator[lis
     Raises:
         SceneError: a scene is none of our rooms.
         EncoderError: an encoder cannot be had again.
+        RunError: an encoder is unknown, or takes no colour pictures.
     """
     record = next(iter(agents.values())).record
     with ExitStack() as opened:
         found = []
         for scene in scenes:
+            record_of_encoder = _encoder_record(scene)  # before the seconds that the room takes
             live = live_room(scene)
-            if scene.encoder is None:
-                raise RunError(f"scene {scene.name} has no record of its encoder. Encode it and train again")
-            encoder = encoder_from_record(scene.encoder)
+            encoder = encoder_from_record(record_of_encoder)
             world = make_world([scene], {scene.name: record.targets[scene.name]}, record.zone_level)
             found.append(Stage(live, world, encoder, opened.enter_context(studio(live.model, eye_view()))))
         yield found
+
+
+def _encoder_record(scene: Scene) -> EncoderRecord:
+    """What made the scene's features of colour pictures. Raises RunError where it is unknown, or takes others."""
+    if scene.encoder is None:
+        raise RunError(f"scene {scene.name} has no record of its encoder. Encode it and train again")
+    seen = sensor_of(scene.encoder)
+    if seen != RGB:
+        problem = f"its encoder {scene.encoder.name} sees {seen}, and live walks take colour pictures"
+        raise RunError(f"scene {scene.name}: {problem}. Evaluate on the grid: clearway evaluate")
+    return scene.encoder
 
 
 def walk_setting(

@@ -9,6 +9,7 @@ Axis letters: B rows, K history, S states, F features, H width, M targets, U sta
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Protocol
 
 import torch
@@ -23,6 +24,9 @@ MOST_ROWS = 131_072  # projected states kept while nothing is being learnt from 
 
 class FirstLayer(Protocol):
     """What both ways offer. Results are sums over the K slots, before bias and ReLU, in the dtype of the factors."""
+
+    def for_targets(self, target_state: Tensor) -> FirstLayer:
+        """The same layer, its tables shared, with other targets (M,) int64; to look up, not to learn."""
 
     def refresh(self, keep: bool) -> None:
         """The weight has changed; `keep`: the states that occurred since the last time will occur again."""
@@ -63,6 +67,12 @@ class AllStates:
         columns = self.history_length * self.width
         self.projected = self.features.new_empty(len(features), columns)
         self.by_state = weight.new_empty(0, columns)
+
+    def for_targets(self, target_state: Tensor) -> AllStates:
+        """See `FirstLayer`."""
+        other = copy(self)
+        other.target_state = target_state
+        return other
 
     def refresh(self, keep: bool) -> None:
         """The weight has changed; `keep` makes no difference here."""
@@ -127,6 +137,13 @@ class VisitedStates:
         self.projected = torch.empty(0, columns, dtype=dtype, device=device)
         self.targets = self._read(target_state)  # (M, F)
         self.by_state, self.by_target = weight.new_empty(0, columns), weight.new_empty(0, self.width)
+
+    def for_targets(self, target_state: Tensor) -> VisitedStates:
+        """See `FirstLayer`; states are projected by the layer that they are asked of."""
+        other = copy(self)
+        other.row_of, other.known, other.targets = torch.full_like(self.row_of, -1), 0, self._read(target_state)
+        other.rows, other.projected = self.rows[:0], self.projected[:0]
+        return other
 
     def refresh(self, keep: bool) -> None:
         """The weight has changed; `keep` the states that are known and project them anew."""

@@ -20,6 +20,7 @@ Axis letters: B rows, U histories, K history, S states, F features, H width, M t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from itertools import accumulate
 
@@ -118,7 +119,7 @@ class LookupNetwork:
     ) -> None:
         shape = network.shape
         assert features.shape[1] == shape.feature_count, "features do not fit the network"
-        self.network, self.target_state = network, target_state
+        self.network = network
         self.width, self.history_length = shape.width, shape.history_length
         weight = network.siamese_weight.data
         self.dtype = dtype or weight.dtype
@@ -126,14 +127,28 @@ class LookupNetwork:
         layer = AllStates if projects_all(len(features), most_seen, features.device) else VisitedStates
         self.first_layer: FirstLayer = layer(weight, features, target_state, self.dtype)
         self.workspace, self.batches = torch.empty(0, self.width, device=features.device, dtype=self.dtype), 0
-        goals = len(target_state)
-        self.all_targets = torch.arange(goals, device=features.device)
-        self.known = torch.zeros(goals, dtype=torch.bool, device=features.device)  # whose rows below are up to date
-        self.wanted = network.siamese_bias.new_zeros(goals, self.width)
-        self.target_term = self.wanted.to(self.dtype, copy=True)  # of the fusion layer, before its ReLU
+        self._make_room(target_state)
         for parameter in network.parameters():
             parameter.grad = torch.zeros_like(parameter)
         self.refresh()
+
+    def for_targets(self, target_state: Tensor) -> LookupNetwork:
+        """The same network with other targets (M,) int64, for forward passes: no state is projected anew."""
+        other = copy(self)
+        other.first_layer = self.first_layer.for_targets(target_state)
+        other._make_room(target_state)
+        if len(target_state) <= FEW_TARGETS:
+            other._know(other.all_targets)
+        return other
+
+    def _make_room(self, target_state: Tensor) -> None:
+        """Tables of the target branch, nothing known yet."""
+        goals, device = len(target_state), target_state.device
+        self.target_state = target_state
+        self.all_targets = torch.arange(goals, device=device)
+        self.known = torch.zeros(goals, dtype=torch.bool, device=device)  # whose rows below are up to date
+        self.wanted = self.network.siamese_bias.new_zeros(goals, self.width)
+        self.target_term = self.wanted.to(self.dtype, copy=True)  # of the fusion layer, before its ReLU
 
     @torch.no_grad()
     def refresh(self, siamese_weight: bool = True, few_rows: bool = True) -> None:
@@ -299,6 +314,8 @@ class LookupNetwork:
     @torch.no_grad()
     def _know(self, targets: Tensor) -> None:
         """Compute the target branch of targets (U,) int64."""
+        if not len(targets):
+            return
         net = self.network
         wanted = self.first_layer.wanted(targets).to(self.wanted.dtype).add_(net.siamese_bias).relu_()
         self.wanted[targets] = wanted

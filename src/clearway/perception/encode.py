@@ -11,15 +11,16 @@ from functools import partial
 
 import numpy as np
 
-from clearway.errors import EncoderError
-from clearway.perception import plugged, pretrained, random_resnet, spread
+from clearway.errors import EncoderError, SceneError
+from clearway.perception import depth_grid, plugged, pretrained, random_resnet, spread
 from clearway.perception.cache import Entry, cached, content_key, joint_key
-from clearway.perception.encoder import Encoder, EncoderWarning
+from clearway.perception.encoder import Encoder, EncoderWarning, sensor_of
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
 from clearway.plugins import find_plugin
 from clearway.progress import picture_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
+from clearway.scenes.sensors import DEPTH, RGB
 from clearway.torch_threads import threads_in_use, torch_threads
 
 AUTO, TRAINED, RANDOM = "auto", "resnet50", "random-resnet50"
@@ -38,8 +39,8 @@ def find_record(
 
     Args:
         name: "resnet50" (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto"
-            (the first if it can be had, else the second), one of another package (`clearway.plugins`), or a vision
-            model on the Hugging Face hub or in a folder.
+            (the first if it can be had, else the second), "depth-grid" (of depth, without a network), one of another
+            package (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
         scenes: what "random-resnet50" calibrates on; their order does not matter.
         seed: of "random-resnet50".
         shape, preprocessing: of "random-resnet50".
@@ -53,6 +54,8 @@ def find_record(
     """
     if name == RANDOM:
         return _fitted(scenes, seed, shape, preprocessing)
+    if name == depth_grid.NAME:
+        return depth_grid.find_record()
     if name == TRAINED:
         return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
     if name != AUTO:
@@ -69,6 +72,12 @@ def find_record(
     return _standing_in(_fitted(scenes, seed, shape, preprocessing))
 
 
+def check_sees(encoder: str, sensors: Sequence[str]) -> None:
+    """Check that an encoder's sensor is among those that are to be rendered. Raises EncoderError."""
+    if encoder == depth_grid.NAME and DEPTH not in sensors:
+        raise EncoderError(f"encoder {encoder} sees depth, and it is not rendered. Add --sensors {RGB} {DEPTH}")
+
+
 def encoder_from_record(record: EncoderRecord) -> Encoder:
     """Make the encoder again that made a scene's features.
 
@@ -78,6 +87,8 @@ def encoder_from_record(record: EncoderRecord) -> Encoder:
     kind = record.settings.get("kind")
     if kind == random_resnet.KIND:
         return random_resnet.from_record(record)
+    if kind == depth_grid.KIND:
+        return depth_grid.from_record(record)
     if kind == pretrained.KIND:
         return pretrained.from_record(record)
     if kind == plugged.KIND:
@@ -106,7 +117,7 @@ def encode_scenes(
     decides the last bits: `batch` and the number of threads.
 
     Args:
-        scenes: scenes with pictures; those to be trained together must be encoded together.
+        scenes: scenes with pictures of the encoder's sensor; those to be trained together must be encoded together.
         encoder: a name, see `find_record`, or the record of an encoder to use again.
         seed: of "random-resnet50".
         threads: processor threads; None: as many as torch uses, one a core if nobody set it.
@@ -133,7 +144,7 @@ def encode_scenes(
         shaped_by = {"threads": threads_in_use() if here else 1, "batch": batch}
         encoded, done = [], 0
         for scene in scenes:
-            pictures = _pictures(scene)
+            pictures = _pictures(scene, sensor_of(record))
             key = joint_key(content_key(pictures), record.identity, shaped_by)
             make = partial(_encode_all, encode, record, pictures, batch, show_done, done)
             features = cached("features", key, make).arrays["features"]
@@ -194,10 +205,13 @@ def _encode_all(
     return Entry({"features": np.concatenate(parts)})
 
 
-def _pictures(scene: Scene) -> Observations:
-    if scene.observations is None:
+def _pictures(scene: Scene, sensor: str = RGB) -> Observations:
+    if not scene.sensors:
         raise EncoderError(f"scene {scene.name} has no pictures to encode. Use the features that its file holds")
-    return scene.observations
+    try:
+        return scene.seen_by(sensor)
+    except SceneError as fault:
+        raise EncoderError(str(fault)) from fault
 
 
 def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessing: Preprocessing) -> EncoderRecord:

@@ -17,11 +17,13 @@ import numpy as np
 from clearway.errors import EncoderError
 from clearway.perception.preprocess import Preprocessing, to_pixels
 from clearway.scenes.scene import EncoderRecord
+from clearway.scenes.sensors import RGB
 
 if TYPE_CHECKING:
     import torch
 
 IDENTITY_LETTERS = 12
+SENSOR = "sensor"  # the setting that names whose pictures an encoder takes, where they are not the colour camera's
 
 
 class EncoderWarning(UserWarning):
@@ -40,7 +42,7 @@ class Encoder(Protocol):
         """F."""
 
     def encode(self, pictures: np.ndarray) -> np.ndarray:
-        """Features (B, F) float32 of pictures (B, height, width, 3) uint8."""
+        """Features (B, F) float32 of its sensor's pictures (B, ...), for example (B, height, width, 3) uint8."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,11 @@ class NetworkEncoder:
         if not np.isfinite(features).all():
             raise EncoderError(f"encoder {self.record.name} made NaN or Inf of a picture. Use another encoder")
         return np.ascontiguousarray(features, dtype=np.float32)
+
+
+def sensor_of(record: EncoderRecord) -> str:
+    """Name of the sensor whose pictures an encoder takes, see `clearway.scenes.sensors`."""
+    return str(record.settings.get(SENSOR, RGB))
 
 
 def identity_of(settings: Mapping[str, object], contents: Iterable[bytes | memoryview]) -> str:

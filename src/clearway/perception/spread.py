@@ -28,13 +28,13 @@ _loaded: dict[str, Encoder] = {}  # by identity: a process that encodes many bat
 
 
 def batches(pictures: Observations, batch: int) -> Iterator[tuple[Observations, int, int]]:
-    """Batches of pictures (S, height, width, 3): where they are, the first and the last, last excluded.
+    """Batches of pictures (S, ...) of one sensor: where they are, the first and the last, last excluded.
 
     Pictures in memory are cut to the batch, so that no process is sent more than it needs.
     """
     for first in range(0, pictures.shape[0], batch):
         last = min(first + batch, pictures.shape[0])
-        if isinstance(pictures, np.ndarray):
+        if isinstance(getattr(pictures, "raw", pictures), np.ndarray):
             yield pictures[first:last], 0, last - first
         else:
             yield pictures, first, last

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
@@ -13,32 +13,41 @@ import numpy as np
 from clearway.scenes import floor_plans
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Provenance, Scene
+from clearway.scenes.sensors import RGB, check_names
 from clearway.scenes.validate import check_moves
 from clearway.version import __version__
 
 
 def build_scene(
-    name: str, seed: int = 0, *, workers: int | None = None, ray: str | None = None, progress: bool = False
+    name: str,
+    seed: int = 0,
+    *,
+    sensors: Sequence[str] = (RGB,),
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: bool = False,
 ) -> Scene:
     """One of our own rooms as a scene with pictures, held in memory, and without features.
 
     Args:
         name: of the room, one of `clearway.scenes.rooms.ROOM_NAMES`.
         seed: 0 is the default room; another gives other colours, pictures and small furniture.
+        sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
 
     Raises:
-        SceneError: there is no such room, or the agent fits nowhere in it.
+        SceneError: there is no such room or sensor, or the agent fits nowhere in it.
         RenderError: MuJoCo cannot render on this machine.
     """
+    check_names(sensors)
     check_mujoco()
     from clearway.scenes.rooms import build_room
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.navigation import find_grid
     from clearway.scenes.rooms.obstacles import AgentShape
-    from clearway.scenes.rooms.render_cluster import render_at
+    from clearway.scenes.rooms.sense import sense
     from clearway.scenes.rooms.topview import render_top_view
 
     title, agent = scene_name(name, seed), AgentShape()
@@ -48,7 +57,7 @@ def build_scene(
         model = room.spec.compile()
     top_view = render_top_view(model, room.width_m, room.depth_m)
     view = first_person_view(grid.state_locations_m, grid.state_headings_deg)
-    pictures = render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {title}")
+    pictures, further = sense(model, view, sensors, title=title, workers=workers, ray=ray, progress=progress)
     return Scene(
         name=title,
         observations=pictures,
@@ -59,11 +68,18 @@ def build_scene(
         made_by=Provenance(source="room", room=name, seed=seed, versions=shaping_versions()),
         cell_size_m=agent.step_m,
         top_view=top_view,
+        further=further,
     )
 
 
 def build_floor_plan(
-    plan: FloorPlan, seed: int = 0, *, workers: int | None = None, ray: str | None = None, progress: bool = False
+    plan: FloorPlan,
+    seed: int = 0,
+    *,
+    sensors: Sequence[str] = (RGB,),
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: bool = False,
 ) -> Scene:
     """A floor plan as a furnished room: its cells and edges exactly, with pictures, and without features.
 
@@ -72,18 +88,21 @@ def build_floor_plan(
     Args:
         plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
         seed: with the plan's name chooses furniture, colours and textures.
+        sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
 
     Raises:
-        SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
+        SceneError: the plan's cells, their number or its extent are no room's, the seed is negative, or there is no
+            such sensor.
         RenderError: MuJoCo cannot render on this machine.
     """
+    check_names(sensors)
     check_mujoco()
     from clearway.scenes.rooms.camera import first_person_view
     from clearway.scenes.rooms.plans.plan_room import build_plan_room
-    from clearway.scenes.rooms.render_cluster import render_at
+    from clearway.scenes.rooms.sense import sense
     from clearway.scenes.rooms.topview import render_top_view
 
     locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
@@ -94,7 +113,7 @@ def build_floor_plan(
     top_view = render_top_view(model, room.width_m, room.depth_m)
     x_m, z_m = layout.origin_m
     view = first_person_view(locations_m - np.array(layout.origin_m), headings_deg)
-    pictures = render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {plan.name}")
+    pictures, further = sense(model, view, sensors, title=plan.name, workers=workers, ray=ray, progress=progress)
     return Scene(
         name=plan.name,
         observations=pictures,
@@ -111,6 +130,7 @@ def build_floor_plan(
             z_min_m=top_view.z_min_m + z_m,
             z_max_m=top_view.z_max_m + z_m,
         ),
+        further=further,
     )
 
 

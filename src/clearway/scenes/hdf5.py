@@ -204,6 +204,18 @@ def read_record(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> dic
 
 def read_group_arrays(file: h5py.File, name: str, source: Path) -> dict[str, np.ndarray]:
     """The numeric arrays of a group by name; empty where there is no such group."""
+    arrays, left = {}, array_limit(source)
+    for key, dataset in group_datasets(file, name, source).items():
+        with faults_named(source, f"{name}/{key}"):
+            anything = (None,) * len(dataset.shape or ())
+        check_layout(dataset, source, shape=anything, kinds="iufb", limit=left)
+        arrays[key] = read_values(dataset, source)
+        left -= arrays[key].nbytes
+    return arrays
+
+
+def group_datasets(file: h5py.File, name: str, source: Path) -> dict[str, h5py.Dataset]:
+    """The datasets of a group by name, as `find_dataset` checks them; empty where there is no such group."""
     with faults_named(source, name):
         link = file.get(name, getlink=True)
         if link is None:
@@ -212,15 +224,7 @@ def read_group_arrays(file: h5py.File, name: str, source: Path) -> dict[str, np.
         if not isinstance(group, h5py.Group) or len(group) > MAX_GROUP_ARRAYS:
             raise SceneError(source, f"is not a group of at most {MAX_GROUP_ARRAYS} arrays", MAKE_AGAIN, name)
         keys = [str(key) for key in group]
-    arrays, left = {}, array_limit(source)
-    for key in keys:
-        dataset = need_dataset(group, key, source)
-        with faults_named(source, f"{name}/{key}"):
-            anything = (None,) * len(dataset.shape or ())
-        check_layout(dataset, source, shape=anything, kinds="iufb", limit=left)
-        arrays[key] = read_values(dataset, source)
-        left -= arrays[key].nbytes
-    return arrays
+    return {key: need_dataset(group, key, source) for key in keys}
 
 
 def write_text(item: h5py.Group | h5py.Dataset, name: str, text: str) -> None:

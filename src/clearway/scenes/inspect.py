@@ -33,6 +33,7 @@ class SceneSummary:
         feature_count: F.
         spread: how well the features tell the states apart.
         picture_size: height and width of the pictures, pixels.
+        sensors: what saw the scene, each in one line.
         source, room, seed: what made the scene, see `Provenance`.
     """
 
@@ -50,6 +51,7 @@ class SceneSummary:
     feature_count: int | None
     spread: FeatureSpread | None
     picture_size: tuple[int, int] | None
+    sensors: tuple[str, ...]
     source: str
     room: str | None
     seed: int | None
@@ -81,6 +83,7 @@ def summary(scene: Scene) -> SceneSummary:
         feature_count=None if features is None else features.shape[1],
         spread=None if features is None else feature_spread(np.asarray(features)),
         picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
+        sensors=tuple(sensor.described() for sensor in scene.sensors),
         source=scene.made_by.source,
         room=scene.made_by.room,
         seed=scene.made_by.seed,

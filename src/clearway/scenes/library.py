@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -14,9 +14,11 @@ from clearway import files
 from clearway.errors import SceneError
 from clearway.scenes import build as building
 from clearway.scenes import floor_plans, grid, rooms
+from clearway.scenes import sensors as sensing
 from clearway.scenes.build import build_floor_plan, build_scene, scene_name, shaping_versions
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Scene
+from clearway.scenes.sensors import RGB
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
 KEY_LENGTH = 16
@@ -25,7 +27,9 @@ KEY_LENGTH = 16
 class Builder(Protocol):
     """What makes a scene that is not in the cache: `build_scene`, or a stand-in."""
 
-    def __call__(self, name: str, seed: int, *, workers: int | None, ray: str | None, progress: bool) -> Scene:
+    def __call__(
+        self, name: str, seed: int, *, sensors: Sequence[str], workers: int | None, ray: str | None, progress: bool
+    ) -> Scene:
         """The scene of a room."""
 
 
@@ -33,6 +37,7 @@ def cached_room_scene(
     name: str,
     seed: int = 0,
     *,
+    sensors: Sequence[str] = (RGB,),
     workers: int | None = None,
     ray: str | None = None,
     progress: bool = False,
@@ -47,39 +52,46 @@ def cached_room_scene(
     Args:
         name: of the room, one of `clearway.scenes.rooms.ROOM_NAMES`.
         seed: 0 is the default room.
+        sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
         build: makes the scene.
 
     Raises:
-        SceneError: there is no such room, or the agent fits nowhere in it.
+        SceneError: there is no such room or sensor, or the agent fits nowhere in it.
         RenderError: MuJoCo cannot render on this machine.
     """
-    make = partial(build, name, seed, workers=workers, ray=ray, progress=progress)
-    return _cached(scene_path(name, seed), scene_name(name, seed), make)
+    make = partial(build, name, seed, sensors=sensors, workers=workers, ray=ray, progress=progress)
+    return _cached(scene_path(name, seed, sensors), scene_name(name, seed), make)
 
 
 def cached_plan_scene(
-    plan: FloorPlan, seed: int = 0, *, workers: int | None = None, ray: str | None = None, progress: bool = False
+    plan: FloorPlan,
+    seed: int = 0,
+    *,
+    sensors: Sequence[str] = (RGB,),
+    workers: int | None = None,
+    ray: str | None = None,
+    progress: bool = False,
 ) -> Scene:
     """A floor plan's furnished room from the user's cache, kept like those of `cached_room_scene`.
 
     Args and errors: those of `build_floor_plan`.
     """
-    make = partial(build_floor_plan, plan, seed, workers=workers, ray=ray, progress=progress)
-    return _cached(plan_path(plan, seed), plan.name, make)
+    make = partial(build_floor_plan, plan, seed, sensors=sensors, workers=workers, ray=ray, progress=progress)
+    return _cached(plan_path(plan, seed, sensors), plan.name, make)
 
 
-def scene_path(name: str, seed: int) -> Path:
-    """Where the cache keeps the scene of a room."""
-    return _path_of(scene_name(name, seed), {"room": name, "seed": seed})
+def scene_path(name: str, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
+    """Where the cache keeps the scene of a room as some sensors see it."""
+    return _path_of(scene_name(name, seed), {"room": name, "seed": seed, "sensors": sorted(sensors)})
 
 
-def plan_path(plan: FloorPlan, seed: int) -> Path:
-    """Where the cache keeps the furnished room of a floor plan."""
+def plan_path(plan: FloorPlan, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
+    """Where the cache keeps the furnished room of a floor plan as some sensors see it."""
     shape = {"cells": plan.cells.tolist(), "blocked": plan.blocked_edges.tolist(), "cell_size_m": plan.cell_size_m}
-    return _path_of(plan.name, {"plan": plan.name, "seed": seed, **shape})
+    return _path_of(plan.name, {"plan": plan.name, "seed": seed, "sensors": sorted(sensors), **shape})
 
 
 def _path_of(title: str, shaped_by: Mapping[str, object]) -> Path:
@@ -108,7 +120,7 @@ def _sources_hash() -> str:
     folder = Path(rooms.__file__).parent
     sources = {source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
     digest = hashlib.sha256()
-    others = {module.__name__: Path(str(module.__file__)) for module in (building, floor_plans, grid)}
+    others = {module.__name__: Path(str(module.__file__)) for module in (building, floor_plans, grid, sensing)}
     for name, source in {**sources, **others}.items():
         content = source.read_bytes()
         digest.update(f"{name} {len(content)}\n".encode())

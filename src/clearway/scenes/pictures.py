@@ -15,7 +15,9 @@ BLOCK_PICTURES = 64  # pictures that walk through memory together when all of th
 
 @dataclass(frozen=True)
 class FilePictures:
-    """Pictures (S, height, width, 3) uint8 in an HDF5 dataset; index with an int, a slice or an int array.
+    """Pictures (S, height, width, 3) uint8 in an HDF5 dataset, or what another sensor saw.
+
+    Index with an int, a slice or an int array.
 
     No file stays open: each look opens it (about a millisecond), so that the object may be pickled, shared
     between threads and forked processes, and the file replaced. Pictures of a replaced file are refused.
@@ -23,14 +25,16 @@ class FilePictures:
     Attributes:
         path: the file.
         dataset: name of the dataset in it.
-        shape: (S, height, width, 3).
+        shape: (S, height, width, 3), or (S, ...) of another sensor.
         stamp: what the file was like when the scene was read, see `file_stamp`.
+        dtype: of the values.
     """
 
     path: Path
     dataset: str
     shape: tuple[int, ...]
     stamp: tuple[int, ...]
+    dtype: str = "uint8"
 
     def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
         """The pictures asked for, in the order asked for.
@@ -44,11 +48,11 @@ class FilePictures:
             raise SceneError(self.path, "has changed since the scene was read", "Read the scene again")
         with opened(self.path) as file:
             dataset = need_dataset(file, self.dataset, self.path)
-            check_layout(dataset, self.path, shape=self.shape, kinds="u")
+            check_layout(dataset, self.path, shape=self.shape, kinds=np.dtype(self.dtype).kind)
             if wanted.ndim == 0:
                 return read_values(dataset, self.path, int(wanted))
             if wanted.size == 0:
-                return np.empty((*wanted.shape, *self.shape[1:]), np.uint8)
+                return np.empty((*wanted.shape, *self.shape[1:]), self.dtype)
             ascending, place = np.unique(wanted, return_inverse=True)
             return read_values(dataset, self.path, _runs(ascending))[place.reshape(wanted.shape)]
 

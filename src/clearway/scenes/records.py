@@ -1,4 +1,7 @@
-"""What our scene files hold beyond `thor_v1`: what made the scene, which encoder was used, the view from above."""
+"""What our scene files hold beyond `thor_v1`: what made the scene, which encoder was used, the view from above, depth.
+
+Each sensor but the colour camera has a dataset in the group `sensors`, with what it is (`Sensor`) as attributes.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,17 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes import hdf5
+from clearway.scenes.pictures import BLOCK_PICTURES, FilePictures, file_stamp
 from clearway.scenes.scene import EncoderRecord, Provenance, TopView
-from clearway.scenes.validate import MAX_COORDINATE_M, MAX_PICTURE_SIDE
+from clearway.scenes.sensors import Readings, Sensor
+from clearway.scenes.validate import MAX_COORDINATE_M, MAX_PICTURE_SIDE, check_sensor
 
 TOP_VIEW_EXTENT = ("x_min_m", "x_max_m", "z_min_m", "z_max_m")
 FILE_ENCODER = "from file"
+SENSORS = "sensors"
+SENSOR_NUMBERS = ("low", "high", "step")
+LARGEST = 1e9  # of a sensor's values
+SENSOR_GZIP_LEVEL = 2  # as of pictures; a room's depth takes 0.02 of its raw size, 6 kB a picture of 400x300
 
 
 def read_provenance(file: h5py.File, path: Path) -> Provenance:
@@ -63,6 +72,50 @@ def read_top_view(file: h5py.File, path: Path) -> TopView | None:
     return TopView(hdf5.read_values(dataset, path).astype(np.uint8), **extent)
 
 
+def read_readings(file: h5py.File, path: Path, count: int) -> tuple[Readings, ...]:
+    """What sensors besides the colour camera measured in `count` states, left in the file; () where it has none.
+
+    Raises:
+        SceneError: what a dataset says of its sensor is missing or does not fit it.
+    """
+    found = []
+    for name, dataset in hdf5.group_datasets(file, SENSORS, path).items():
+        sensor = _read_sensor(dataset, name, path)
+        kept = np.dtype(sensor.kept_dtype)
+        hdf5.check_layout(dataset, path, shape=(count, *sensor.shape), kinds=kept.kind)
+        if dataset.dtype != kept:
+            raise SceneError(path, f"holds {dataset.dtype}, expected {kept}", hdf5.MAKE_AGAIN, f"{SENSORS}/{name}")
+        raw = FilePictures(path.resolve(), f"{SENSORS}/{name}", tuple(dataset.shape), file_stamp(path), kept.name)
+        found.append(Readings(sensor, raw, str(path)))
+    return tuple(found)
+
+
+def write_readings(file: h5py.File, readings: Readings) -> None:
+    """Store what a sensor measured, a pose a chunk and a block of them in memory at a time, and what the sensor is.
+
+    Raises:
+        SceneError: a value is out of the sensor's range.
+    """
+    sensor, raw = readings.sensor, readings.raw
+    dataset = file.require_group(SENSORS).create_dataset(
+        sensor.name,
+        shape=raw.shape,
+        dtype=sensor.kept_dtype,
+        chunks=(1, *sensor.shape),
+        shuffle=np.dtype(sensor.kept_dtype).itemsize > 1,
+        compression="gzip",
+        compression_opts=SENSOR_GZIP_LEVEL,
+        fletcher32=True,
+    )
+    hdf5.write_text(dataset, "dtype", sensor.dtype)
+    hdf5.write_text(dataset, "unit", sensor.unit)
+    for key in SENSOR_NUMBERS:
+        if getattr(sensor, key) is not None:
+            dataset.attrs[key] = float(getattr(sensor, key))
+    for start in range(0, raw.shape[0], BLOCK_PICTURES):
+        dataset[start : start + BLOCK_PICTURES] = readings.checked(slice(start, start + BLOCK_PICTURES))
+
+
 def write_provenance(file: h5py.File, made_by: Provenance) -> None:
     """Keep what made the scene as one JSON attribute."""
     hdf5.write_text(file, "made_by", json.dumps(asdict(made_by)))
@@ -82,6 +135,21 @@ def write_top_view(file: h5py.File, view: TopView) -> None:
     dataset = hdf5.write_array(file, "top_view", view.image)
     for side in TOP_VIEW_EXTENT:
         dataset.attrs[side] = getattr(view, side)
+
+
+def _read_sensor(dataset: h5py.Dataset, name: str, path: Path) -> Sensor:
+    """What a dataset says of its sensor."""
+    where = f"{SENSORS}/{name}"
+    texts = {key: hdf5.read_attribute(dataset, key, path) for key in ("dtype", "unit")}
+    numbers = {key: hdf5.read_number(dataset, key, path, -LARGEST, LARGEST) for key in SENSOR_NUMBERS}
+    for key, value in {**texts, "low": numbers["low"], "high": numbers["high"]}.items():
+        if value is None:
+            raise SceneError(path, f"lacks the attribute '{key}'", hdf5.MAKE_AGAIN, where)
+    with hdf5.faults_named(path, where):
+        shape = tuple(dataset.shape[1:])
+    sensor = Sensor(name, shape, str(texts["dtype"]), str(texts["unit"]), **numbers)  # type: ignore[arg-type]
+    check_sensor(sensor, path)
+    return sensor
 
 
 def _kept_text(kept: Mapping[str, object], key: str, path: Path, attribute: str) -> str:

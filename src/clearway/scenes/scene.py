@@ -12,19 +12,23 @@ from typing import Protocol
 
 import numpy as np
 
-from clearway.errors import printable
+from clearway.errors import SceneError, printable
 from clearway.scenes import graph as graphs
+from clearway.scenes.sensors import RGB, Readings, Sensor, rgb
 
 
 class Observations(Protocol):
-    """The pictures of a scene: an array, or a file read on demand. Index with an int, a slice or an int array."""
+    """What a sensor saw at each pose: an array, or a file read on demand. Index with an int, a slice or an int array.
+
+    Colour pictures are (S, height, width, 3) uint8 RGB; `sensors.Sensor` says what others are.
+    """
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """(S, height, width, 3)."""
+        """(S, ...)."""
 
     def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
-        """The pictures asked for, uint8 RGB."""
+        """The observations asked for."""
 
 
 class Features(Protocol):
@@ -109,6 +113,8 @@ class Scene:
         encoder: what made the features; None where features is None.
         cell_size_m: step length of a move, metres.
         top_view: picture from above for maps, or None.
+        further: what sensors besides the colour camera measured, for example depth; one `Readings` each. A third sensor
+            is one more of them. `sensors` and `seen_by` speak of all of them alike, colour included.
     """
 
     name: str
@@ -121,6 +127,28 @@ class Scene:
     encoder: EncoderRecord | None = None
     cell_size_m: float = 0.5
     top_view: TopView | None = None
+    further: tuple[Readings, ...] = ()
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """What saw the scene, colour first; empty where nothing did."""
+        colour = () if self.observations is None else (rgb(*self.observations.shape[1:3]),)
+        return (*colour, *(readings.sensor for readings in self.further))
+
+    def seen_by(self, name: str) -> Observations:
+        """What a sensor saw at each pose, (S, *its shape), of its dtype and in its unit.
+
+        Raises:
+            SceneError: the scene has nothing of that sensor.
+        """
+        if name == RGB and self.observations is not None:
+            return self.observations
+        for readings in self.further:
+            if readings.sensor.name == name:
+                return readings
+        found = ", ".join(sensor.name for sensor in self.sensors) or "nothing"
+        remedy = f"Build or import it again with --sensors rgb {name}"
+        raise SceneError(self.name, f"has {found}, but no {name}", remedy)
 
     @property
     def state_count(self) -> int:

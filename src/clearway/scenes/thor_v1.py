@@ -3,7 +3,8 @@
 Published: `observation` (S, height, width, 3) uint8, `resnet_feature` (S, 10 or 1, F) of which index 0 is
 read, `location` (S, 2) metres, `rotation` (S,) degrees, `graph` (S, 4), `shortest_path_distance` (S, S).
 Ours have besides: checksums and compression, attributes (format version, cell size, what made the scene,
-which encoder made the features), the group `encoder` with its statistics, and `top_view`.
+which encoder made the features), the group `encoder` with its statistics, `top_view`, and the group `sensors` with what
+sensors besides the colour camera saw, for example `sensors/depth` (S, height, width) in whole millimetres.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ from clearway.scenes.pictures import BLOCK_PICTURES, FilePictures, file_stamp
 from clearway.scenes.records import (
     read_encoder,
     read_provenance,
+    read_readings,
     read_top_view,
     write_encoder,
     write_provenance,
+    write_readings,
     write_top_view,
 )
 from clearway.scenes.scene import Features, Observations, Scene
@@ -84,6 +87,7 @@ def read_scene(path: str | Path, *, name: str | None = None, features_in_file: b
             cell_size_m=hdf5.read_number(file, "cell_size_m", path, MIN_CELL_SIZE_M, MAX_COORDINATE_M)
             or step_length_m(locations_m, graph),
             top_view=read_top_view(file, path),
+            further=read_readings(file, path, count),
         )
         check_scene(scene, path)
         if scene.observations is None and features is None:
@@ -208,6 +212,8 @@ def _write_all(file: h5py.File, scene: Scene, path: Path) -> None:
         write_top_view(file, scene.top_view)
     if scene.observations is not None:
         _write_pictures(file, scene.observations, path)
+    for readings in scene.further:
+        write_readings(file, readings)
 
 
 def _write_pictures(file: h5py.File, pictures: Observations, path: Path) -> None:

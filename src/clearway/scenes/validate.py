@@ -6,6 +6,7 @@ What training depends on (the graph and the features) raises `SceneError`. What 
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, MOVES, TURNS, Action
 from clearway.scenes.graph import turn_counts
 from clearway.scenes.scene import Observations, Scene, TopView
+from clearway.scenes.sensors import RGB, STEPS_DTYPE, Readings, Sensor
 
 MIN_STATES = 2
 MAX_STATES = 65_536
@@ -22,6 +24,10 @@ MIN_HEADINGS, MAX_HEADINGS = 3, 360
 MAX_PICTURE_SIDE = 2_048  # pixels
 MAX_COORDINATE_M = 10_000.0
 MIN_CELL_SIZE_M = 1e-3
+SENSOR_NAME = "(?!target)[a-z][a-z0-9_]{0,39}"  # environments show targets as target_...
+NO_SENSORS = (RGB, "observation", "scene")  # colour stands elsewhere, and environments use the other names
+SENSOR_DTYPES = ("uint8", "uint16", "float32")
+MAX_UNIT = 20
 CHECK_THE_MAKER = "Make the scene again, or check the program that made it"
 
 
@@ -43,6 +49,7 @@ def check_scene(scene: Scene, source: str | Path | None = None) -> None:
             raise SceneError(source, "has features but no record of their encoder", "Encode the scene again")
     if scene.observations is not None:
         check_observations(scene.observations, scene.state_count, source)
+    check_further(scene.further, scene.state_count, source)
     if scene.top_view is not None:
         check_top_view(scene.top_view, source)
     if not MIN_CELL_SIZE_M <= scene.cell_size_m <= MAX_COORDINATE_M:  # NaN fails the comparison
@@ -127,6 +134,40 @@ def check_observations(observations: Observations, state_count: int, source: str
     fits = fits and all(1 <= side <= MAX_PICTURE_SIDE for side in shape[1:3])
     wanted = f"({state_count}, height, width, 3) with sides up to {MAX_PICTURE_SIDE}"
     _check(fits, source, "observation", f"has shape {tuple(shape)}, expected {wanted}")
+
+
+def check_further(further: tuple[Readings, ...], state_count: int, source: str | Path) -> None:
+    """Check that each sensor has one set of readings, of its shape and type at every state. Raises SceneError.
+
+    Their values are checked whenever they are read or written.
+    """
+    names = [readings.sensor.name for readings in further]
+    for readings, name in zip(further, names, strict=True):
+        check_sensor(readings.sensor, source)
+        _check(names.count(name) == 1, source, name, "stands twice among the sensors")
+        wanted = (state_count, *readings.sensor.shape)
+        _check(tuple(readings.shape) == wanted, source, name, f"has shape {tuple(readings.shape)}, expected {wanted}")
+        dtype, kept = getattr(readings.raw, "dtype", None), readings.sensor.kept_dtype
+        _check(dtype is None or dtype == kept, source, name, f"holds {dtype}, expected {kept}")
+
+
+def check_sensor(sensor: Sensor, source: str | Path) -> None:
+    """Check what is said of a sensor besides the colour camera. Raises SceneError."""
+    name = sensor.name
+    named = bool(re.fullmatch(SENSOR_NAME, name)) and name not in NO_SENSORS
+    _check(named, source, name[:80], "is no name of a sensor: small letters, digits and underscores")
+    sides = 1 <= len(sensor.shape) <= 3 and all(1 <= side <= MAX_PICTURE_SIDE for side in sensor.shape)
+    problem = f"has observations of shape {sensor.shape}, expected 1 to 3 sides up to {MAX_PICTURE_SIDE}"
+    _check(sides, source, name, problem)
+    problem = f"is of {sensor.dtype[:80]}, expected {', '.join(SENSOR_DTYPES)}"
+    _check(sensor.dtype in SENSOR_DTYPES, source, name, problem)
+    _check(len(sensor.unit) <= MAX_UNIT, source, name, f"has a unit of {len(sensor.unit)} letters")
+    ranged = -np.inf < sensor.low < sensor.high < np.inf  # NaN fails the comparison
+    _check(ranged, source, name, f"has the range {sensor.low} to {sensor.high}")
+    if sensor.step is not None:
+        most = np.iinfo(STEPS_DTYPE).max
+        fits = sensor.step > 0 and sensor.low >= 0 and sensor.high / sensor.step <= most
+        _check(fits, source, name, f"has steps of {sensor.step}, expected 0 to {most} of them in its range")
 
 
 def check_top_view(view: TopView, source: str | Path) -> None:

@@ -72,6 +72,7 @@ class Agent(BaseModel):
     actions: list[str]
     history_length: int
     picture_size: list[int] | None
+    observation: dict[str, Any] | None
     encoder: str
     version: str
 
@@ -114,6 +115,7 @@ def make_app(service: Service) -> FastAPI:
             actions=list(card.actions),
             history_length=card.history_length,
             picture_size=None if card.picture_size is None else list(card.picture_size),
+            observation=None if card.observation is None else dict(card.observation),
             encoder=str(card.encoder.get("name")),
             version=__version__,
         )

@@ -43,7 +43,7 @@ def write_film(stage: Stage, episode: Episode, path: Path, frames_per_s: int) ->
 def _frames(stage: Stage, session: Session, index: int) -> Iterator[np.ndarray]:
     walker = session.walkers[index]
     agents = stage.agents
-    scenes = agents[index].scenes if index < len(agents) else (stage.scenes[stage.index(str(session.episode.scene))],)
+    scenes = agents[index].scenes if index < len(agents) else stage.scenes
     return frames(scenes, _walked(walker))
 
 

@@ -19,6 +19,8 @@ import numpy as np
 from PIL import Image
 
 from clearway.errors import ClearwayError
+from clearway.scenes.scene import Scene
+from clearway.scenes.sensors import Sensor
 from clearway.view.episode import read_episode
 from clearway.view.film import write_film
 from clearway.view.session import Session
@@ -42,6 +44,7 @@ PAGE = {
 MOST_PAGES = 16  # open at a time
 TOO_MANY_PAGES = 4001  # WebSocket close code; the page shows the reason that comes with it
 FILM_FRAMES_PER_S = 3
+GREY_BEND = 20  # how much better near is told apart than far; depth in metres up to 20 becomes log(1 + depth)
 JPEG = {"quality": 90, "subsampling": 0}
 
 
@@ -83,6 +86,14 @@ def make_app(stage: Stage) -> FastAPI:
         observations = stage.scenes[index].observations
         return _jpeg(observations[state]) if observations is not None else _missing()
 
+    @app.get("/scenes/{index}/{sensor}/{state}.jpg")
+    def sensed(index: int, sensor: str, state: int) -> Response:
+        if index not in range(len(stage.scenes)) or state not in range(stage.scenes[index].state_count):
+            return _missing()
+        scene = stage.scenes[index]
+        shown = next((one for one in _shades(scene) if one.name == sensor), None)
+        return _missing() if shown is None else _jpeg(grey(scene.seen_by(sensor)[state], shown))
+
     @app.get("/film.mp4")
     def film(request: Request) -> Response:
         episode = read_episode(request.url.query)
@@ -109,6 +120,20 @@ def make_app(stage: Stage) -> FastAPI:
                 return None
 
     return app
+
+
+def grey(values: np.ndarray, sensor: Sensor) -> np.ndarray:
+    """A sensor's values as a picture of their shape, uint8: white for the lowest, black for the highest.
+
+    Steps near the lowest are told apart better than steps near the highest: depth of a room, where the range goes far.
+    """
+    share = (values.astype(np.float64) - sensor.low) / (sensor.high - sensor.low)
+    return np.rint(255 * (1 - np.log1p(GREY_BEND * share) / np.log1p(GREY_BEND))).astype(np.uint8)
+
+
+def _shades(scene: Scene) -> list[Sensor]:
+    """The sensors of a scene whose observations are one number a pixel."""
+    return [sensor for sensor in scene.sensors if len(sensor.shape) == 2]
 
 
 def _page_files() -> dict[str, tuple[bytes, int, None, str]]:
@@ -152,6 +177,7 @@ def _map_json(stage: Stage, index: int) -> dict[str, Any]:
         "has_pictures": scene.observations is not None,
         "picture_shape": None if scene.observations is None else list(scene.observations.shape[1:3]),
         "has_above": scene.top_view is not None,
+        "sensors": [sensor.to_json() for sensor in _shades(scene)],
     }
 
 

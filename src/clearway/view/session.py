@@ -18,12 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from clearway.envs.world import World
 from clearway.errors import ClearwayError
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.scenes.graph import UNREACHABLE
-from clearway.scenes.scene import Scene
 from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
-from clearway.view.stage import Stage, agent_world
+from clearway.view.stage import Stage
 from clearway.view.walker import Mind, Walker
 
 Message = dict[str, Any]
@@ -75,26 +74,22 @@ class Session:
         """
         scene = self.stage.scenes[self.stage.index(wanted.scene) if wanted.scene is not None else 0]
         target = self.stage.targets[scene.name][0] if wanted.target is None else wanted.target
-        world = self.stage.user_world(scene, target)
-        start = _drawn_start(scene, target, wanted.seed) if wanted.start is None else wanted.start
+        drive = wanted.drive or not self.stage.agents
+        worlds = [shown.place(scene.name, target) for shown in self.stage.agents]
+        worlds += [self.stage.user_world(scene, target)] if drive else []
+        start = _drawn_start(worlds[0], wanted.seed) if wanted.start is None else wanted.start
         if not 0 <= start < scene.state_count:
             raise ClearwayError(f"start {start}: {scene.name} has states 0 to {scene.state_count - 1}. Choose another")
-        episode = replace(
-            wanted, scene=scene.name, start=start, target=target, drive=wanted.drive or not self.stage.agents
-        )
+        episode = replace(wanted, scene=scene.name, start=start, target=target, drive=drive)
         recorded = [actions_of(walk) for walk in episode.walks] + [[]] * MOST_WALKERS
         walkers = []
-        for shown, actions in zip(self.stage.agents, recorded, strict=False):
-            own_world, index = agent_world(shown, scene.name, target)
+        for shown, placed, actions in zip(self.stage.agents, worlds, recorded, strict=False):
             learner = shown.agent.record.learner
-            critic = shown.agent.critic(own_world)
-            mind = Mind(critic, learner.reward_scale, episode.selection, learner.history_length)
-            walkers.append(
-                Walker(own_world, index, start, shown.reward, seed=episode.seed, mind=mind, recorded=actions)
-            )
+            mind = Mind(shown.critic(placed), learner.reward_scale, episode.selection, learner.history_length)
+            walkers.append(Walker(placed, 0, start, shown.reward, seed=episode.seed, mind=mind, recorded=actions))
         if episode.drive:
             walk = Walker(
-                world, 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=recorded[len(walkers)]
+                worlds[-1], 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=recorded[len(walkers)]
             )
             walkers.append(walk)
         self.episode, self.walkers = episode, walkers
@@ -161,8 +156,7 @@ class Session:
         }
 
 
-def _drawn_start(scene: Scene, target: int, seed: int) -> int:
-    """A state from which the target can be reached, drawn uniformly; the same for the same seed."""
-    steps = scene.distances_to(np.array([target]))[0]
-    starts = np.flatnonzero((steps != UNREACHABLE) & (steps > 0))
-    return int(np.random.default_rng([seed, target]).choice(starts))
+def _drawn_start(world: World, seed: int) -> int:
+    """A start to the world's only target, drawn uniformly, in the scene's own numbering; the same for the same seed."""
+    first = world.scene_offset[world.target_scene[0]]
+    return int(np.random.default_rng([seed, world.scene_state(0)]).choice((world.start_state - first).numpy()))

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.envs.world import World, make_world
+from clearway.envs.world import World, scene_tables
 from clearway.errors import RunError
-from clearway.learn.load import Agent, load_agent, run_scenes
+from clearway.learn.load import Agent, load_agent, run_scenes, run_tables
+from clearway.model.lookup import LookupNetwork
+from clearway.model.policy import Critic, network_critic
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
@@ -30,6 +33,31 @@ class StageAgent:
     name: str
     agent: Agent
     scenes: tuple[Scene, ...]
+
+    @cached_property
+    def world(self) -> World:
+        """The tables of its scenes, without targets."""
+        return run_tables(self.agent.record, self.scenes)
+
+    @cached_property
+    def _lookup(self) -> LookupNetwork:
+        return self.agent.lookup(self.world)
+
+    def make_ready(self) -> None:
+        """Compute what all episodes share, so that one begins at once."""
+        assert self._lookup is not None
+
+    def place(self, scene: str, target: int) -> World:
+        """Its world with one target, trained on or not: a state in the scene's own numbering.
+
+        Raises:
+            SceneError: there is no such state, or too few lead to it.
+        """
+        return self.world.with_targets({scene: (target,)})
+
+    def critic(self, placed: World) -> Critic:
+        """Its probabilities and values for a world from `place`."""
+        return network_critic(self._lookup.for_targets(placed.target_state), placed)
 
     @property
     def reward(self) -> Reward:
@@ -72,26 +100,14 @@ class Stage:
             raise RunError(f"scene {name}: not shown here. Choose one of {', '.join(names)}")
         return names.index(name)
 
+    @cached_property
+    def _user_world(self) -> World:
+        bare = [replace(scene, features=None) for scene in self.scenes]
+        return scene_tables(bare, self.zone_level)
+
     def user_world(self, scene: Scene, target: int) -> World:
-        """The tables for a walk without an agent: one scene, one target."""
-        return make_world([scene], {scene.name: (target,)}, self.zone_level)
-
-
-def agent_world(shown: StageAgent, scene: str, target: int) -> tuple[World, int]:
-    """The world of an agent's run in which `scene` has the one target given, and that target's index.
-
-    Args:
-        shown: the agent.
-        scene: name of one of its scenes.
-        target: state in the scene's own numbering, trained on or not.
-
-    Raises:
-        SceneError: there is no such state, or none leads to it.
-    """
-    record = shown.agent.record
-    targets = {name: (target,) if name == scene else own[:1] for name, own in record.targets.items()}
-    world = make_world(shown.scenes, targets, record.zone_level)
-    return world, list(targets).index(scene)
+        """The tables for a walk without an agent, with one target."""
+        return self._user_world.with_targets({scene.name: (target,)})
 
 
 def scene_stage(scene: Scene) -> Stage:
@@ -113,6 +129,7 @@ def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None
     for folder, name in zip(folders, _names(folders), strict=True):
         agent = load_agent(folder)
         agents.append(StageAgent(name, agent, tuple(run_scenes(agent.record, scene_files))))
+        agents[-1].make_ready()
     first, *others = agents
     scenes = tuple(scene for scene in first.scenes if all(_has(other, scene) for other in others))
     if not scenes:

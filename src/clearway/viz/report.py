@@ -12,15 +12,15 @@ from __future__ import annotations
 import base64
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from html import escape
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.files import json_text, read_json, written_whole
 from clearway.markdown import table_lines
 from clearway.scenes.scene import Scene
-from clearway.viz.page_style import CSS
+from clearway.viz.html import rendered_html
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
 
 HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
@@ -120,9 +120,11 @@ def _missing_text(section: Section) -> str:
     return f"{count} run{'s are' if count > 1 else ' is'} not complete yet; the tables hold what is." if count else ""
 
 
-def _folded(table: ReportTable) -> str:
+def _table_notes(table: ReportTable) -> tuple[str, ...]:
+    """Where the rows are that are not shown, then the table's own notes."""
     more = len(table.rows) - SHOWN_ROWS
-    return f"{more:,} more rows in {TABLES}/{table.name}.csv" if more > 0 else ""
+    rest = f"{more:,} more rows in {TABLES}/{table.name}.csv" if more > 0 else ""
+    return tuple(note for note in (rest, *table.notes) if note)
 
 
 # ------------------------------------------------------------------------------------------------------------ Markdown
@@ -149,66 +151,76 @@ def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str],
 
 def _markdown_table(table: ReportTable) -> list[str]:
     rows = [[value_text(value) for value in row] for row in table.rows[:SHOWN_ROWS]]
-    notes = [f"{note}  " for note in (_folded(table), *table.notes) if note]
+    notes = [f"{note}  " for note in _table_notes(table)]
     return [*table_lines(table.headings, rows), "", *notes, ""]
 
 
 # ---------------------------------------------------------------------------------------------------------------- HTML
 
 
+@dataclass(frozen=True)
+class ShownTable:
+    """A table of the page: all text, no more rows than are shown.
+
+    Attributes:
+        title: above it.
+        headings: of the columns.
+        looks: CSS classes of each column; "" for none.
+        rows: as many texts each.
+        notes: below it.
+        folded: it shows when asked for.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    looks: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+    folded: bool
+
+
 def _page(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
-    parts = [f'<p class="lead warning">{escape(warning)}</p>'] if warning else []
-    body = "".join(
-        [f"<section>{_table(table)}</section>" for table in _summary(sections)]
-        + [_section(folder, section) for section in sections]
-    )
-    made = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts.items())
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{CSS}</style></head><body>"
-        f'<header class="top"><p class="mark">clearway</p><h1>{escape(title)}</h1>{"".join(parts)}</header>'
-        f"<main>{body}<section><h2>How it was made</h2><dl class=facts>{made}</dl></section></main></body></html>\n"
+    return rendered_html(
+        "report",
+        title=title,
+        warning=warning,
+        summary=[_shown(table) for table in _summary(sections)],
+        sections=[_section(folder, section) for section in sections],
+        facts=facts,
     )
 
 
-def _section(folder: Path, section: Section) -> str:
-    parts = [f"<h2>{escape(section.title)}</h2><p>{escape(section.text)}</p>"]
-    missing = _missing_text(section)
-    parts += [f"<p><strong>{escape(missing)}</strong></p>"] if missing else []
-    parts += [_table(_verdict_rows(section.claims))] if section.claims else []
-    parts += [_table(table) for table in section.tables]
-    pictures = "".join(
-        f'<figure><img alt="{escape(figure.title)}" src="data:image/png;base64,{_encoded(folder, figure.name)}">'
-        f"<figcaption>{escape(figure.title)}</figcaption></figure>"
-        for figure in section.pictures
-    )
-    parts += [f'<div class="gallery large">{pictures}</div>'] if pictures else []
-    return f'<section id="{escape(section.name)}">{"".join(parts)}</section>'
+def _section(folder: Path, section: Section) -> dict[str, Any]:
+    """A section as the page's template names it."""
+    verdicts = [_verdict_rows(section.claims)] if section.claims else []
+    return {
+        "name": section.name,
+        "title": section.title,
+        "text": section.text,
+        "missing": _missing_text(section),
+        "tables": [_shown(table) for table in (*verdicts, *section.tables)],
+        "pictures": [{"title": each.title, "png": _encoded(folder, each.name)} for each in section.pictures],
+    }
 
 
 def _encoded(folder: Path, name: str) -> str:
     return base64.b64encode((folder / FIGURES / f"{name}.png").read_bytes()).decode()
 
 
-def _table(table: ReportTable) -> str:
-    kinds = [_column_class([row[column] for row in table.rows]) for column in range(len(table.headings))]
-    head = "".join(f"<th{kind}>{escape(text)}</th>" for kind, text in zip(kinds, table.headings, strict=True))
-    rows = "".join(
-        "<tr>"
-        + "".join(f"<td{kind}>{escape(value_text(value))}</td>" for kind, value in zip(kinds, row, strict=True))
-        + "</tr>"
-        for row in table.rows[:SHOWN_ROWS]
+def _shown(table: ReportTable) -> ShownTable:
+    return ShownTable(
+        title=table.title,
+        headings=table.headings,
+        looks=tuple(_look([row[column] for row in table.rows]) for column in range(len(table.headings))),
+        rows=tuple(tuple(map(value_text, row)) for row in table.rows[:SHOWN_ROWS]),
+        notes=_table_notes(table),
+        folded=table.folded,
     )
-    notes = "".join(f"<p>{escape(note)}</p>" for note in (_folded(table), *table.notes) if note)
-    body = f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>{notes}'
-    title = escape(table.title)
-    return f"<details><summary>{title}</summary>{body}</details>" if table.folded else f"<h3>{title}</h3>{body}"
 
 
-def _column_class(values: Sequence[Value]) -> str:
+def _look(values: Sequence[Value]) -> str:
     """Columns of words stand on the left, long sentences are broken into lines; figures stay on the right."""
     texts = [value for value in values if isinstance(value, str) and any(letter.isalpha() for letter in value)]
     if not texts:
         return ""
-    return ' class="words long"' if max(map(len, texts)) > LONG_TEXT else ' class="words"'
+    return "words long" if max(map(len, texts)) > LONG_TEXT else "words"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 import tempfile
 import threading
@@ -11,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PAGE = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={}"><title>clearway</title>\n'
+from clearway.viz.html import rendered_html
 
 
 @contextmanager
@@ -24,6 +23,6 @@ def opened_in_browser(address: str) -> Iterator[None]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "clearway.html"
         with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
-            file.write(PAGE.format(html.escape(address)))
+            file.write(rendered_html("redirect", address=address))
         threading.Thread(target=webbrowser.open, args=(path.as_uri(),), daemon=True).start()
         yield

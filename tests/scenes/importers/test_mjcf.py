@@ -38,7 +38,9 @@ def columns_of(picture: np.ndarray, rgb: tuple[float, float, float]) -> np.ndarr
 
 def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
     world = World(floor_m=2.0, camera_m=0.8, extent_m=(-1.3, 1.3, -3.3, 3.3), spawn_m=(0.0, 0.0))
-    scene = read_mjcf(path, world, AgentShape(step_m=1.0), height_px=60, width_px=80, workers=1)
+    scene = read_mjcf(
+        path, world, AgentShape(step_m=1.0), height_px=60, width_px=80, sensors=("rgb", "depth"), workers=1
+    )
     assert pose_quirks(scene) == []
     assert scene.cell_count == 3 * 7 - 2
     here = int(np.flatnonzero(np.all(np.abs(scene.locations_m) < 1e-9, axis=1))[0])
@@ -46,6 +48,9 @@ def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
     red = columns_of(ahead, RED)
     middle = 40 + 30 / np.tan(np.radians(30)) * 1 / 3  # 1 m to the right at 3 m
     assert red.size and abs(red.mean() - middle) < 3
+    depth_m = scene.seen_by("depth")[here]
+    np.testing.assert_allclose(depth_m[30, red[1:-1]], 2.9, atol=0.002)  # to the front of the post
+    assert depth_m[30, :10].min() == 20  # the model has no walls
     green = columns_of(behind, GREEN)
     assert green.size and green.min() > 40  # behind on the left is on the right when one looks back
     assert not any(columns_of(side, colour).size for side in (left, right) for colour in (RED, GREEN))
@@ -78,7 +83,7 @@ def test_hidden_geoms_and_limits_of_the_model_s_own_hide_nothing(path: Path) -> 
 
 
 def test_more_than_fits_is_refused_before_any_picture_is_taken(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importer, "render_at", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(importer, "sense", lambda *_, **__: pytest.fail("rendered"))
     monkeypatch.setattr(limits, "MAX_PICTURE_BYTES", 20 << 20)
     problem = r"\d+ pictures of 400 x 300 pixels take \d+ MiB of memory, expected at most 20\. .*--step"
     with pytest.raises(SceneError, match=problem):

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
-from clearway.scenes.rooms.camera import first_person_view
+from clearway.scenes.rooms.camera import View, first_person_view
 from clearway.scenes.rooms.render import render
 from clearway.scenes.rooms.topview import render_top_view
+from clearway.scenes.sensors import SENSORS
 from small_rooms import SmallRoom
 
 WALLS = {  # a wall of each colour at the end of each heading's line of sight
@@ -83,3 +86,46 @@ def extent_of(picture: np.ndarray, rgb: tuple[float, float, float]) -> tuple[tup
     there = np.abs(picture - 255 * np.array(rgb)).max(axis=2) < 12
     rows, columns = np.nonzero(there.any(axis=1))[0], np.nonzero(there.any(axis=0))[0]
     return (int(rows[0]), int(rows[-1])), (int(columns[0]), int(columns[-1]))
+
+
+def depth_in_m(room: SmallRoom, view: View) -> np.ndarray:
+    pictures = render(lit(room), replace(view, sensor="depth"), workers=1)
+    assert pictures.dtype == np.uint16  # whole millimetres
+    return SENSORS["depth"](view.height_px, view.width_px).values(pictures)
+
+
+def test_depth_is_the_distance_to_the_walls_in_metres():
+    view = first_person_view(np.array([[1.0, 0.5]] * 4), np.array(list(WALLS)))
+    depths_m = depth_in_m(coloured_room(), view)
+    assert depths_m.shape == (4, 300, 400) and depths_m.dtype == np.float32
+    for depth_m, wall_m in zip(depths_m, (3.5, 3.0, 0.5, 1.0), strict=True):
+        # along the middle of the view: the wall ahead is as deep at its sides as in its middle
+        np.testing.assert_allclose(depth_m[145:155, 190:210], wall_m, atol=0.0011)
+    assert depths_m[0, 145:155, 60:80].max() < 3.5 - 1  # the wall at x = 0 is nearer
+    np.testing.assert_allclose(depths_m[2, 150, 60:340], 0.5, atol=0.0011)
+
+
+def test_nothing_ahead_is_as_far_as_depth_reaches():
+    view = first_person_view(np.array([[1.0, 0.5]]), np.array([0]))
+    far = SmallRoom().add_box((-9, 9), (22.0, 22.1), group=2).add_box((0.9, 1.1), (19.5, 19.6), group=2)
+    depth_m = depth_in_m(far, view)[0]
+    assert depth_m.max() == np.float32(20) and depth_m[:20].min() == np.float32(20)
+    np.testing.assert_allclose(depth_m[150, 200], 19.0, atol=0.01)
+
+
+def test_an_edge_has_no_depth_between_that_of_its_two_sides():
+    room = coloured_room().add_box((0.7, 1.3), (1.5, 1.6), (0.8, 1.17), group=2)
+    room.spec.visual.quality.offsamples = 8
+    depth_m = depth_in_m(room, first_person_view(np.array([[1.0, 0.5]]), np.array([7])))[0]
+    box = depth_m < 1.3
+    assert box.sum() > 1000
+    near_box = depth_m[100:160, 100:300]
+    assert np.all((near_box < 1.3) | (near_box > 1.6))
+
+
+def test_depth_leaves_colour_as_it_is():
+    view = first_person_view(np.full((4, 2), 2.0), np.array(list(WALLS)))
+    model = lit(coloured_room())
+    alone = render(model, view, workers=1)
+    render(model, replace(view, sensor="depth"), workers=1)
+    np.testing.assert_array_equal(render(model, view, workers=1), alone)

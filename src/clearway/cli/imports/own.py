@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from clearway.choices import SensorName
 from clearway.cli.arguments import check_at_least
 from clearway.cli.imports.writing import Encoding, encode_and_write, place_name, write_scenes
+from clearway.errors import ClearwayError
 from clearway.ray_cluster import kept_connected
 
 if TYPE_CHECKING:
@@ -38,6 +40,8 @@ class ImportFloorPlan:
     """With the plan's name: of the furniture, colours and textures, or of the made-up features."""
     cell_size: float = 0.25
     """Side of a cell, metres."""
+    sensors: tuple[SensorName, ...] = ("rgb",)
+    """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
@@ -50,20 +54,29 @@ class ImportFloorPlan:
             self._render(plans)
             return
         self.encoding.check_unused("--features makes features up. Leave out --features")
+        if self.sensors != type(self).sensors:
+            raise ClearwayError("--sensors says what to render, but --features renders nothing. Leave out one of them")
         for plan in plans:
             write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
 
     def _render(self, plans: Sequence[FloorPlan]) -> None:
         """Make rooms, encode their pictures and write."""
+        from clearway.perception import check_sees
         from clearway.scenes.library import cached_plan_scene
         from clearway.scenes.rooms.plans.limits import check_can_be_rendered
+        from clearway.scenes.sensors import check_names
 
         self.encoding.check()
+        check_names(self.sensors)
+        check_sees(self.encoding.encoder, self.sensors)
         for plan in plans:  # all of them before anything that takes minutes
             check_can_be_rendered(plan, self.seed)
         workers, ray = self.encoding.workers, self.encoding.ray
         with kept_connected(ray, workers):
-            scenes = [cached_plan_scene(plan, self.seed, workers=workers, ray=ray, progress=True) for plan in plans]
+            scenes = [
+                cached_plan_scene(plan, self.seed, sensors=self.sensors, workers=workers, ray=ray, progress=True)
+                for plan in plans
+            ]
             encode_and_write(scenes, self.out, self.encoding)
 
 

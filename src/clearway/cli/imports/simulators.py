@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from clearway.choices import SensorName
 from clearway.cli.arguments import check_at_least, check_finite, check_named, check_positive, check_seeds
 from clearway.cli.imports.writing import Encoding, encode_and_write, place_name
 from clearway.ray_cluster import kept_connected
@@ -81,15 +82,19 @@ class ImportMjcf:
     """Of the pictures, pixels."""
     height: int = 300
     """Of the pictures, pixels."""
+    sensors: tuple[SensorName, ...] = ("rgb",)
+    """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
         """Compile, find the free cells, render, encode and write."""
+        from clearway.perception import check_sees
         from clearway.scenes.build import check_mujoco
 
         check_positive(step=self.step, agent_radius=self.agent_radius, agent_height=self.agent_height)
         check_finite(floor_height=self.floor_height, camera_height=self.camera_height)
         self.encoding.check()
+        check_sees(self.encoding.encoder, self.sensors)
         check_mujoco()
         from clearway.scenes.importers.mjcf import read_mjcf
         from clearway.scenes.importers.mjcf_floor import World
@@ -104,6 +109,7 @@ class ImportMjcf:
                 name=self.name or place_name(self.file),
                 height_px=self.height,
                 width_px=self.width,
+                sensors=self.sensors,
                 workers=workers,
                 ray=ray,
                 progress=True,

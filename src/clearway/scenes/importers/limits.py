@@ -17,11 +17,21 @@ def check_picture_size(source: str | Path, height_px: int, width_px: int) -> Non
         raise SceneError(source, problem, "Give another --height and --width")
 
 
-def check_picture_count(source: str | Path, states: int, height_px: int, width_px: int, fewer: str) -> None:
-    """Refuse more poses or pictures than fit; `fewer` says how to have fewer. Raises SceneError."""
+def check_picture_count(
+    source: str | Path, states: int, height_px: int, width_px: int, fewer: str, pose_bytes: int | None = None
+) -> None:
+    """Refuse more poses or pictures than fit. Raises SceneError.
+
+    Args:
+        source: the file, for the error.
+        states: number of poses.
+        height_px, width_px: of a picture.
+        fewer: says how to have fewer.
+        pose_bytes: what all sensors take at a pose; None: a colour picture.
+    """
     if states > MAX_STATES:
         raise SceneError(source, f"has {states} poses on free cells, expected at most {MAX_STATES}", fewer)
-    size = states * height_px * width_px * 3
+    size = states * (height_px * width_px * 3 if pose_bytes is None else pose_bytes)
     if size > MAX_PICTURE_BYTES:
         problem = f"{states} pictures of {width_px} x {height_px} pixels take {size >> 20} MiB of memory"
         remedy = f"{fewer}, or a smaller --height and --width"

@@ -6,6 +6,7 @@ looks along the model's y and 90 along its x. The state is the model's first, `q
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -20,9 +21,10 @@ from clearway.scenes.importers.mjcf_floor import World, find_cells, floor_of, sp
 from clearway.scenes.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, first_person_view
 from clearway.scenes.rooms.navigation import Floor
 from clearway.scenes.rooms.obstacles import AgentShape, bounding_boxes
-from clearway.scenes.rooms.render_cluster import render_at
+from clearway.scenes.rooms.sense import sense
 from clearway.scenes.rooms.topview import PIXELS_PER_M, render_from_above
 from clearway.scenes.scene import Provenance, Scene, TopView
+from clearway.scenes.sensors import RGB, SENSORS, check_names
 from clearway.scenes.validate import check_moves, check_scene
 
 SOURCE = "mjcf"
@@ -42,6 +44,7 @@ def read_mjcf(
     name: str | None = None,
     height_px: int = PICTURE_HEIGHT_PX,
     width_px: int = PICTURE_WIDTH_PX,
+    sensors: Sequence[str] = (RGB,),
     workers: int | None = None,
     ray: str | None = None,
     progress: bool = False,
@@ -55,14 +58,16 @@ def read_mjcf(
         name: of the scene; None: the file's.
         height_px: of a picture.
         width_px: of a picture.
+        sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show a progress bar, if standard error is a terminal.
 
     Raises:
-        SceneError: MuJoCo refuses the model, the world is too large, or the agent fits nowhere.
+        SceneError: MuJoCo refuses the model, the world is too large, the agent fits nowhere, or a sensor is unknown.
         RenderError: MuJoCo cannot render on this machine.
     """
+    check_names(sensors)
     world, agent = world or World(), agent or AgentShape()
     title = path.stem if name is None else name
     _check_body(path, agent)
@@ -72,7 +77,8 @@ def read_mjcf(
     mujoco.mj_kinematics(model, data)
     floor = floor_of(path, model, data, world, agent.step_m)
     grid = find_cells(path, model, data, floor, world, agent)
-    check_picture_count(path, len(grid.graph), height_px, width_px, SMALLER)
+    pose_bytes = sum(SENSORS[name](height_px, width_px).kept_bytes for name in sensors)
+    check_picture_count(path, len(grid.graph), height_px, width_px, SMALLER, pose_bytes)
     check_moves(grid.graph, path)
     top_m = _set_lens(model, data, floor, world.floor_m)
     view = first_person_view(
@@ -83,9 +89,10 @@ def read_mjcf(
         width_px=width_px,
         groups=SHOWN_GROUPS,
     )
+    pictures, further = sense(model, view, sensors, title=title, workers=workers, ray=ray, progress=progress)
     scene = Scene(
         name=title,
-        observations=render_at(ray, model, view, workers=workers, progress=progress, label=f"rendering {title}"),
+        observations=pictures,
         features=None,
         locations_m=grid.state_locations_m,
         headings_deg=grid.state_headings_deg,
@@ -97,6 +104,7 @@ def read_mjcf(
         ),
         cell_size_m=agent.step_m,
         top_view=_from_above(model, data, floor, grid.locations_m, world.floor_m + agent.height_m, top_m),
+        further=further,
     )
     check_scene(scene, path)
     return scene

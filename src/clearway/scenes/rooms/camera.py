@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from clearway.scenes import sensors
 from clearway.scenes.rooms.groups import CEILING_GROUP, SEEN_GROUP
 
 CAMERA_HEIGHT_M = 1.0
@@ -49,6 +50,7 @@ class View:
         vertical_extent: angle of view from the lower to the upper edge in degrees; metres if orthographic.
         orthographic: without perspective, all rays of sight are parallel.
         groups: the geom groups that show.
+        sensor: what takes the pictures, one of `sensors.SENSORS`.
     """
 
     shots: tuple[Shot, ...]
@@ -57,6 +59,12 @@ class View:
     vertical_extent: float
     orthographic: bool
     groups: tuple[int, ...]
+    sensor: str = sensors.RGB
+
+    def empty_pictures(self, count: int) -> np.ndarray:
+        """Room for so many pictures, (count, height_px, width_px, 3) uint8 RGB or as `Sensor.kept` has them."""
+        sensor = sensors.SENSORS[self.sensor](self.height_px, self.width_px)
+        return np.empty((count, *sensor.shape), sensor.kept_dtype)
 
 
 def first_person_view(
@@ -125,7 +133,7 @@ def first_person_shot(
 
 
 def take_pictures(model: mujoco.MjModel, view: View, shots: Iterable[Shot]) -> Iterator[np.ndarray]:
-    """The pictures of some shots one by one, each (height_px, width_px, 3) uint8 RGB; the array is used again.
+    """The pictures of some shots one by one, as `View.empty_pictures` has them; the array may be used again.
 
     Sets the lens of `view` in `model`; the view's own shots do not count. Needs a process with a working MUJOCO_GL
     backend (see `render`), which opens before the first shot is asked for.
@@ -138,16 +146,21 @@ def take_pictures(model: mujoco.MjModel, view: View, shots: Iterable[Shot]) -> I
     shown = mujoco.MjvOption()
     shown.geomgroup[:] = 0
     shown.geomgroup[list(view.groups)] = 1
-    picture = np.empty((view.height_px, view.width_px, 3), np.uint8)
+    sensor = sensors.SENSORS[view.sensor](view.height_px, view.width_px)
+    picture = np.empty(sensor.shape, sensor.dtype)
+    if view.sensor == sensors.DEPTH:
+        model.vis.quality.offsamples = 0  # several samples a pixel might be blended over an edge
     max_geom = model.ngeom + model.nsite + SPARE_GEOMS
     with mujoco.Renderer(model, view.height_px, view.width_px, max_geom=max_geom) as renderer:
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0  # the rooms' light is baked
+        if view.sensor == sensors.DEPTH:
+            renderer.enable_depth_rendering()
         for shot in shots:
             if shot.moved_m:
                 data.mocap_pos[:] = shot.moved_m
                 mujoco.mj_forward(model, data)
             renderer.update_scene(data, _free_camera(shot, view.orthographic), shown)
-            yield renderer.render(out=picture)
+            yield sensor.kept(renderer.render(out=picture))
 
 
 def _free_camera(shot: Shot, orthographic: bool) -> mujoco.MjvCamera:

@@ -42,7 +42,7 @@ REMEDIES = {
 OTHER_REMEDY = "Unset MUJOCO_GL to render without a screen"
 
 Camera = Callable[[Sequence["Shot"]], np.ndarray]
-"""From shots to their pictures, (shots, height_px, width_px, 3) uint8 RGB."""
+"""From shots to their pictures, (shots, height_px, width_px, 3) uint8 RGB or as `View.empty_pictures` has them."""
 
 
 def render(
@@ -53,7 +53,7 @@ def render(
     progress: bool = False,
     label: str = "rendering",
 ) -> np.ndarray:
-    """The pictures of a view, (shots, height_px, width_px, 3) uint8 RGB, the same for any number of workers.
+    """The pictures of a view, as its `empty_pictures` has them, the same for any number of workers.
 
     Args:
         model: the compiled room.
@@ -68,7 +68,7 @@ def render(
     if workers is not None and workers < 1:
         raise RenderError(f"{workers} renderer processes cannot render; ask for 1 or more")
     count = min(workers or _core_count(), MOST_WORKERS, len(view.shots))
-    pictures = np.empty((len(view.shots), view.height_px, view.width_px, 3), np.uint8)
+    pictures = view.empty_pictures(len(view.shots))
     head = job_head(view, binary_model(model))
     with (
         picture_progress(label, len(pictures), progress) as show_done,
@@ -104,15 +104,14 @@ def studio(model: mujoco.MjModel, view: View, *, workers: int | None = None) -> 
         workers: number of processes; None: one a core.
 
     Yields:
-        A function from shots to their pictures, (shots, height_px, width_px, 3) uint8 RGB; it raises what `render`
-        raises.
+        A function from shots to their pictures (`View.empty_pictures`); it raises what `render` raises.
     """
     count = min(workers or _core_count(), MOST_WORKERS)
     head = job_head(view, binary_model(model))
     with _started_workers(count) as started, ThreadPoolExecutor(count) as threads:
 
         def take(shots: Sequence[Shot]) -> np.ndarray:
-            pictures = np.empty((len(shots), view.height_px, view.width_px, 3), np.uint8)
+            pictures = view.empty_pictures(len(shots))
             jobs = [
                 threads.submit(worker.take, pictures[first::count], shots[first::count], _nothing)
                 for first, worker in enumerate(started)
@@ -131,7 +130,7 @@ def studio(model: mujoco.MjModel, view: View, *, workers: int | None = None) -> 
 
 
 def take_alone(head: bytes, pictures: np.ndarray, shots: Sequence[Shot]) -> None:
-    """Fill pictures (shots, height_px, width_px, 3) uint8 by one renderer process with one thread.
+    """Fill pictures (`View.empty_pictures`) by one renderer process with one thread.
 
     Args:
         head: lens and room, see `job_head`.
@@ -200,7 +199,7 @@ class _Worker:
         """Take the pictures of some shots.
 
         Args:
-            pictures: what to fill, (shots, height_px, width_px, 3) uint8.
+            pictures: what to fill, see `View.empty_pictures`.
             shots: the share of this worker.
             advance: called after each picture.
             last: no more shots will follow.
@@ -214,7 +213,7 @@ class _Worker:
             raw = self.process.stdout.read(size)
             if len(raw) < size:
                 raise self._failure(index, len(pictures))
-            pictures[index] = np.frombuffer(raw, np.uint8).reshape(pictures.shape[1:])
+            pictures[index] = np.frombuffer(raw, pictures.dtype).reshape(pictures.shape[1:])
             advance()
 
     def _send(self, message: bytes, asked: int) -> None:

@@ -46,22 +46,22 @@ def render_at(
     """
     if ray is None:
         return render(model, view, workers=workers, progress=progress, label=label)
-    pictures = np.empty((len(view.shots), view.height_px, view.width_px, 3), np.uint8)
+    pictures = view.empty_pictures(len(view.shots))
     with connected(ray, workers) as cluster, picture_progress(label, len(pictures), progress) as show_done:
         take = cluster.remote(num_cpus=1)(take_share)
         head = cluster.put(job_head(view, binary_model(model)))
         starts = range(0, len(pictures), SHARE_SHOTS)
         shares = [view.shots[first : first + SHARE_SHOTS] for first in starts]
-        tasks = [take.remote(head, share, pictures.shape[1:]) for share in shares]
+        tasks = [take.remote(head, share, pictures.shape[1:], pictures.dtype) for share in shares]
         for first, share, task in zip(starts, shares, tasks, strict=True):
             pictures[first : first + len(share)] = result(cluster, task, _died)
             show_done(first + len(share))
     return pictures
 
 
-def take_share(head: bytes, shots: Sequence[Shot], shape: tuple[int, int, int]) -> np.ndarray:
-    """Pictures (shots, height_px, width_px, 3) uint8 by one renderer process of this machine; see `job_head`."""
-    pictures = np.empty((len(shots), *shape), np.uint8)
+def take_share(head: bytes, shots: Sequence[Shot], shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    """Pictures (shots, *shape) by one renderer process of this machine; see `job_head`."""
+    pictures = np.empty((len(shots), *shape), dtype)
     take_alone(head, pictures, shots)
     return pictures
 

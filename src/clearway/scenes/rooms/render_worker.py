@@ -1,11 +1,11 @@
 """One renderer process: reads a job from standard input, writes raw pictures to standard output.
 
 The job is a line of JSON, the view without its shots, a line with the size of the room in bytes, and the room in
-MuJoCo's binary format. Then every line is a JSON list of shots to take, until the end. Each picture is height x width
-x 3 bytes, in the order of the shots; a line is read whole before its pictures are written. `render` starts the
-process and chooses its OpenGL backend by the environment, which MuJoCo reads when it is imported. A renderer that does
-not open is one line on standard error and exit code `CANNOT_DRAW`. When `render` dies, the pipes break and the process
-ends.
+MuJoCo's binary format. Then every line is a JSON list of shots to take, until the end. A picture is sent as its bytes
+(`View.empty_pictures` says how many), in the order of the shots; a line is read whole before its pictures are written.
+`render` starts the process and chooses its OpenGL backend by the environment, which MuJoCo reads when it is imported. A
+renderer that does not open is one line on standard error and exit code `CANNOT_DRAW`. When `render` dies, the pipes
+break and the process ends.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ const $ = (id) => document.getElementById(id);
 const STEPS_PER_S = [1, 2, 4, 8, 16, 30];
 const STATUS_MS = 6000;
 
-const known = { stage: null, scene: null, sceneIndex: -1, episode: null, walkers: [], ended: [], cards: [], minds: new Map(), link: "" };
+const known = { stage: null, scene: null, sceneIndex: -1, episode: null, walkers: [], ended: [], cards: [], pictures: null, minds: new Map(), link: "" };
 let shown = 0; // the step looked at
 let playing = false;
 let turn = 0; // of playing: an older loop notices that it is over
@@ -76,6 +76,7 @@ async function takeEpisode(answer) {
     const scene = await fetched(`scenes/${answer.scene}/map.json`);
     await map.setScene(scene, `scenes/${answer.scene}/above.jpg`);
     Object.assign(known, { scene, sceneIndex: answer.scene });
+    showSensors();
   }
   Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link });
   if (!before || before.scene !== answer.scene || before.target !== answer.target) known.minds.clear();
@@ -86,14 +87,27 @@ async function takeEpisode(answer) {
   const pictures = {
     any: known.scene.has_pictures,
     coarse: known.scene.has_pictures && known.scene.picture_shape[0] < 100,
-    path: (state) => `scenes/${answer.scene}/views/${state}.jpg`,
+    path: (state) => `scenes/${answer.scene}/${$("sensor").value || "views"}/${state}.jpg`,
   };
+  known.pictures = pictures;
   known.cards = known.walkers.map((walker, index) => createCard(walker, index, pictures, drive));
   $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
   showTarget(pictures);
   await showLayer(askNow);
   show();
   keepLink();
+}
+
+// What may be seen by: colour, and sensors with one number a pixel, each drawn in grey over its range.
+function showSensors() {
+  const { sensors } = known.scene, before = $("sensor").value;
+  const named = ({ name, low, high, unit }) => `${name}, ${low} to ${high} ${unit}`;
+  $("sensor").replaceChildren(
+    element("option", { value: "", textContent: "colour" }),
+    ...sensors.map((sensor) => element("option", { value: sensor.name, textContent: named(sensor) })),
+  );
+  $("sensor").value = sensors.some(({ name }) => name === before) ? before : "";
+  $("sensor-field").hidden = !sensors.length;
 }
 
 function takeSteps(answer) {
@@ -281,6 +295,10 @@ const help = () => $("help-dialog").showModal();
 
 $("scene").addEventListener("change", () => begin({ scene: $("scene").value, start: null, target: null }));
 $("selection").addEventListener("change", () => begin({ selection: $("selection").value }));
+$("sensor").addEventListener("change", () => {
+  showTarget(known.pictures);
+  show();
+});
 $("layer").addEventListener("change", () => showLayer());
 $("mind").addEventListener("change", () => showLayer());
 $("timeline").addEventListener("input", () => {

@@ -1,0 +1,79 @@
+"""Targets of a scene and where episodes to them start; the rule of starts stands here alone.
+
+Axis letters: S states of a scene, A actions, K starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+
+from clearway.errors import SceneError
+from clearway.scenes.graph import distances_to
+
+LEAST_SHARE = 0.5  # of the scene's largest component, from which a target must be reached
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where episodes to one target may start: all states from which it can be reached, itself excluded.
+
+    Attributes:
+        state: (K,) int64, ascending.
+        steps: (K,) int64, of the shortest path from each.
+    """
+
+    state: np.ndarray
+    steps: np.ndarray
+
+    @classmethod
+    def of(cls, steps: np.ndarray) -> Starts:
+        """The starts by the shortest-path steps (S,) of all states to the target, -1 where there is no path."""
+        state = np.flatnonzero(steps > 0)
+        return cls(state, steps[state].astype(np.int64))
+
+
+def starts_to(name: str, graph: np.ndarray, targets: Sequence[int], first: int, largest_part: int) -> list[Starts]:
+    """The starts of each target of a scene.
+
+    Args:
+        name: of the scene, for errors.
+        graph: (S, A) int, next state by action; -1 where a move is blocked.
+        targets: states.
+        first: is added to the states found.
+        largest_part: states of the scene's largest strongly connected component.
+
+    Raises:
+        SceneError: a target is reached from less than `LEAST_SHARE` of the largest component.
+    """
+    found = []
+    for target, steps in zip(targets, distances_to(graph, np.asarray(targets)), strict=True):
+        starts = Starts.of(steps)
+        if len(starts.state) < max(1, LEAST_SHARE * (largest_part - 1)):
+            problem = f"only {len(starts.state)} of {len(graph)} states lead to target {target}"
+            raise SceneError(name, problem, "Choose a target in the scene's largest component", "graph")
+        found.append(Starts(starts.state + first, starts.steps))
+    return found
+
+
+def checked_states(name: str, targets: Sequence[int], state_count: int) -> list[int]:
+    """The targets of a scene as Python's own ints.
+
+    Raises:
+        SceneError: there are none, or one is no state id, out of range or repeated.
+    """
+    chosen = list(targets)
+    if not chosen:
+        raise SceneError(name, "the scene has no target", "Give at least one state id as its target")
+    for target in chosen:
+        if not isinstance(target, Integral) or isinstance(target, bool):
+            raise SceneError(name, f"target {target!r} is no state id", "Give whole numbers as targets")
+        if not 0 <= target < state_count:
+            valid = f"states are 0 to {state_count - 1}"
+            raise SceneError(name, f"target {target} is out of range ({valid})", "Choose another target")
+    if len(set(chosen)) < len(chosen):
+        raise SceneError(name, "a target is named twice", "Name every target once")
+    return [int(target) for target in chosen]

@@ -1,0 +1,63 @@
+"""The report's page, from sections written by hand."""
+
+from base64 import b64decode
+from pathlib import Path
+
+import pytest
+
+from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series
+from clearway.viz.report import SHOWN_ROWS, write_report
+
+LONG = "a sentence that is broken into lines because it has so many words"
+TABLE = ReportTable(
+    "kept", "Kept & shown", ("agent", "steps", "note"), (("<i>ours</i>", 1234.5, LONG), ("x", None, "")), ("A note.",)
+)
+MANY = ReportTable("many", "Many", ("n",), tuple((n,) for n in range(SHOWN_ROWS + 7)), folded=True)
+FIGURE = ReportFigure("line", 'A "line"', "x", "y", (Series("a", [0, 1], [1, 2]),))
+CLAIM = Claim("It <works>", "holds", "9 < 10")
+SECTION = Section(
+    "first", "First <section>", "What was done.", (TABLE, MANY), (FIGURE,), claims=(CLAIM,), missing=("run",)
+)
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> str:
+    facts = {"command": "clearway reproduce --out '<here>'"}
+    return write_report(tmp_path, "A & B", [SECTION], facts, "Only <smoke>.", []).read_text(encoding="utf-8")
+
+
+def test_everything_is_shown_and_nothing_is_taken_for_markup(written, page_parts):
+    shown = page_parts(written)
+    for text in (
+        "A & B", "Only <smoke>.", "First <section>", "What was done.", "Kept & shown", "<i>ours</i>", "1,234", LONG,
+        "A note.", "It <works>", "holds", "9 < 10", 'A "line"', "clearway reproduce --out '<here>'",
+        "1 run is not complete yet; the tables hold what is.",
+    ):  # fmt: skip
+        assert text in shown.texts
+    assert not {"i", "here", "works", "smoke"} & {tag for tag, _ in shown.seen}
+    assert shown.texts.count("It <works>") == 2  # among all verdicts and in its section
+    assert [each.get("id") for each in shown.all("section")] == [None, "first", None]
+
+
+def test_columns_of_words_stand_on_the_left(written, page_parts):
+    kept = page_parts(written[written.index("<h3>Kept") : written.index("<details>")])
+    looks = ["words", None, "words long"]
+    assert [each.get("class") for each in kept.all("th")] == looks
+    assert [each.get("class") for each in kept.all("td")] == looks * 2
+
+
+def test_a_long_table_is_folded_and_says_where_the_rest_is(written, page_parts):
+    folded = page_parts(written[written.index("<details>") : written.index("</details>")] + "</details>")
+    assert folded.texts == ["Many", "n", *map(str, range(SHOWN_ROWS)), "7 more rows in tables/many.csv"]
+
+
+def test_pictures_are_inside(written, page_parts, tmp_path):
+    (picture,) = page_parts(written).all("img")
+    kind, content = picture["src"].split(",")
+    assert kind == "data:image/png;base64" and picture["alt"] == 'A "line"'
+    assert b64decode(content) == (tmp_path / "figures/line.png").read_bytes()
+
+
+def test_no_warning_is_no_paragraph(tmp_path, page_parts):
+    page = write_report(tmp_path, "T", [], {}, "", []).read_text(encoding="utf-8")
+    assert not page_parts(page).all("p")[1:]  # the mark alone
