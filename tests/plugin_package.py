@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.reward import Reward
+from clearway.reward import Arrival, Reward, Time
 from clearway.scenes.thor_v1 import read_scene
 
 
@@ -42,7 +42,7 @@ def vars_of(scene):
     return {field: getattr(scene, field) for field in scene.__dataclass_fields__}
 
 
-DEAR = Reward("dear", alpha=-0.5)
+DEAR = Reward("dear", (Time(-0.5), Arrival()))
 
 
 class Still:

@@ -15,9 +15,9 @@ from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_scene_agent
 from clearway.errors import EncoderError, PluginError
 from clearway.learn.config import Algorithm
-from clearway.perception import encode, encode_scenes, encoder_from_record
+from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
-from clearway.reward import REWARDS, Reward
+from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
 from clearway.scenes.importers.plugged import plugged_scenes
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from made import corridor_scene, grid_scene
@@ -45,7 +45,7 @@ def offer(folder: Path, group: str, lines: str, module: str = "", package: str =
 def test_the_built_in_names_are_those_that_there_are() -> None:
     kinds = get_args(get_type_hints(ImportScenes, include_extras=True)["kind"])
     importers = [get_args(kind)[1].name for kind in kinds if get_args(kind)[0] is not ImportPlugin]
-    assert BUILT_IN["encoders"] == (encode.AUTO, encode.TRAINED, encode.RANDOM)
+    assert BUILT_IN["encoders"] == (encode.AUTO, encode.TRAINED, encode.RANDOM, depth_grid.NAME)
     assert BUILT_IN["importers"] == tuple(importers)
     assert set(BUILT_IN["rewards"]) == set(REWARDS)
     assert BUILT_IN["algorithms"] == get_args(Algorithm)
@@ -108,7 +108,7 @@ def test_another_version_of_the_encoder_is_refused(tmp_path, here, monkeypatch) 
 
 
 def test_rewards_agents_and_algorithms_are_found_by_name(here) -> None:
-    assert load_plugin(plugin_of("rewards", "dear")) == Reward("dear", alpha=-0.5)
+    assert load_plugin(plugin_of("rewards", "dear")) == Reward("dear", (Time(-0.5), Arrival())) == reward_named("dear")
     assert load_plugin(plugin_of("agents", "still")).__name__ == "Still"
     assert load_plugin(plugin_of("algorithms", "nothing"))() is None
     assert find_plugin("rewards", "shortest") is None

@@ -53,7 +53,7 @@ def test_the_blocks_run_on_a_small_room(tmp_path: Path, monkeypatch, capsys) -> 
     left = run_page(SMALLER)
     said = capsys.readouterr().out
     assert "learning_rate: no such setting" in said
-    assert "quarters" in said and "careful" in said
+    assert "quarters" in said and "beta -0.05" in said and "few-turns" in said
     assert left["run"].folder is None
     assert {path.name for path in (tmp_path / "runs/bathroom").glob("evaluation.*")} == {
         "evaluation.json",

@@ -13,15 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from clearway.choices import RewardName
 from clearway.errors import PluginError
 
 Kind = Literal["encoders", "rewards", "agents", "importers", "algorithms"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 BUILT_IN: dict[Kind, tuple[str, ...]] = {
-    "encoders": ("auto", "resnet50", "random-resnet50"),
-    "rewards": get_args(RewardName),
+    "encoders": ("auto", "resnet50", "random-resnet50", "depth-grid"),
+    "rewards": ("collision-aware", "shortest", "bump", "clearance"),
     "agents": ("random", "shortest path"),
     "importers": ("thor-v1", "floor-plan", "images", "savn", "avd", "ai2thor", "mjcf", "miniworld"),
     "algorithms": ("ppo", "a2c", "a3c"),

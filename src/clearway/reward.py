@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from clearway.errors import ClearwayError
+from clearway.plugins import find_plugin, load_plugin
 
 if TYPE_CHECKING:
     import numpy as np
@@ -320,17 +321,20 @@ REWARDS: dict[str, Reward] = {reward.name: reward for reward in (COLLISION_AWARE
 
 
 def reward_named(name: str | Reward) -> Reward:
-    """The reward of a name: one of `REWARDS`, or a user's own as `package.module:name`.
+    """The reward of a name: one of `REWARDS`, another package's (`plugins`), or a user's own as `package.module:name`.
 
-    There stands a `Reward`, or a function without arguments that gives one.
+    What is named is a `Reward`, or a function without arguments that gives one.
 
     Raises:
         RewardError: there is none.
+        PluginError: two packages offer one of this name, or it cannot be imported.
     """
     if isinstance(name, Reward):
         return name
     if isinstance(name, str) and name in REWARDS:
         return REWARDS[name]
+    if isinstance(name, str) and (plugin := find_plugin("rewards", name)):
+        return _made(str(plugin), load_plugin(plugin))
     module, colon, attribute = name.partition(":") if isinstance(name, str) else ("", "", "")
     if not colon or not module or not attribute:
         choices = ", ".join(map(repr, REWARDS))
@@ -339,7 +343,12 @@ def reward_named(name: str | Reward) -> Reward:
         found = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as fault:
         raise RewardError(f"reward={name!r}: cannot be loaded ({fault}). Check the module and the name") from fault
+    return _made(f"reward={name!r}", found)
+
+
+def _made(source: str, found: object) -> Reward:
+    """What was found under a name, or what it gives when it is called."""
     made = found() if callable(found) else found
     if not isinstance(made, Reward):
-        raise RewardError(f"reward={name!r}: gives {made!r:.60}, expected a clearway.Reward. Correct it")
+        raise RewardError(f"{source}: gives {made!r:.60}, expected a clearway.Reward. Correct it")
     return made

@@ -15,7 +15,7 @@ def test_one_environment_and_many(tmp_path) -> None:
     assert isinstance(env.unwrapped, ImageGoalEnv)
     assert env.reset(seed=0, options={"start": 4})[1]["distance_to_go"] == 3
     assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (True, True)]
-    envs = clearway.make_env(corridor_scene(), num_envs=np.int64(3), reward=clearway.Reward("dear", alpha=-0.5))
+    envs = clearway.make_env(corridor_scene(), num_envs=np.int64(3), reward="shortest")
     assert isinstance(envs, ImageGoalVectorEnv)
     assert envs.reset(seed=0)[0]["observation"].shape[:2] == (3, 4)
 
