@@ -6,7 +6,7 @@ import pytest
 import clearway
 from clearway.errors import ArgumentError
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene
+from made import corridor_scene, grid_scene, with_depth
 
 
 @pytest.fixture
@@ -62,15 +62,15 @@ def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
 
     calls = []
 
-    def stand_in(name, seed, *, workers, progress):
-        calls.append((name, seed, workers, progress))
+    def stand_in(name, seed, *, sensors, workers, progress):
+        calls.append((name, seed, sensors, workers, progress))
         return grid_scene(seed, name=name, picture_size=(32, 32))
 
     monkeypatch.setattr(library, "cached_room_scene", stand_in)
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     out = tmp_path / "rooms/bathroom.h5"
     scene = clearway.build_room("bathroom", np.int64(2), encoder="random-resnet50", out=str(out))
-    assert calls == [("bathroom", 2, None, False)]
+    assert calls == [("bathroom", 2, ["rgb"], None, False)]
     assert scene.encoder_name == "random-resnet50"
     assert np.array_equal(clearway.load_scene(out).features, scene.features)
 
@@ -83,6 +83,7 @@ def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
         ({"name": "bathroom", "seed": 1.5}, r"seed=1\.5: expected a whole number"),
         ({"name": "bathroom", "out": "room.txt"}, r"ends in \.h5 or \.hdf5"),
         ({"name": "bathroom", "encoder_seed": -3}, "encoder_seed=-3"),
+        ({"name": "bathroom", "sensors": [3]}, "sensors=3: expected a word"),
     ],
 )
 def test_build_room_refuses_before_it_builds(arguments, part) -> None:
@@ -124,3 +125,22 @@ def test_an_encoder_of_one_s_own_without_a_part_is_refused_before_a_room_is_buil
         clearway.encode_scenes(grid_scene(1), Brightness(), workers=2)
     with pytest.raises(clearway.ClearwayError, match="has no pictures to encode"):
         clearway.encode_scenes(replace(grid_scene(1), observations=None), Brightness())
+
+
+def test_an_encoder_of_one_s_own_may_see_depth() -> None:
+    class Nearest:
+        identity, feature_count, sensor = "nearest-1", 1, "depth"
+
+        def encode(self, depth_m):
+            return depth_m.reshape(len(depth_m), -1).min(1, keepdims=True)
+
+    scene = with_depth(grid_scene(1))
+    (seen,) = clearway.encode_scenes(scene, Nearest())
+    depth_m = scene.seen_by("depth")[np.arange(scene.state_count)]
+    assert np.array_equal(np.asarray(seen.features)[:, 0], depth_m.reshape(scene.state_count, -1).min(1))
+    with pytest.raises(clearway.ClearwayError, match="has rgb, but no depth"):
+        clearway.encode_scenes(grid_scene(1), Nearest())
+    with pytest.raises(clearway.ClearwayError, match="sees depth, and it is not rendered"):
+        clearway.build_room("bathroom", encoder="depth-grid")
+    with pytest.raises(clearway.ClearwayError, match="Choose among rgb, depth"):
+        clearway.build_room("bathroom", sensors=["rgb", "sonar"])

@@ -9,13 +9,14 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
+from clearway.api.arguments import as_choice, as_path, as_seed, as_whole, as_word
 from clearway.errors import ArgumentError, EncoderError
-from clearway.perception.encoder import Encoder
+from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.plugged import own_encoder
 from clearway.scenes.rooms import ROOM_NAMES
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
+from clearway.scenes.sensors import RGB, check_names
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
 SceneSource: TypeAlias = Scene | str | os.PathLike[str]
@@ -25,7 +26,7 @@ BATCH_PICTURES = 32  # that an encoder of the user's own is given together
 
 
 class OwnEncoder(Protocol):
-    """An encoder of your own; a `name` beside these is what tables call it."""
+    """An encoder of your own; `name` beside these is what tables call it, `sensor = "depth"` lets it see depth."""
 
     identity: str
     """Another one whenever the features change; scenes trained together must agree in it."""
@@ -128,9 +129,9 @@ def encode_scenes(
 
 def _features(scene: Scene, encoder: Encoder) -> np.ndarray:
     """Features (S, F) float32 of a scene's pictures."""
-    pictures = scene.observations
-    if pictures is None:
+    if not scene.sensors:
         raise EncoderError(f"scene {scene.name} has no pictures to encode. Use the features that its file holds")
+    pictures = scene.seen_by(sensor_of(encoder.record))
     starts = range(0, scene.state_count, BATCH_PICTURES)
     return np.concatenate([encoder.encode(pictures[start : start + BATCH_PICTURES]) for start in starts])
 
@@ -139,6 +140,7 @@ def build_room(
     name: str,
     seed: int = 0,
     *,
+    sensors: Iterable[str] = (RGB,),
     encoder: str | OwnEncoder = "auto",
     encoder_seed: int = 0,
     out: str | os.PathLike[str] | None = None,
@@ -152,6 +154,7 @@ def build_room(
     Args:
         name: "bathroom", "bedroom", "living_room" or "kitchen".
         seed: 0 gives the default room, another one other colours, textures, pictures and small furniture.
+        sensors: what takes the pictures: ("rgb",), or ("rgb", "depth") with depth in metres beside the colours.
         encoder: see `encode_scenes`. "random-resnet50" is calibrated on this room alone: encode rooms that are to be
             trained together once more, together.
         encoder_seed: of "random-resnet50".
@@ -166,6 +169,7 @@ def build_room(
     Warns:
         EncoderWarning: "auto" fell back to random weights.
     """
+    from clearway.perception import check_sees
     from clearway.scenes.library import cached_room_scene
 
     room, room_seed = as_choice("name", name, ROOM_NAMES), as_seed("seed", seed)
@@ -174,9 +178,13 @@ def build_room(
         raise ArgumentError(f"out={str(path)!r}: expected a name that ends in {' or '.join(SCENE_SUFFIXES)}. Rename it")
     count = None if workers is None else as_whole("workers", workers, 1)
     as_seed("encoder_seed", encoder_seed)  # before the minute that building takes
-    if not isinstance(encoder, str):
+    named = [as_word("sensors", sensor) for sensor in ([sensors] if isinstance(sensors, str) else sensors)]
+    check_names(named)
+    if isinstance(encoder, str):
+        check_sees(encoder, named)
+    else:
         own_encoder(encoder)
-    scene = cached_room_scene(room, room_seed, workers=count, progress=show_progress)
+    scene = cached_room_scene(room, room_seed, sensors=named, workers=count, progress=show_progress)
     (encoded,) = encode_scenes(scene, encoder, encoder_seed=encoder_seed, show_progress=show_progress)
     if path is None:
         return encoded

@@ -5,6 +5,7 @@ Such an encoder, and what an entry point of the group `clearway.encoders` gives 
     identity: str, another one whenever the features change; scenes trained together must agree in it
     feature_count: int, F
     encode(pictures): features (B, F) of pictures (B, height, width, 3) uint8; equal for equal pictures
+    sensor: str, where it takes those of another sensor than the colour camera, such as "depth"
 
 The record of a package's encoder names plugin and package, so that it can be made again wherever that is installed.
 That of a program's own cannot say how: its scenes can be trained on, but new pictures cannot be encoded by them.
@@ -20,9 +21,10 @@ from typing import Any
 import numpy as np
 
 from clearway.errors import EncoderError, PluginError
-from clearway.perception.encoder import identity_of
+from clearway.perception.encoder import SENSOR, identity_of
 from clearway.plugins import Plugin, find_plugin, load_plugin
 from clearway.scenes.scene import EncoderRecord
+from clearway.scenes.sensors import RGB, SENSORS
 
 KIND, OWN_KIND = "plugin", "own"
 
@@ -42,7 +44,7 @@ class CheckedEncoder:
     made: Any
 
     def encode(self, pictures: np.ndarray) -> np.ndarray:
-        """Features (B, F) float32 of pictures (B, height, width, 3) uint8.
+        """Features (B, F) float32 of pictures (B, height, width, 3) uint8, or of what its sensor sees.
 
         Raises:
             EncoderError: what was returned is of another shape or type, or holds NaN or Inf.
@@ -98,7 +100,10 @@ def _checked(
         raise PluginError(f"{what}: its feature_count is {count!r:.40}, expected a whole number from 1 on. {remedy}")
     if not callable(getattr(made, "encode", None)):
         raise PluginError(f"{what}: has no method encode. {remedy}")
-    fixed = {**fixed, "made_of": identity}
+    sensor = getattr(made, SENSOR, RGB)
+    if sensor not in SENSORS:
+        raise PluginError(f"{what}: its sensor is {sensor!r:.40}, expected one of {', '.join(SENSORS)}. {remedy}")
+    fixed = {**fixed, "made_of": identity, **({} if sensor == RGB else {SENSOR: sensor})}
     return CheckedEncoder(EncoderRecord(name, identity_of(fixed, ()), {**fixed, **told}), int(count), made)
 
 
