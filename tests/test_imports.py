@@ -19,6 +19,7 @@ ORDER = (
         "progress",
         "children",
         "ray_cluster",
+        "spread",
         "terminal",
         "torch_threads",
     },

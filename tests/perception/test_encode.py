@@ -1,5 +1,6 @@
-import subprocess
-import sys
+import os
+import signal
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +17,9 @@ from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from made import corridor_scene, grid_scene
+from spread_parts import workers_of
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 
 TINY = ResNetShape(8, (16, 32), (1, 1), "bottleneck")
 
@@ -167,28 +171,20 @@ def test_the_calibration_takes_one_thread_whatever_torch_has(own_cache: Path, mo
     assert len(identities) == 1
 
 
-UNGUARDED = """
-import sys
-from clearway.perception import encode_scenes
-from clearway.perception.random_resnet import ResNetShape, fit_record
-from clearway.scenes.thor_v1 import read_scene
+@needs_proc
+def test_an_encoding_process_that_is_killed_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes = rooms()
+    record = encode_scenes(scenes[:1], "random-resnet50", workers=1)[0].encoder
+    open_batches = encode._batches
 
-scene = read_scene(sys.argv[1])
-record = fit_record([scene.observations], shape=ResNetShape(8, (16, 32), (1, 1)))
-encode_scenes([scene], record, workers=1)
-"""
+    def kill_first(*arguments: object) -> Iterator[object]:
+        for worker in workers_of(os.getpid()):
+            os.kill(worker, signal.SIGKILL)
+        yield from open_batches(*arguments)
 
-
-@pytest.mark.slow
-def test_a_script_without_a_guard_ends_with_a_word(tmp_path: Path) -> None:
-    write_scene(rooms()[0], tmp_path / "a.h5")
-    (tmp_path / "script.py").write_text(UNGUARDED)
-    words = [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "a.h5")]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 1
-    assert "encoding with workers runs the script again in each of them" in done.stderr
-    assert "an encoding process died. Try fewer --workers" in done.stderr
-    assert 'needs the guard if __name__ == "__main__":' in done.stderr
+    monkeypatch.setattr(encode, "_batches", kill_first)
+    with pytest.raises(EncoderError, match=r"^an encoding process was killed by SIGKILL\. Run .* fewer --workers"):
+        encode_scenes(scenes[1:], record, workers=1)
 
 
 @pytest.mark.slow

@@ -13,9 +13,8 @@ from clearway.errors import RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
-from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import is_done
-from clearway.experiments.local import affordable_workers, run_jobs
+from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting, prepare
@@ -95,18 +94,8 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
     jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
     with board(request.out, jobs, show_progress) as show:
-        if request.ray is None:
-            workers = affordable_workers(request.workers, request.threads)
-            run_jobs(request.out, left, workers=workers, threads=request.threads, show=show)
-        else:
-            run_jobs_on_ray(
-                request.out,
-                left,
-                address=request.ray,
-                workers=request.workers,
-                threads=request.threads,
-                show=show,
-            )
+        workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
+        run_jobs(request.out, left, workers=workers, threads=request.threads, show=show, ray=request.ray)
     return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from clearway.errors import EncoderError, SceneError
-from clearway.perception import depth_grid, plugged, pretrained, random_resnet, spread
+from clearway.perception import depth_grid, plugged, pretrained, random_resnet
 from clearway.perception.cache import Entry, cached, content_key, joint_key
 from clearway.perception.encoder import Encoder, EncoderWarning, sensor_of
 from clearway.perception.preprocess import Preprocessing
@@ -21,10 +19,14 @@ from clearway.plugins import find_plugin
 from clearway.progress import picture_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
 from clearway.scenes.sensors import DEPTH, RGB
+from clearway.spread.workers import Work, Workers, workers_for
 from clearway.torch_threads import threads_in_use, torch_threads
 
 AUTO, TRAINED, RANDOM = "auto", "resnet50", "random-resnet50"
 BATCH_PICTURES = 32
+
+Batch = tuple[Observations, int, int]
+"""Where pictures are, the first and the last of a batch, last excluded."""
 
 
 def find_record(
@@ -113,6 +115,8 @@ def encode_scenes(
 ) -> list[Scene]:
     """The scenes with features of their pictures, all by one encoder.
 
+    However many workers share the work, features are those of one process with one thread, bit for bit.
+
     Features are kept in the user's cache folder by the content of the pictures, the encoder's identity, and what
     decides the last bits: `batch` and the number of threads.
 
@@ -123,73 +127,72 @@ def encode_scenes(
         threads: processor threads; None: as many as torch uses, one a core if nobody set it.
         progress: show a progress bar, if standard error is a terminal.
         batch: pictures that go through the network together.
-        workers: processes that share the encoding, one thread each; None: this process alone, with `threads`.
-        ray: address of a Ray cluster that encodes instead, see `ray_cluster.connected`.
+        workers: processes that share the encoding, one thread each; None: this process alone, with `threads`. Under
+            Ray's "local" processors, None for all.
+        ray: address of a Ray cluster that encodes instead, see `ray_cluster.connected`; files of pictures must have
+            the same path on all nodes.
 
     Raises:
-        EncoderError: see `find_record`; or a scene has no pictures, or a process died, or processes are asked for by a
-            script without the guard `if __name__ == "__main__":`.
+        EncoderError: see `find_record`; or a scene has no pictures, or a process died.
         SceneError: the pictures of a scene's file are damaged.
         RunError: Ray is asked for and cannot be had.
     """
-    if workers is not None:
-        _check_guarded()
+    here = workers is None and ray is None
     with (
         torch_threads(threads),
         picture_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
-        _encoding(workers, ray) as encode,
     ):
         record = find_record(encoder, scenes, seed=seed) if isinstance(encoder, str) else encoder
-        here = workers is None and ray is None
         shaped_by = {"threads": threads_in_use() if here else 1, "batch": batch}
+        work = Work(partial(_open, encoder_from_record, record, None if here else 1), _encode, _died)
         encoded, done = [], 0
-        for scene in scenes:
-            pictures = _pictures(scene, sensor_of(record))
-            key = joint_key(content_key(pictures), record.identity, shaped_by)
-            make = partial(_encode_all, encode, record, pictures, batch, show_done, done)
-            features = cached("features", key, make).arrays["features"]
-            done += scene.state_count
-            show_done(done)
-            encoded.append(scene.with_features(features, record))
+        with workers_for(work, workers=workers, ray=ray) as crew:
+            for scene in scenes:
+                pictures = _pictures(scene, sensor_of(record))
+                key = joint_key(content_key(pictures), record.identity, shaped_by)
+                make = partial(_encode_all, crew, pictures, batch, show_done, done)
+                features = cached("features", key, make).arrays["features"]
+                done += scene.state_count
+                show_done(done)
+                encoded.append(scene.with_features(features, record))
     return encoded
 
 
-def _check_guarded() -> None:
-    """Check that this is no new process that runs its parent's script once more, where both would wait for ever."""
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        problem = "encoding with workers runs the script again in each of them"
-        raise EncoderError(f'{problem}. Put what the script does under if __name__ == "__main__":')
+def _open(load: Callable[[EncoderRecord], Encoder], record: EncoderRecord, threads: int | None) -> Encoder:
+    """What a worker encodes with: the network, with so many threads; None leaves them as they are."""
+    if threads is not None:
+        import torch
+
+        torch.set_num_threads(threads)
+    return load(record)
 
 
-@contextmanager
-def _encoding(workers: int | None, ray: str | None) -> Iterator[spread.Encode]:
-    """Who encodes: this process, several, or a cluster. Processes start where features are not cached."""
-    if ray is not None:
-        with spread.cluster(ray, workers) as encode:
-            yield encode
-    elif workers is not None:
-        with spread.processes(workers) as encode:
-            yield encode
-    else:
-        yield _encoding_here()
+def _encode(encoder: Encoder, batch: Batch) -> np.ndarray:
+    """Features (B, F) float32 of a batch."""
+    pictures, first, last = batch
+    return encoder.encode(pictures[first:last])
 
 
-def _encoding_here() -> spread.Encode:
-    """Encoding in this process, with the threads that torch has; the network is loaded at most once."""
-    encoders: list[Encoder] = []
+def _died(batch: Batch, how: str) -> EncoderError:
+    remedy = "Run the command again, with fewer --workers where memory is short"
+    return EncoderError(f"an encoding process {how}. {remedy}")
 
-    def encode(load: spread.Loader, record: EncoderRecord, pictures: Observations, batch: int) -> Iterator[np.ndarray]:
-        if not encoders:
-            encoders.append(load(record))
-        for part, first, last in spread.batches(pictures, batch):
-            yield encoders[0].encode(part[first:last])
 
-    return encode
+def _batches(pictures: Observations, size: int) -> Iterator[Batch]:
+    """Batches of pictures (S, height, width, 3).
+
+    Pictures in memory are cut to the batch, so that no process is sent more than it needs.
+    """
+    for first in range(0, pictures.shape[0], size):
+        last = min(first + size, pictures.shape[0])
+        if isinstance(getattr(pictures, "raw", pictures), np.ndarray):
+            yield pictures[first:last], 0, last - first
+        else:
+            yield pictures, first, last
 
 
 def _encode_all(
-    encode: spread.Encode,
-    record: EncoderRecord,
+    crew: Workers[Batch, np.ndarray],
     pictures: Observations,
     batch: int,
     show_done: Callable[[int], None],
@@ -198,7 +201,7 @@ def _encode_all(
     """The features (S, F) float32 of all pictures of a scene, to be cached."""
     parts: list[np.ndarray] = []
     done = done_before
-    for part in encode(encoder_from_record, record, pictures, batch):
+    for part in crew.results(_batches(pictures, batch)):
         parts.append(part)
         done += len(part)
         show_done(done)

@@ -149,7 +149,7 @@ def check_mujoco() -> None:
     try:
         import_module("mujoco")
     except (ImportError, AttributeError, RuntimeError, OSError) as error:
-        from clearway.scenes.rooms.render import cannot_draw
+        from clearway.scenes.rooms.render_worker import cannot_draw
 
         raise cannot_draw(f"{type(error).__name__}: {error}") from error
 

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
-import time
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +10,12 @@ import numpy as np
 import pytest
 
 from clearway.errors import RenderError
-from clearway.scenes.rooms import render as rendering
 from clearway.scenes.rooms.camera import View, first_person_view
 from clearway.scenes.rooms.render import render, studio
 from small_rooms import SmallRoom
+from spread_parts import workers_of
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 
 NO_LIBRARY = """
 import ctypes, ctypes.util
@@ -87,58 +87,16 @@ def test_the_users_backend_is_respected_and_named_if_it_fails(model, view, monke
         render(model, view, workers=1)
 
 
-def test_a_worker_that_dies_ends_the_others_with_one_clear_error(model, view, monkeypatch):
-    dying = (
-        "import os, signal, sys, time; view = sys.stdin.buffer.read();"
-        " sys.stdout.buffer.write(bytes(360_000)); sys.stdout.flush();"
-        " os.kill(os.getpid(), signal.SIGKILL) if {first!r} else time.sleep(600)"
-    )
-    started = []
-    start = subprocess.Popen
-
-    def start_stand_in(command, **options):
-        process = start([sys.executable, "-c", dying.format(first=not started)], **options)
-        started.append(process)
-        return process
-
-    monkeypatch.setattr(rendering.subprocess, "Popen", start_stand_in)
-    begun = time.monotonic()
-    with pytest.raises(RenderError, match=r"signal SIGKILL after 1 of 4 pictures.*fewer workers"):
-        render(model, view, workers=2)
-    assert time.monotonic() - begun < 60
-    assert [process.poll() for process in started] == [-9, -9]
-
-
-def test_no_process_outlives_a_killed_caller(model, tmp_path):
-    script = tmp_path / "caller.py"
-    script.write_text(
-        f"import sys; sys.path[:] = {[path or os.getcwd() for path in sys.path]!r}\n"
-        "import mujoco, numpy as np\n"
-        "from clearway.scenes.rooms.camera import first_person_view\n"
-        "from clearway.scenes.rooms import render as rendering\n"
-        "start = rendering.subprocess.Popen\n"
-        "def noted(*args, **options):\n"
-        "    process = start(*args, **options)\n"
-        "    print(process.pid, flush=True)\n"
-        "    return process\n"
-        "rendering.subprocess.Popen = noted\n"
-        "model = mujoco.MjSpec().compile()\n"
-        "rendering.render(model, first_person_view(np.zeros((1000, 2)), np.zeros(1000)), workers=2)\n"
-    )
-    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as caller:
-        workers = [int(caller.stdout.readline()) for _ in range(2)]
-        caller.kill()
-    deadline = time.monotonic() + 30
-    while any(is_running(worker) for worker in workers):
-        assert time.monotonic() < deadline, "a renderer process is still running"
-        time.sleep(0.05)
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
+@needs_proc
+def test_a_renderer_that_is_killed_is_one_clear_error_and_ends_the_others(model, view):
+    with studio(model, view, workers=2) as camera:
+        camera(view.shots)
+        os.kill(workers_of(os.getpid())[0], signal.SIGKILL)
+        with pytest.raises(RenderError, match=r"renderer process was killed by SIGKILL .*fewer workers") as error:
+            for _ in range(20):  # until the one that died is asked
+                camera(view.shots)
+        assert "\n" not in str(error.value)
+    assert not workers_of(os.getpid())
 
 
 def test_no_pictures_need_no_worker(model):

@@ -1,65 +1,39 @@
-"""One renderer process: reads a job from standard input, writes raw pictures to standard output.
-
-The job is a line of JSON, the view without its shots, a line with the size of the room in bytes, and the room in
-MuJoCo's binary format. Then every line is a JSON list of shots to take, until the end. A picture is sent as its bytes
-(`View.empty_pictures` says how many), in the order of the shots; a line is read whole before its pictures are written.
-`render` starts the process and chooses its OpenGL backend by the environment, which MuJoCo reads when it is imported. A
-renderer that does not open is one line on standard error and exit code `CANNOT_DRAW`. When `render` dies, the pipes
-break and the process ends.
-"""
+"""What a renderer process does: it opens a camera in a room once, and takes pictures; and what it needs for that."""
 
 from __future__ import annotations
 
-import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, replace
-from itertools import chain, islice
-from typing import TYPE_CHECKING
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clearway.errors import RenderError
 
 if TYPE_CHECKING:
     import mujoco
 
-    from clearway.scenes.rooms.camera import Shot, View
-
-CANNOT_DRAW = 3
-CANNOT_DRAW_MARK = "cannot draw: "
-MODEL_FILE = "room.mjb"
-
-
-def job_head(view: View, room: bytes) -> bytes:
-    """What a process reads first: the lens of a view, and the room as `binary_model` makes it."""
-    lens = json.dumps(asdict(replace(view, shots=()))).encode()
-    return b"%s\n%d\n%s" % (lens, len(room), room)
-
-
-def shots_line(shots: Sequence[Shot]) -> bytes:
-    """Shots as a line of JSON."""
-    return json.dumps([asdict(shot) for shot in shots]).encode() + b"\n"
-
-
-def _view_of_line(line: bytes) -> View:
-    from clearway.scenes.rooms.camera import View
-
-    parts = json.loads(line)
-    return View(shots=(), groups=tuple(parts.pop("groups")), **{k: v for k, v in parts.items() if k != "shots"})
-
-
-def _shots_of_lines(lines: Iterable[bytes]) -> Iterator[Shot]:
-    """The shots of all lines, a line at a time."""
     from clearway.scenes.rooms.camera import Shot
 
-    for line in lines:
-        for parts in json.loads(line):
-            look_at_m, moved_m = tuple(parts.pop("look_at_m")), tuple(map(tuple, parts.pop("moved_m")))
-            yield Shot(look_at_m=look_at_m, moved_m=moved_m, **parts)
+BACKEND_VARIABLE = "MUJOCO_GL"
+MESA_THREADS_VARIABLE = "LP_NUM_THREADS"  # of the software rasteriser, in each process
+MODEL_FILE = "room.mjb"
+REMEDIES = {
+    "egl": "On Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri",
+    "osmesa": "On Debian or Ubuntu: apt-get install libosmesa6; or unset MUJOCO_GL",
+}
+OTHER_REMEDY = "Unset MUJOCO_GL to render without a screen"
+
+Camera = Callable[[Sequence["Shot"]], np.ndarray]
+"""From shots to their pictures, (shots, height_px, width_px, 3) uint8 RGB or as `View.empty_pictures` has them."""
 
 
 def binary_model(model: mujoco.MjModel) -> bytes:
     """The compiled room in MuJoCo's binary format."""
     import mujoco
-    import numpy as np
 
     content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, content)
@@ -73,28 +47,57 @@ def model_of_binary(content: bytes) -> mujoco.MjModel:
     return mujoco.MjModel.from_binary_path(MODEL_FILE, {MODEL_FILE: content})
 
 
-def main() -> None:
-    """Take the pictures that standard input asks for."""
-    with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as output:
-        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a driver prints must not mix with the pictures
-        try:
-            from clearway.scenes.rooms.camera import take_pictures
+def open_camera(lens: Mapping[str, Any], room: bytes) -> Camera:
+    """A camera in this process, which needs `renderer_environment`.
 
-            job = sys.stdin.buffer
-            view = _view_of_line(job.readline())
-            model = model_of_binary(job.read(int(job.readline())))
-            pictures = take_pictures(model, view, _shots_of_lines(job))
-            first = list(islice(pictures, 1))
-        except Exception as error:
-            # Missing libraries show as many kinds of error (MuJoCo and PyOpenGL raise AttributeError,
-            # ImportError, RuntimeError, ...): `render` makes one RenderError of them all.
-            cause = " ".join(f"{type(error).__name__}: {error}".split())
-            print(f"{CANNOT_DRAW_MARK}{cause}", file=sys.stderr, flush=True)
-            sys.exit(CANNOT_DRAW)
-        for picture in chain(first, pictures):
-            output.write(picture.tobytes())
-            output.flush()
+    Args:
+        lens: the fields of a view, all but its shots; as a `View` they could not be read where MuJoCo is broken.
+        room: as `binary_model` makes it.
+
+    Raises:
+        RenderError: this machine has no OpenGL backend that works; here, or by the camera.
+    """
+    asked: deque[Shot] = deque()
+    with _one_kind_of_error():
+        from clearway.scenes.rooms.camera import View, take_pictures
+
+        view = View(shots=(), **lens)
+        pictures = take_pictures(model_of_binary(room), view, iter(asked.popleft, None))
+
+    def camera(shots: Sequence[Shot]) -> np.ndarray:
+        taken = view.empty_pictures(len(shots))
+        asked.extend(shots)
+        with _one_kind_of_error():
+            for index in range(len(shots)):
+                taken[index] = next(pictures)
+        return taken
+
+    return camera
 
 
-if __name__ == "__main__":
-    main()
+def take(camera: Camera, shots: Sequence[Shot]) -> np.ndarray:
+    """The pictures of some shots."""
+    return camera(shots)
+
+
+def renderer_environment(threads: int) -> dict[str, str]:
+    """What renderer processes get where the caller's environment says nothing: EGL (no screen) on Linux; threads."""
+    backend = {BACKEND_VARIABLE: "egl"} if sys.platform == "linux" else {}
+    return {MESA_THREADS_VARIABLE: str(threads), **backend}
+
+
+def cannot_draw(cause: str) -> RenderError:
+    """The error for a machine whose OpenGL backend does not open."""
+    backend = {**renderer_environment(1), **os.environ}.get(BACKEND_VARIABLE, "")
+    remedy = REMEDIES.get(backend.lower().strip(), OTHER_REMEDY)
+    words = " ".join(cause.split())
+    return RenderError(f"no pictures can be rendered here with {BACKEND_VARIABLE}={backend} ({words}). {remedy}")
+
+
+@contextmanager
+def _one_kind_of_error() -> Iterator[None]:
+    """Missing libraries show as many (MuJoCo and PyOpenGL raise AttributeError, ImportError, RuntimeError, ...)."""
+    try:
+        yield
+    except Exception as error:
+        raise cannot_draw(f"{type(error).__name__}: {error}") from error

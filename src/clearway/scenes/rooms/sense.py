@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clearway.scenes.rooms.render_cluster import render_at
+from clearway.scenes.rooms.render import render
 from clearway.scenes.sensors import RGB, SENSORS, Readings
 
 if TYPE_CHECKING:
@@ -34,20 +34,20 @@ def sense(
         view: the shots and the lens, the same for all sensors.
         sensors: names that passed `sensors.check_names`.
         title: of the room, for progress bars.
-        workers, ray, progress: see `render_at`.
+        workers, ray, progress: see `render`.
 
     Returns:
         pictures: (shots, height_px, width_px, 3) uint8 RGB.
         further: what each sensor but the colour camera measured, in the order asked for.
 
     Raises:
-        RenderError, RunError: as of `render_at`.
+        RenderError, RunError: as of `render`.
     """
     taken = {}
     for name in (RGB, *(name for name in sensors if name != RGB)):
         label = f"rendering {title}" if name == RGB else f"rendering {title}, {name}"
         one = replace(view, sensor=name)
-        taken[name] = render_at(ray, model, one, workers=workers, progress=progress, label=label)
+        taken[name] = render(model, one, workers=workers, ray=ray, progress=progress, label=label)
     pictures = taken.pop(RGB)
     further = (Readings(SENSORS[name](view.height_px, view.width_px), raw) for name, raw in taken.items())
     return pictures, tuple(further)

@@ -3,20 +3,23 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
-from clearway.errors import RunError
-from clearway.experiments import local
+from clearway.errors import RunError, SceneError
+from clearway.experiments import jobs as experiment_jobs
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
-from clearway.experiments.local import affordable_workers, run_jobs
+from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
 from clearway.learn.run_folder import RunFolder
 from clearway.reward import COLLISION_AWARE
 from small_setting import small_setting
+from spread_parts import workers_of
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 
 
 def jobs_of(setting: Setting) -> list[Job]:
@@ -28,6 +31,7 @@ def nothing(under_way: Sequence[Job]) -> None:
     """Show nothing."""
 
 
+@needs_proc
 def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
     """One worker is killed on the way and begins again."""
     here, there = small_setting(tmp_path / "here"), small_setting(tmp_path / "there")
@@ -36,10 +40,10 @@ def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
     killed: list[int] = []
 
     def kill_once(under_way: Sequence[Job]) -> None:
-        children = [process.pid for process in local.multiprocessing.active_children()]
-        if children and not killed:
-            killed.append(children[0])
-            os.kill(children[0], signal.SIGKILL)
+        workers = workers_of(os.getpid())
+        if workers and not killed:
+            killed.append(workers[0])
+            os.kill(workers[0], signal.SIGKILL)
 
     run_jobs(there.out, jobs_of(there), workers=2, threads=1, show=kill_once)
     assert killed
@@ -50,43 +54,25 @@ def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
         assert (tables[0].collisions == tables[1].collisions).all()
 
 
-def test_a_process_does_one_job_after_the_other_until_it_dies(tmp_path: Path) -> None:
-    setting = small_setting(tmp_path, seeds=3)
-    jobs = jobs_of(setting)
-    seen: list[tuple[str, int]] = []
-
-    def kill_in_the_third(under_way: Sequence[Job]) -> None:
-        for job, process in zip(under_way, local.multiprocessing.active_children(), strict=bool(under_way)):
-            if (job.run.name, process.pid) not in seen:
-                seen.append((job.run.name, process.pid))
-                if len(seen) == 3:
-                    os.kill(process.pid, signal.SIGKILL)
-
-    run_jobs(setting.out, jobs, workers=1, threads=1, show=kill_in_the_third)
-    assert [name for name, _ in seen] == [job.run.name for job in (*jobs, jobs[-1])]
-    assert [pid == seen[0][1] for _, pid in seen] == [True, True, True, False]
-    assert all(is_done(setting.out, job) for job in jobs)
-
-
 def test_what_the_user_did_wrong_is_said_in_one_line(tmp_path: Path) -> None:
     setting = small_setting(tmp_path)
     jobs = jobs_of(setting)
     setting.files[0].path.write_bytes(b"not a scene")
-    with pytest.raises(RunError, match=r"bathroom\.h5"):
+    with pytest.raises(SceneError, match=r"bathroom\.h5"):
         run_jobs(setting.out, jobs, workers=1, threads=1, show=nothing)
     assert not any(is_done(setting.out, job) for job in jobs)
 
 
+@needs_proc
 def test_a_run_that_is_killed_every_time_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     setting = small_setting(tmp_path, seeds=1)
-    monkeypatch.setattr(local, "ATTEMPTS", 2)
+    monkeypatch.setattr(experiment_jobs, "ATTEMPTS", 2)
     killed: set[int] = set()
 
     def kill(under_way: Sequence[Job]) -> None:
-        for process in local.multiprocessing.active_children():
-            if process.pid not in killed:
-                killed.add(process.pid)
-                os.kill(process.pid, signal.SIGKILL)
+        for worker in workers_of(os.getpid()):
+            killed.add(worker)
+            os.kill(worker, signal.SIGKILL)
 
     (job,) = jobs_of(setting)
     with pytest.raises(RunError, match=r"SIGKILL, attempt 2.*run the command again"):
@@ -94,6 +80,7 @@ def test_a_run_that_is_killed_every_time_is_given_up(tmp_path: Path, monkeypatch
     assert len(killed) == 2
 
 
+@needs_proc
 def test_an_interruption_stops_all_workers_and_leaves_what_can_be_resumed(tmp_path: Path) -> None:
     setting = small_setting(tmp_path)
     jobs = jobs_of(setting)
@@ -104,7 +91,7 @@ def test_an_interruption_stops_all_workers_and_leaves_what_can_be_resumed(tmp_pa
 
     with pytest.raises(KeyboardInterrupt):
         run_jobs(setting.out, jobs, workers=2, threads=1, show=interrupt)
-    assert not local.multiprocessing.active_children()
+    assert not workers_of(os.getpid())
     run_jobs(setting.out, jobs, workers=2, threads=1, show=nothing)
     assert all(is_done(setting.out, job) for job in jobs)
 
@@ -116,23 +103,20 @@ def endless_command(folder: Path) -> list[str]:
     return [sys.executable, "-m", "clearway", "reproduce", "fig3", "--learners", "published", *map(str, words)]
 
 
-def wait_for(pattern: str, folder: Path) -> Path:
-    """The first file in a folder that matches, once there is one."""
-    end = time.monotonic() + 120
-    while time.monotonic() < end:
-        for path in folder.glob(pattern):
-            return path
-        time.sleep(0.02)
-    raise TimeoutError(f"no {pattern} in {folder}")
+def wait_until(happens: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    """Come back when something is so, which cannot be once the process has ended."""
+    while not happens():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
 
 
+@needs_proc
 def test_ctrl_c_is_said_once_and_not_by_workers(tmp_path: Path) -> None:
-    """The terminal sends SIGINT to every process of the group, also to workers that are still importing."""
+    """The terminal sends SIGINT to every process of the group, also to workers that have just been started."""
     with subprocess.Popen(
         endless_command(tmp_path), stderr=subprocess.PIPE, start_new_session=True, text=True
     ) as process:
-        wait_for("out/reproduction.json", tmp_path)
-        time.sleep(0.5)  # the workers are importing by now
+        wait_until(lambda: len(workers_of(process.pid)) > 0, process)
         os.killpg(process.pid, signal.SIGINT)
         _, said = process.communicate(timeout=120)
     assert process.returncode == 130
@@ -141,27 +125,23 @@ def test_ctrl_c_is_said_once_and_not_by_workers(tmp_path: Path) -> None:
 
 
 def test_a_killed_command_leaves_no_worker_that_keeps_its_runs_locked(tmp_path: Path) -> None:
-    with subprocess.Popen(endless_command(tmp_path), stderr=subprocess.PIPE) as process:
-        metrics = wait_for("out/runs/*/metrics.jsonl", tmp_path)
+    with subprocess.Popen(endless_command(tmp_path), stderr=subprocess.PIPE, text=True) as process:
+        wait_until(lambda: any(tmp_path.glob("out/runs/*/metrics.jsonl")), process)
         process.kill()
-    end = time.monotonic() + 10  # alone it takes a moment
-    while True:
-        try:
-            with RunFolder(metrics.parent).held():
-                return
-        except RunError:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        process.communicate(timeout=120)  # until no worker has standard error open any more
+    for metrics in tmp_path.glob("out/runs/*/metrics.jsonl"):
+        with RunFolder(metrics.parent).held():
+            pass
 
 
 def test_memory_limits_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local, "_free_bytes", lambda: 3 * local.JOB_BYTES)
+    monkeypatch.setattr(experiment_jobs, "_free_bytes", lambda: 3 * experiment_jobs.JOB_BYTES)
     with pytest.warns(UserWarning, match=r"3 runs side by side instead of 8: one may take 1 GB, 3\.0 are free"):
         assert affordable_workers(8, threads=1) == 3
     assert affordable_workers(2, threads=1) == 2
-    monkeypatch.setattr(local, "_free_bytes", lambda: 0)
+    monkeypatch.setattr(experiment_jobs, "_free_bytes", lambda: 0)
     with pytest.warns(UserWarning, match="1 runs side by side instead of 8"):
         assert affordable_workers(8, threads=1) == 1
     assert affordable_workers(None, threads=1) == 1  # nothing to be told of
-    monkeypatch.setattr(local, "_free_bytes", lambda: None)
+    monkeypatch.setattr(experiment_jobs, "_free_bytes", lambda: None)
     assert affordable_workers(8, threads=1) == 8

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import ClearwayError, RunError
-from clearway.experiments.cluster import run_jobs_on_ray
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
+from clearway.experiments.jobs import run_jobs
 from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
@@ -62,7 +62,7 @@ def test_a_cluster_gives_what_this_process_gives_though_a_node_is_killed(tmp_pat
             cluster.remove_node(doomed.pop(), allow_graceful=False)
 
     try:
-        run_jobs_on_ray(there.out, jobs, address=cluster.address, workers=None, threads=1, show=kill_a_node)
+        run_jobs(there.out, jobs, ray=cluster.address, workers=None, threads=1, show=kill_a_node)
     finally:
         ray.shutdown()
         cluster.shutdown()
@@ -81,7 +81,7 @@ def test_an_interruption_saves_a_checkpoint_of_what_is_under_way(tmp_path: Path)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_jobs_on_ray(setting.out, jobs, address="local", workers=1, threads=1, show=interrupt)
+        run_jobs(setting.out, jobs, ray="local", workers=1, threads=1, show=interrupt)
     assert len(seen) == 1  # the other one was waiting for the only processor
     (job,) = [job for job in jobs if job.run.name in seen]
     assert read_progress(newest_checkpoint(run_folder(setting.out, job.run).checkpoints)).frames > 0
@@ -92,7 +92,7 @@ def test_what_the_user_did_wrong_is_said_as_on_one_machine(tmp_path: Path) -> No
     (job,) = jobs_of(setting)
     setting.files[0].path.write_bytes(b"not a scene")
     with pytest.raises(ClearwayError, match=r"bathroom\.h5"):
-        run_jobs_on_ray(setting.out, [job], address="local", workers=1, threads=1, show=nothing)
+        run_jobs(setting.out, [job], ray="local", workers=1, threads=1, show=nothing)
     assert not is_done(setting.out, job)
 
 
@@ -100,10 +100,4 @@ def test_more_threads_than_any_node_has_are_refused(tmp_path: Path) -> None:
     setting = small_setting(tmp_path, seeds=1)
     ray.init(num_cpus=2, include_dashboard=False)
     with pytest.raises(RunError, match=r"no node .* the 3 processors .*there are 2 and .*--threads"):
-        run_jobs_on_ray(setting.out, jobs_of(setting), address="local", workers=None, threads=3, show=nothing)
-
-
-def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
-    setting = small_setting(tmp_path, seeds=1)
-    with pytest.raises(RunError, match=r"--ray auto: no cluster.*--ray local"):
-        run_jobs_on_ray(setting.out, jobs_of(setting), address="auto", workers=None, threads=1, show=nothing)
+        run_jobs(setting.out, jobs_of(setting), ray="local", workers=None, threads=3, show=nothing)
