@@ -1,10 +1,13 @@
 """Every block of docs/python.md, from top to bottom in one namespace."""
 
 import warnings
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from clearway.perception import encode
+from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes import library
 from documents import ROOT, Block, code_blocks, shortened
 from made import grid_scene
@@ -42,7 +45,9 @@ def test_the_blocks_run_on_a_small_room(tmp_path: Path, monkeypatch, capsys) -> 
     def stand_in(name, seed, **_):
         return grid_scene(3, width=6, depth=5, obstacle_share=0.1, picture_size=(32, 32), name=name)
 
+    small = ResNetShape(8, (8, 16), (1, 1))
     monkeypatch.setattr(library, "cached_room_scene", stand_in)
+    monkeypatch.setattr(encode, "find_record", partial(encode.find_record, shape=small))
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
     left = run_page(SMALLER)

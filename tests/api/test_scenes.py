@@ -148,3 +148,22 @@ def test_an_encoder_of_one_s_own_without_a_part_is_refused_before_a_room_is_buil
         clearway.encode_scenes(grid_scene(1), Brightness(), workers=2)
     with pytest.raises(clearway.ClearwayError, match="has no pictures to encode"):
         clearway.encode_scenes(replace(grid_scene(1), observations=None), Brightness())
+
+
+def test_an_encoder_of_one_s_own_may_see_depth() -> None:
+    class Nearest:
+        identity, feature_count, sensor = "nearest-1", 1, "depth"
+
+        def encode(self, depth_m):
+            return depth_m.reshape(len(depth_m), -1).min(1, keepdims=True)
+
+    scene = with_depth(grid_scene(1))
+    (seen,) = clearway.encode_scenes(scene, Nearest())
+    depth_m = scene.seen_by("depth")[np.arange(scene.state_count)]
+    assert np.array_equal(np.asarray(seen.features)[:, 0], depth_m.reshape(scene.state_count, -1).min(1))
+    with pytest.raises(clearway.ClearwayError, match="has rgb, but no depth"):
+        clearway.encode_scenes(grid_scene(1), Nearest())
+    with pytest.raises(clearway.ClearwayError, match="sees depth, and it is not rendered"):
+        clearway.build_room("bathroom", encoder="depth-grid")
+    with pytest.raises(clearway.ClearwayError, match="Choose among rgb, depth"):
+        clearway.build_room("bathroom", sensors=["rgb", "sonar"])

@@ -33,7 +33,7 @@ class Build:
     """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoder: str = "auto"
     """resnet50, random-resnet50, auto (the first if it can be had, else the second), depth-grid (needs --sensors rgb
-    depth), or a Hugging Face model."""
+    depth), one of another package (clearway plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None

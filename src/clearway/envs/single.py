@@ -99,7 +99,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | `render_mode`       | `None`              | `"rgb_array"` (view, target and map side by side) or `"ansi"`      |
 
     ```python
-    >>> import gymnasium, clearway.envs  # or without the second: gymnasium.make("clearway.envs:Clearway/ImageGoal-v0")
+    >>> import gymnasium  # which knows it once clearway is installed
     >>> env = gymnasium.make("Clearway/ImageGoal-v0", scenes="bathroom.h5")
     >>> envs = gymnasium.make_vec("Clearway/ImageGoal-v0", num_envs=64, scenes="bathroom.h5")
 

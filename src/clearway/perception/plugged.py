@@ -5,6 +5,7 @@ Such an encoder, and what an entry point of the group `clearway.encoders` gives 
     identity: str, another one whenever the features change; scenes trained together must agree in it
     feature_count: int, F
     encode(pictures): features (B, F) of pictures (B, height, width, 3) uint8; equal for equal pictures
+    sensor: str, where it takes those of another sensor than the colour camera, such as "depth"
 
 and, where it takes other pictures than the colour camera's, `sensor`: "depth" for (B, height, width) float32 metres
 (`clearway.scenes.sensors`).
@@ -15,6 +16,7 @@ That of a program's own cannot say how: its scenes can be trained on, but new pi
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
@@ -91,7 +93,7 @@ def own_encoder(made: Any) -> CheckedEncoder:
 
 
 def _checked(
-    made: Any, name: str, fixed: dict[str, object], told: dict[str, object], what: str, remedy: str
+    made: Any, name: str, fixed: Mapping[str, object], told: Mapping[str, object], what: str, remedy: str
 ) -> CheckedEncoder:
     """The encoder, if it has all parts; `told` is kept in its record but is no part of its identity."""
     identity, count = getattr(made, "identity", None), getattr(made, "feature_count", None)

@@ -23,7 +23,7 @@ class Encoding:
 
     encoder: str = "auto"
     """resnet50, random-resnet50, auto (the first if it can be had, else the second), depth-grid (needs --sensors rgb
-    depth), or a Hugging Face model."""
+    depth), one of another package (clearway plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None
