@@ -7,10 +7,10 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 
-from clearway.evaluate.episodes import run_episodes
-from clearway.evaluate.metrics import SC_STEPS
-from clearway.evaluate.quality import Criteria, Quality, quality
-from clearway.evaluate.report import Evaluation, Protocol, summarise
+from clearway.evaluation.episodes import run_episodes
+from clearway.evaluation.metrics import SC_STEPS
+from clearway.evaluation.quality import Criteria, Quality, quality
+from clearway.evaluation.report import Evaluation, Protocol, summarise
 from clearway.learn.train import Learning, RunRequest
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic

@@ -14,7 +14,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from throughput import ENDLESS
 
-from clearway.envs.world import World
 from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.model.lookup import LookupNetwork
@@ -22,6 +21,7 @@ from clearway.model.network import SiameseActorCritic
 from clearway.model.policy import Policy, network_policy
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
+from clearway.world.tables import World
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ from stable_baselines3 import A2C
 from throughput import ENDLESS
 
 from clearway.choices import MatmulPrecision
-from clearway.envs.world import World
 from clearway.learn import algorithms
 from clearway.learn.algorithms import carried_over
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
+from clearway.world.tables import World
 
 A2C_LIKE = replace(
     carried_over(ON_PREPARED, algorithms.A2C), frames=ENDLESS, hindsight=False, lookahead=0.0, feature_basis=0

@@ -39,13 +39,12 @@ from scene_sets import ENCODER, chosen_scenes
 from throughput import device_name, matrix_peak
 
 from clearway.cli.arguments import scene_files
-from clearway.envs.world import World, make_world
 from clearway.errors import ClearwayError
-from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
-from clearway.evaluate.metrics import average, by_scene
-from clearway.evaluate.optimum import world_yardsticks
-from clearway.evaluate.oracle import DISCOUNT, ENTROPY_WEIGHT
-from clearway.evaluate.report import Protocol
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.metrics import average, by_scene
+from clearway.evaluation.optimum import world_yardsticks
+from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT
+from clearway.evaluation.report import Protocol
 from clearway.files import written_whole
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import PRESETS
@@ -56,6 +55,7 @@ from clearway.perception import encode_scenes
 from clearway.reward import REWARDS, Reward
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, seeded_targets
+from clearway.world.tables import World, make_world
 
 ROOMS = "rooms"
 SHOWN_VERSIONS = ("python", "clearway", "torch", "numpy")

@@ -26,11 +26,11 @@ from torch import Tensor
 import clearway.envs
 from clearway.envs.registration import DEFAULT_STEP_LIMIT, ENV_ID
 from clearway.envs.sb3 import SB3VecEnv, scene_space
-from clearway.envs.world import World
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
+from clearway.world.tables import World
 
 Observation = dict[str, np.ndarray]
 VEC_ENVS = ("dummy", "subproc", "batched")

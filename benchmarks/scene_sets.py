@@ -8,16 +8,16 @@ from pathlib import Path
 
 import torch
 
-from clearway.envs.world import World, make_world
 from clearway.errors import SceneError
 from clearway.learn.presets import DEFAULT
 from clearway.learn.setup import fitted_features
 from clearway.perception import encode_scenes
-from clearway.scenes.library import cached_room_scene
-from clearway.scenes.rooms import ROOM_NAMES
+from clearway.rooms import ROOM_NAMES
+from clearway.rooms.library import cached_room_scene
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 from clearway.scenes.thor_v1 import read_scene
+from clearway.world.tables import World, make_world
 
 ENCODER = "random-resnet50"
 ON_PREPARED = replace(DEFAULT, centre_features=False, whiten_features=False)  # the default learner on `prepared` scenes

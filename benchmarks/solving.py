@@ -8,11 +8,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from clearway.envs.world import World
-from clearway.evaluate.episodes import EPISODES_PER_TARGET, run_episodes
-from clearway.evaluate.metrics import SC_STEPS
-from clearway.evaluate.quality import quality
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, run_episodes
+from clearway.evaluation.metrics import SC_STEPS
+from clearway.evaluation.quality import quality
 from clearway.model.policy import Policy
+from clearway.world.tables import World
 
 CHECK_SEED = 1
 SCREENING_EPISODES = 5  # a target; the rest is walked only where these show no failure

@@ -57,9 +57,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from clearway.envs.navigation import Navigation, TargetChoice
-from clearway.envs.streams import Streams
-from clearway.envs.world import World, make_world
 from clearway.learn import algorithms
 from clearway.learn.algorithms import carried_over
 from clearway.learn.figures import Figures as Figured
@@ -77,6 +74,9 @@ from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.targets import seeded_targets
+from clearway.world.navigation import Navigation, TargetChoice
+from clearway.world.streams import Streams
+from clearway.world.tables import World, make_world
 
 STATES = (180, 408, 468, 676)
 FEATURES = 2048

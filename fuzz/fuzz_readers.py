@@ -23,14 +23,14 @@ import atheris
 
 with atheris.instrument_imports(include=["clearway"]):
     from clearway.errors import ClearwayError
-    from clearway.evaluate.episode_files import read_episodes
+    from clearway.evaluation.episode_files import read_episodes
+    from clearway.importers.archives import unpacked
+    from clearway.importers.avd import read_avd
+    from clearway.importers.images import read_images
+    from clearway.importers.savn import read_savn
     from clearway.learn.checkpoint import read_network
     from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
     from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
-    from clearway.scenes.importers.archives import unpacked
-    from clearway.scenes.importers.avd import read_avd
-    from clearway.scenes.importers.images import read_images
-    from clearway.scenes.importers.savn import read_savn
     from clearway.scenes.thor_v1 import read_scene, write_scene
 
 import numpy as np

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from clearway.clearance import scene_clearance_m
-from made import corridor_scene, scene_of_cells
+from helpers.made import corridor_scene, scene_of_cells
 
 
 def test_beside_a_wall_half_a_cell_is_free() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from documents import ROOT, Block, code_blocks, run_block, shortened
+from helpers.documents import ROOT, Block, code_blocks, run_block, shortened
 
 UNTIL_STOPPED = "timeout 30 clearway "
 ROOM = """

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 import clearway
-from documents import ROOT
-from imported import imported_by
-from made import corridor_scene
+from helpers.documents import ROOT
+from helpers.imported import imported_by
+from helpers.made import corridor_scene
 
 OFFERED = {
     "load_scene",
@@ -45,13 +45,6 @@ def test_every_name_can_be_had_and_is_shown() -> None:
     shown = pydoc.plain(pydoc.render_doc(clearway))
     for name in OFFERED:
         assert f"{name}(" in shown, name
-
-
-def test_evaluate_stays_the_function_whoever_imports_the_folder_of_that_name() -> None:
-    import clearway.evaluate.run
-
-    assert clearway.evaluate.__module__ == "clearway.api.evaluation"
-    assert sys.modules["clearway.evaluate.run"].evaluate_run
 
 
 def test_what_is_not_offered_is_refused() -> None:

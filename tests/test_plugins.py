@@ -14,14 +14,14 @@ from clearway.cli.imports.plugin import ImportPlugin
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_scene_agent
 from clearway.errors import EncoderError, PluginError
+from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS
 from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
-from clearway.scenes.importers.plugged import plugged_scenes
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from made import corridor_scene, grid_scene
-from plugin_package import MODULE, clearway_with, write_package
+from helpers.made import corridor_scene, grid_scene
+from helpers.plugin_package import MODULE, clearway_with, write_package
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +201,7 @@ def test_importers_that_are_no_plugins_are_refused(tmp_path) -> None:
 
 
 def test_scenes_with_features_are_written_as_they_are(tmp_path) -> None:
-    module = f"import sys\nsys.path.append({str(Path(__file__).parent)!r})\nfrom made import corridor_scene\n"
+    module = f"import sys\nsys.path.append({str(Path(__file__).parent)!r})\nfrom helpers.made import corridor_scene\n"
     site = offer(tmp_path / "site", "importers", "made = others:read", f"{module}def read(p): return corridor_scene()")
     words = ("scenes", "import", "plugin", "made", tmp_path, "--out", tmp_path / "out")
     assert clearway_with(site, words=words, cache=tmp_path).returncode == 0

@@ -7,14 +7,14 @@ import torch
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from clearway.envs.navigation import Navigation
-from clearway.envs.world import make_world
-from clearway.evaluate.oracle import action_values, expected, make_task, optimal_policy, soft_policy
+from clearway.evaluation.oracle import action_values, expected, make_task, optimal_policy, soft_policy
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
 from clearway.scenes import graph as graphs
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import check_scene
+from clearway.world.navigation import Navigation
+from clearway.world.tables import make_world
 from clearway.zones import Zone, cell_zones, pose_zones
 
 MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)

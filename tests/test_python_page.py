@@ -8,9 +8,9 @@ import pytest
 
 from clearway.perception import encode
 from clearway.perception.random_resnet import ResNetShape
-from clearway.scenes import library
-from documents import ROOT, Block, code_blocks, shortened
-from made import grid_scene
+from clearway.rooms import library
+from helpers.documents import ROOT, Block, code_blocks, shortened
+from helpers.made import grid_scene
 
 PAGE = ROOT / "docs/python.md"
 FEWER = {"frames=600_000": "frames=4_000", "frames=200_000": "frames=4_000", "episodes=100": "episodes=2"}

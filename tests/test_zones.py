@@ -4,7 +4,7 @@ import pytest
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import Scene
 from clearway.zones import ZONE_NAMES, Zone, cell_zones, pose_zones, scene_zones
-from made import corridor_scene, grid_scene, scene_of_cells
+from helpers.made import corridor_scene, grid_scene, scene_of_cells
 
 F, P, C = Zone.FREE, Zone.PRECOLLISION, Zone.COLLISION
 

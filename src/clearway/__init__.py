@@ -4,8 +4,6 @@ A program of one's own needs no more than this module: `docs/python.md` shows it
 heavy; each name brings what it needs when it is first asked for.
 """
 
-import sys
-
 from clearway.gymnasium_hook import register_with_gymnasium
 from clearway.version import __version__
 
@@ -98,18 +96,4 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_HOME})
 
 
-class _Door(type(sys)):  # type: ignore[misc]
-    """This module, whose `evaluate` is the function and stays it when the folder of that name is imported."""
-
-    @property
-    def evaluate(self) -> object:
-        """The function."""
-        return _from_home("evaluate")
-
-    @evaluate.setter
-    def evaluate(self, folder: object) -> None:
-        """What Python binds once it has imported the folder; `from clearway.evaluate.run import ...` does without."""
-
-
-sys.modules[__name__].__class__ = _Door
 register_with_gymnasium()

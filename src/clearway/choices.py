@@ -6,7 +6,7 @@ ZoneLevel = Literal["pose", "cell"]
 """See `clearway.zones`."""
 
 RoomName = Literal["bathroom", "bedroom", "living_room", "kitchen"]
-"""See `clearway.scenes.rooms`."""
+"""See `clearway.rooms`."""
 
 SensorName = Literal["rgb", "depth"]
 """See `clearway.scenes.sensors`."""
@@ -24,7 +24,7 @@ PresetName = Literal["default", "paper", "paper-a3c"]
 """See `clearway.learn.presets`."""
 
 FeatureStore = Literal["memory", "float16", "mapped"]
-"""See `clearway.envs.feature_store`."""
+"""See `clearway.world.feature_store`."""
 
 MatmulPrecision = Literal["highest", "medium"]
 """See `clearway.model.precision`."""

@@ -6,7 +6,7 @@ from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import ArgumentError
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene
+from helpers.made import corridor_scene
 
 
 def test_one_environment_and_many(tmp_path) -> None:

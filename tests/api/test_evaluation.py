@@ -2,12 +2,12 @@ import pytest
 
 import clearway
 from clearway.errors import ArgumentError
-from clearway.evaluate.run import evaluate_run
+from clearway.evaluation.run import evaluate_run
 from clearway.files import read_json
 from clearway.learn.load import run_scenes
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene
-from small_runs import FEATURES
+from helpers.made import corridor_scene, grid_scene
+from helpers.small_runs import FEATURES
 
 SMALL = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
 

@@ -6,7 +6,7 @@ import pytest
 import clearway
 from clearway.errors import ArgumentError
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene, with_depth
+from helpers.made import corridor_scene, grid_scene, with_depth
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_a_missing_file_and_one_too_many_are_refused(folder) -> None:
 
 
 def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
-    from clearway.scenes import library
+    from clearway.rooms import library
 
     calls = []
 

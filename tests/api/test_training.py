@@ -12,8 +12,8 @@ from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.reward import SHORTEST
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene
-from small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
+from helpers.made import corridor_scene, grid_scene
+from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
 
 SMALL = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
 

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from clearway.errors import ClearwayError
-from clearway.evaluate import single
+from clearway.evaluation import single
 from clearway.scenes.scene import encoder_names
 from clearway.scenes.targets import default_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene

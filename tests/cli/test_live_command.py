@@ -15,8 +15,8 @@ from clearway.learn.train import train
 from clearway.live.run import walk_setting
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from small_live import walkable_room, walkable_scene
-from small_runs import small_request
+from helpers.small_live import walkable_room, walkable_scene
+from helpers.small_runs import small_request
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runs]:
         )
         found[name] = train(request, folder / name).path
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("clearway.scenes.rooms.build_room", lambda *room, **options: walkable_room())
+        patch.setattr("clearway.rooms.build_room", lambda *room, **options: walkable_room())
         yield Runs(**found)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene
+from helpers.made import corridor_scene
 
 OPTIMAL_KEYS = {"steps", "collision_visits", "precollision_visits"}
 SOFT_KEYS = OPTIMAL_KEYS | {"collisions"}

@@ -15,8 +15,8 @@ from clearway.experiments.reproduce import ReproduceRequest
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
-from small_runs import small_learner
-from small_setting import BUDGET, small_rooms
+from helpers.small_runs import small_learner
+from helpers.small_setting import BUDGET, small_rooms
 
 
 @pytest.fixture

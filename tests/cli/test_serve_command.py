@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from clearway.serve.client import Client
-from sums import Sums, plain
+from helpers.sums import Sums, plain
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_addresses_are_printed_as_a_browser_takes_them(clearway, served, host, s
 PROGRAM = """
 import clearway.serve.run
 from clearway.cli.main import main
-from sums import Sums
+from helpers.sums import Sums
 
 clearway.serve.run.open_model = lambda source, scene: Sums()
 main(["serve", "x.onnx"])

@@ -19,8 +19,8 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape, fit_record
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from made import grid_scene
-from small_runs import small_learner, small_request
+from helpers.made import grid_scene
+from helpers.small_runs import small_learner, small_request
 
 TINY = ResNetShape(8, (16,), (1,), "basic")
 TARGETS = {"attic": (5, 22), "cellar": (3, 9)}

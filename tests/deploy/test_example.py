@@ -8,7 +8,7 @@ from pathlib import Path
 from PIL import Image
 
 import clearway
-from imported import imported_by
+from helpers.imported import imported_by
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "run_onnx.py"
 

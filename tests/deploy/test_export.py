@@ -18,7 +18,7 @@ from clearway.deploy.onnx_file import OnnxModel
 from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
 from clearway.perception import depth_grid, encoder_from_record
-from made import with_depth
+from helpers.made import with_depth
 
 CLOSE = {"rtol": 0, "atol": 1e-5}
 

@@ -9,12 +9,12 @@ from PIL import Image
 
 import clearway
 from clearway.deploy.navigator import choose, open_model
-from clearway.envs.navigation import Navigation
 from clearway.errors import DeployError
 from clearway.learn.load import run_world
 from clearway.reward import COLLISION_AWARE
-from imported import imported_by
-from sums import Sums, plain
+from clearway.world.navigation import Navigation
+from helpers.imported import imported_by
+from helpers.sums import Sums, plain
 
 
 def values(navigator: clearway.Navigator, levels: list[int]) -> list[float]:

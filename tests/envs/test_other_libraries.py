@@ -18,7 +18,7 @@ from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import EnvError
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -9,8 +9,8 @@ from gymnasium.wrappers import TimeLimit
 from clearway.envs.registration import ENV_ID, register_environments
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
-from imported import imported_by
-from made import corridor_scene, grid_scene
+from helpers.imported import imported_by
+from helpers.made import corridor_scene, grid_scene
 
 
 def steps_until_truncated(env: gymnasium.Env, most: int = 600) -> int | None:

@@ -13,7 +13,7 @@ from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
 from clearway.zones import Zone, scene_zones
-from made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene
 
 NO_BUMPS = np.empty((0, 2), np.int64)
 

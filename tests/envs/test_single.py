@@ -13,7 +13,7 @@ from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import EnvError
 from clearway.scenes.actions import Action
-from made import corridor_scene, grid_scene, with_depth
+from helpers.made import corridor_scene, grid_scene, with_depth
 
 
 @pytest.mark.parametrize("observations", ["features", "pictures"])

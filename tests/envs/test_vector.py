@@ -16,7 +16,7 @@ from clearway.errors import ClearwayError, EnvError, SceneError
 from clearway.reward import Arrival, Reward, RewardError, Time
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene, grid_scene, with_depth
+from helpers.made import corridor_scene, grid_scene, with_depth
 
 INFO_KEYS = {"collision", "cost", "zone", "distance_to_go", "scene", "state", "target"}
 MODES = list(AutoresetMode)

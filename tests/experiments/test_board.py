@@ -8,7 +8,7 @@ from clearway.experiments.board import RunState, clock, state_of, state_table
 from clearway.experiments.job import do
 from clearway.experiments.plan import Job
 from clearway.reward import COLLISION_AWARE
-from small_setting import small_setting
+from helpers.small_setting import small_setting
 
 
 def test_a_run_s_state_is_read_from_its_files(tmp_path: Path) -> None:

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clearway.envs.world import make_world
-from clearway.evaluate.episodes import run_episodes
-from clearway.evaluate.policies import random_policy, shortest_path_policy
+from clearway.evaluation.episodes import run_episodes
+from clearway.evaluation.policies import random_policy, shortest_path_policy
 from clearway.experiments import fig5, fig6, hard
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.scenes.scene import Scene
+from clearway.world.tables import make_world
 from clearway.zones import Zone
-from made import corridor_scene, grid_scene
-from small_setting import small_setting
+from helpers.made import corridor_scene, grid_scene
+from helpers.small_setting import small_setting
 
 
 def test_hardness_by_other_means() -> None:

@@ -4,14 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clearway.evaluate.episode_files import read_episodes, write_episodes
+from clearway.evaluation.episode_files import read_episodes, write_episodes
 from clearway.experiments import convergence
 from clearway.experiments.convergence import mark_steps, settled_row, settling
 from clearway.experiments.fig4 import jobs
 from clearway.experiments.groups import PAIR, compared
 from clearway.experiments.job import do, run_folder, trial_path
 from clearway.experiments.setting import Setting
-from small_setting import small_setting
+from helpers.small_setting import small_setting
 
 
 def rows(*steps: float | None, success: float = 1.0) -> list[dict[str, float]]:

@@ -19,7 +19,7 @@ from clearway.errors import ClearwayError
 from clearway.experiments.demo import DemoRequest, run_demo
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import read_scene
-from small_demo import shrink_demo
+from helpers.small_demo import shrink_demo
 
 AGENTS = {"collision-aware", "shortest", "random", "shortest path"}
 

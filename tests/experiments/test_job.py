@@ -11,7 +11,7 @@ from clearway.learn import train
 from clearway.learn.figures import Figures
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from small_setting import small_setting
+from helpers.small_setting import small_setting
 
 
 def made_job(out: Path) -> Job:

@@ -16,8 +16,8 @@ from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
 from clearway.learn.run_folder import RunFolder
 from clearway.reward import COLLISION_AWARE
-from small_setting import small_setting
-from spread_parts import workers_of
+from helpers.small_setting import small_setting
+from helpers.spread_parts import workers_of
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 

@@ -14,7 +14,7 @@ from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.reward import COLLISION_AWARE
-from small_setting import small_setting
+from helpers.small_setting import small_setting
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 # Ray reads these when it is imported; all processes of a cluster must share the token

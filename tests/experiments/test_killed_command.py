@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from small_setting import small_setting
+from helpers.small_setting import small_setting
 
 KILLS = 6
 LONGEST_S = 8.0  # a command is killed so long after it has begun to train, at most

@@ -5,7 +5,7 @@ import pytest
 
 from clearway.experiments.plan import Job, PlannedRun, SceneFile, Trial, merged
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from small_runs import small_learner
+from helpers.small_runs import small_learner
 
 RUN = PlannedRun((SceneFile("room", Path("a/room.h5"), "digest"),), ((1, 2),), SHORTEST, small_learner(), 0)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from clearway.choices import ExperimentName
-from clearway.evaluate.episode_files import read_episodes
-from clearway.evaluate.episodes import EpisodeTable, episode_starts
-from clearway.evaluate.optimum import world_yardsticks
+from clearway.evaluation.episode_files import read_episodes
+from clearway.evaluation.episodes import EpisodeTable, episode_starts
+from clearway.evaluation.optimum import world_yardsticks
 from clearway.experiments import analysis, fig3, fig5, fig6, generalisation, hard, job, navigation_tables, table1
 from clearway.experiments.analysis import pareto_front
 from clearway.experiments.catalogue import EXPERIMENTS
@@ -24,8 +24,8 @@ from clearway.learn.presets import DEFAULT
 from clearway.reward import COLLISION_AWARE
 from clearway.viz import report
 from clearway.viz.report import HTML, JSON, MARKDOWN, write_report
-from small_runs import small_learner
-from small_setting import small_setting
+from helpers.small_runs import small_learner
+from helpers.small_setting import small_setting
 
 
 @pytest.fixture(scope="module")

@@ -19,23 +19,23 @@ import numpy as np
 from PIL import Image
 from safetensors.torch import save
 
-from clearway.evaluate.episode_files import read_episodes
+from clearway.evaluation.episode_files import read_episodes
+from clearway.importers.archives import unpacked
+from clearway.importers.avd import read_avd
+from clearway.importers.images import read_images
+from clearway.importers.savn import read_savn
 from clearway.learn.checkpoint import FORMAT_VERSION, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, newest_checkpoint
 from clearway.learn.load import load_agent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import train
 from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
-from clearway.scenes.importers.archives import unpacked
-from clearway.scenes.importers.avd import read_avd
-from clearway.scenes.importers.images import read_images
-from clearway.scenes.importers.savn import read_savn
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from clearway.scenes.validate import SceneWarning
+from helpers.made import corridor_scene
+from helpers.small_runs import small_learner, small_request
 from hostile import scene_files
 from hostile.cases import Case, Sound
-from made import corridor_scene
-from small_runs import small_learner, small_request
 
 DEEP = "[" * 100_000
 ZIP_METHODS = {"bzip2": zipfile.ZIP_BZIP2, "LZMA": zipfile.ZIP_LZMA}

@@ -19,9 +19,9 @@ from clearway.scenes.pictures import BLOCK_PICTURES
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import FORMAT_VERSION, read_scene, write_scene
 from clearway.scenes.validate import SceneWarning
-from dumps import full_scene, published_dump, replaced
+from helpers.dumps import full_scene, published_dump, replaced
+from helpers.made import corridor_scene
 from hostile.cases import Case, Sound
-from made import corridor_scene
 
 Change = Callable[[h5py.File], object]
 GIB = 1024**3

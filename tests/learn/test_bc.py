@@ -9,14 +9,14 @@ import pytest
 import torch
 
 from clearway.errors import RunError
-from clearway.evaluate.policies import shortest_path_policy
+from clearway.evaluation.policies import shortest_path_policy
 from clearway.learn import bc
 from clearway.learn.bc import BC, Cloning, cloning_loss
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.load import load_agent, run_world
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE
-from small_runs import (
+from helpers.small_runs import (
     corridor_world,
     equal_bits,
     reached_from_everywhere,

@@ -18,7 +18,7 @@ from clearway.learn.checkpoint import (
     read_training,
     write_checkpoint,
 )
-from small_runs import equal_bits
+from helpers.small_runs import equal_bits
 
 FILES = ("network.safetensors", "training.safetensors", "checkpoint.json")
 

@@ -6,15 +6,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation, TargetChoice
-from clearway.envs.world import World
 from clearway.learn.hindsight import find_segments, hindsight_batch
 from clearway.learn.losses import Batch
 from clearway.learn.rollout import Rollout
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.reward import BUMP, COLLISION_AWARE, Reward
 from clearway.scenes.actions import Action
-from small_runs import corridor_world, small_learner, small_network, small_trainer
+from clearway.world.navigation import Navigation, TargetChoice
+from clearway.world.tables import World
+from helpers.small_runs import corridor_world, small_learner, small_network, small_trainer
 
 FORWARD, RIGHT, LEFT, BACKWARD = Action
 GAMMA, SCALE = 0.9, 0.1

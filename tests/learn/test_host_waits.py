@@ -12,7 +12,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.trainer import Trainer
-from small_runs import small_learner, small_trainer
+from helpers.small_runs import small_learner, small_trainer
 
 SIZED_BY_VALUES = ("nonzero", "_unique2", "unique_consecutive", "unique_dim", "masked_select", "bincount")
 READ = (

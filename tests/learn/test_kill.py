@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-import killed_runs
 from clearway.learn import train
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.metrics_log import BOARD
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import write_scene
-from made import corridor_scene
-from small_runs import equal_bits, small_learner, small_request
+from helpers import killed_runs
+from helpers.made import corridor_scene
+from helpers.small_runs import equal_bits, small_learner, small_request
 
 KILLS = 50
 
@@ -44,7 +44,7 @@ def files_of(folder: RunFolder) -> set[str]:
 def test_fifty_kills_leave_the_same_bits_as_none(preset: str, tmp_path: Path) -> None:
     whole = train.train(killed_runs.request(preset), tmp_path / "whole")
     killed = RunFolder(tmp_path / "killed")
-    command = [sys.executable, "-m", "killed_runs", str(killed.path), preset, str(KILLS), "1"]
+    command = [sys.executable, "-m", "helpers.killed_runs", str(killed.path), preset, str(KILLS), "1"]
     done = subprocess.run(command, capture_output=True, text=True, env=environment(), timeout=600)
     assert done.returncode == 0, done.stderr
     assert not done.stderr
@@ -67,7 +67,7 @@ FULL_DISK = """
 import resource, sys
 from pathlib import Path
 from clearway.learn import train
-from small_runs import small_learner, small_request
+from helpers.small_runs import small_learner, small_request
 train.set_threads(1)
 train.SECONDS_BETWEEN_CHECKPOINTS = 0.0
 save = train.save

@@ -12,7 +12,7 @@ from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from small_runs import reached_from_everywhere, small_world
+from helpers.small_runs import reached_from_everywhere, small_world
 
 RECIPE = replace(DEFAULT, frames=60_000, envs=60, rollout_steps=20, step_limit=60, width=32, lr_start=3e-3, lr_end=1e-4)
 

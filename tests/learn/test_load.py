@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.envs.world import make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_agent, run_scenes, run_world
@@ -16,7 +15,8 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, save, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from small_runs import small_learner, small_request, small_scenes
+from clearway.world.tables import make_world
+from helpers.small_runs import small_learner, small_request, small_scenes
 
 
 def request_with_files(folder: Path) -> RunRequest:

@@ -5,7 +5,7 @@ from torch import Tensor
 from clearway.learn.lookahead import UNKNOWN, Observed, better_policy
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from small_runs import small_learner, small_trainer
+from helpers.small_runs import small_learner, small_trainer
 
 SHARP = 0.05  # a temperature
 

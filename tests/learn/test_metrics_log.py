@@ -11,7 +11,7 @@ import pytest
 from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.reward import COLLISION_AWARE
-from small_runs import small_learner, small_trainer, small_world
+from helpers.small_runs import small_learner, small_trainer, small_world
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "metrics.md"
 

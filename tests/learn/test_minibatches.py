@@ -8,7 +8,7 @@ import torch
 from clearway.learn.losses import Batch, LossSettings, loss_gradient
 from clearway.learn.minibatches import Deck, Minibatch, dealt_epochs
 from clearway.learn.presets import DEFAULT
-from small_runs import small_learner, small_trainer
+from helpers.small_runs import small_learner, small_trainer
 
 STATES, TARGETS = 20, 4  # scenes of 12 and 8 states
 ROWS_PER_SCENE = (40, 25)

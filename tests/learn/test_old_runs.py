@@ -16,7 +16,7 @@ from clearway.learn.load import load_agent, run_world
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.trainer import Trainer
-from small_runs import equal_bits, small_learner, small_request, small_scenes
+from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 RECORDED = Path(__file__).parent / "recorded"
 SETTINGS_THEN = 40

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp, clip_gradients
-from small_runs import equal_bits
+from helpers.small_runs import equal_bits
 
 
 class Two(nn.Module):

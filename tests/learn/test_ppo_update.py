@@ -12,7 +12,7 @@ from clearway.learn.losses import Batch, LossSettings, actor_critic_loss
 from clearway.learn.minibatches import Minibatch, dealt_epochs
 from clearway.learn.trainer import SHUFFLE_SALT, Trainer
 from clearway.model.network import SiameseActorCritic
-from small_runs import small_learner, small_trainer
+from helpers.small_runs import small_learner, small_trainer
 
 
 def gathered_epochs(trainer: Trainer) -> list[list[Minibatch]]:

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.envs.world import make_world
 from clearway.errors import RunError
-from clearway.evaluate.oracle import action_values, make_task, optimal_policy
-from clearway.evaluate.run import evaluate_run
+from clearway.evaluation.oracle import action_values, make_task, optimal_policy
+from clearway.evaluation.run import evaluate_run
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.load import load_acting, load_agent, run_world
 from clearway.learn.q_learning import QLearning, TableTrainer, best_actions, table_rows
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from made import corridor_scene
-from small_runs import (
+from clearway.world.tables import make_world
+from helpers.made import corridor_scene
+from helpers.small_runs import (
     CORRIDOR_TARGETS,
     corridor_world,
     equal_bits,

@@ -4,12 +4,12 @@ import pytest
 import torch
 from torch import Tensor
 
-from clearway.envs.world import World
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.rollout import Rollout, as_rows, by_step, sample_actions
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from small_runs import corridor_world, small_learner, small_trainer
+from clearway.world.tables import World
+from helpers.small_runs import corridor_world, small_learner, small_trainer
 
 
 def collected(trainer: Trainer) -> Rollout:

@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 import torch
 
-from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.rotation import Rotation, divided_envs
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from made import corridor_scene
-from small_runs import FEATURES, equal_bits, small_learner, small_trainer
+from clearway.world.tables import World, make_world
+from helpers.made import corridor_scene
+from helpers.small_runs import FEATURES, equal_bits, small_learner, small_trainer
 
 CELLS = (3, 4, 5, 6, 7)
 SOME = small_learner(scenes_at_once=2, scene_updates=3, heads="shared")

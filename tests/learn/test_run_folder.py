@@ -11,8 +11,8 @@ from clearway.errors import RunError
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder, RunRecord, scene_digest
 from clearway.reward import BUMP
-from made import corridor_scene
-from small_runs import small_request
+from helpers.made import corridor_scene
+from helpers.small_runs import small_request
 
 
 def made_record() -> RunRecord:

@@ -4,7 +4,7 @@ from clearway.learn.metrics_log import episode_figures
 from clearway.learn.rollout import Rollout
 from clearway.learn.statistics import WINDOW, EpisodeStatistics
 from clearway.model.lookup import Activations
-from small_runs import equal_bits
+from helpers.small_runs import equal_bits
 
 Steps = list[list[int]]
 

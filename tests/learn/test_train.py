@@ -23,7 +23,7 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.trainer import Trainer
 from clearway.reward import SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from small_runs import equal_bits, small_learner, small_request, small_scenes
+from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 
 def without_seconds(folder: RunFolder) -> list[dict[str, float]]:
@@ -263,7 +263,7 @@ RUN = """
 import sys
 from pathlib import Path
 from clearway.learn import train
-from small_runs import small_learner, small_request
+from helpers.small_runs import small_learner, small_request
 train.set_threads(1)
 train.train(small_request(learner=small_learner(frames=160_000)), Path(sys.argv[1]))
 """

@@ -20,7 +20,7 @@ from clearway.model import lookup
 from clearway.model.first_layer import AllStates, VisitedStates
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
+from helpers.small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
 
 PLAIN_A2C = small_learner(A2C(), hindsight=False, lookahead=0.0, step_limit=5, matmul_precision="highest")
 

@@ -1,7 +1,7 @@
 import pytest
 
 from clearway.live.room import LiveRoom
-from small_live import walkable_live
+from helpers.small_live import walkable_live
 
 
 @pytest.fixture(scope="session")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from clearway.live.body import REACH_M, SAMPLES, Body
+from clearway.rooms import ROOM_NAMES, build_room
+from clearway.rooms.navigation import find_grid
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.rooms import ROOM_NAMES, build_room
-from clearway.scenes.rooms.navigation import find_grid
-from small_rooms import SmallRoom
+from helpers.small_rooms import SmallRoom
 
 
 def body_at(room: SmallRoom, x_m: float, z_m: float) -> Body:

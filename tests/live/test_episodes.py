@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.envs.world import World, make_world
-from clearway.evaluate.episodes import run_episodes
-from clearway.evaluate.policies import random_policy, shortest_path_policy
+from clearway.evaluation.episodes import run_episodes
+from clearway.evaluation.policies import random_policy, shortest_path_policy
 from clearway.live.episodes import LivePolicy, LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.settings import MOST, Perturbations
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder
+from clearway.rooms.camera import eye_view, first_person_shot
+from clearway.rooms.render import Camera, studio
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.scenes.rooms.camera import eye_view, first_person_shot
-from clearway.scenes.rooms.render import Camera, studio
-from small_live import state_at
+from clearway.world.tables import World, make_world
+from helpers.small_live import state_at
 
 PROTOCOL = LiveProtocol(episodes_per_target=4, step_cap=15, seed=3, selection="sampled", history_length=4)
 

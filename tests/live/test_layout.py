@@ -14,11 +14,11 @@ from clearway.live.layout import (
     way_remains,
     with_obstacle_on_path,
 )
-from clearway.scenes.rooms.navigation import find_grid
-from clearway.scenes.rooms.pieces import loose_obstacles
+from clearway.rooms.navigation import find_grid
+from clearway.rooms.pieces import loose_obstacles
 from clearway.scenes.scene import Provenance, Scene
-from small_live import state_at, walkable_room
-from small_rooms import SmallRoom
+from helpers.small_live import state_at, walkable_room
+from helpers.small_rooms import SmallRoom
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from clearway.errors import SceneError
 from clearway.live.room import live_room
 from clearway.scenes.scene import Provenance
-from made import corridor_scene
+from helpers.made import corridor_scene
 
 
 def test_a_scene_that_is_no_room_of_ours_is_refused():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.load import Agent
 from clearway.live.agent import live_policy
@@ -18,12 +17,13 @@ from clearway.live.run import Stage, check_alike, finish_live, stages, walk_sett
 from clearway.live.settings import Perturbations, Setting
 from clearway.perception import depth_grid
 from clearway.perception.encode import encoder_from_record
+from clearway.rooms.camera import eye_view
+from clearway.rooms.render import studio
 from clearway.scenes.actions import Action
-from clearway.scenes.rooms.camera import eye_view
-from clearway.scenes.rooms.render import studio
-from made import corridor_scene
-from small_live import state_at
-from small_runs import small_request, small_world
+from clearway.world.tables import World, make_world
+from helpers.made import corridor_scene
+from helpers.small_live import state_at
+from helpers.small_runs import small_request, small_world
 
 SURE = 1_000.0  # of an action's score
 

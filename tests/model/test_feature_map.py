@@ -10,7 +10,7 @@ from torch import Tensor
 from clearway.choices import FeatureStore
 from clearway.model import feature_map
 from clearway.model.feature_map import FeatureMap, prepared_features, principal_directions
-from small_runs import small_world
+from helpers.small_runs import small_world
 
 
 def drawn(states: int, count: int, seed: int = 0) -> Tensor:

@@ -10,8 +10,8 @@ from clearway.learn.train import train
 from clearway.perception import depth_grid, encode_scenes, encoder_from_record
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from made import corridor_scene, grid_scene, with_depth
-from small_runs import small_request
+from helpers.made import corridor_scene, grid_scene, with_depth
+from helpers.small_runs import small_request
 
 
 def bare(scene: Scene) -> Scene:

@@ -16,8 +16,8 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from made import corridor_scene, grid_scene
-from spread_parts import workers_of
+from helpers.made import corridor_scene, grid_scene
+from helpers.spread_parts import workers_of
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 

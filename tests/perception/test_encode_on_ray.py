@@ -12,7 +12,7 @@ from clearway.perception.encode import find_record
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 # Ray reads these when it is imported; all processes of a cluster must share the token

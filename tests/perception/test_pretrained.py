@@ -26,7 +26,7 @@ from clearway.perception.encoder import Encoder
 from clearway.perception.model_files import read_preprocessing
 from clearway.perception.preprocess import Preprocessing, to_pixels
 from clearway.perception.pretrained import find_record, from_record
-from made import grid_scene
+from helpers.made import grid_scene
 
 PICTURES = grid_scene(0, picture_size=(24, 32)).observations[:5]
 

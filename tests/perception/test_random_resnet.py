@@ -9,7 +9,7 @@ from clearway.perception import random_resnet
 from clearway.perception.preprocess import Preprocessing, to_pixels
 from clearway.perception.random_resnet import ResNetShape, fit_record, from_record
 from clearway.scenes.scene import EncoderRecord
-from made import grid_scene
+from helpers.made import grid_scene
 
 TINY = ResNetShape(8, (16, 32), (1, 1), "bottleneck")
 SMALL_PICTURES = Preprocessing(24, 32)

@@ -9,7 +9,7 @@ from clearway.errors import SceneError
 from clearway.scenes.export import export_thor_v1
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
-from made import grid_scene
+from helpers.made import grid_scene
 
 
 class PublishedLoader:

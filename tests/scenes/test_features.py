@@ -11,7 +11,7 @@ from clearway.errors import SceneError
 from clearway.learn.run_folder import scene_digest
 from clearway.scenes.features import FileFeatures
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene
 
 
 def in_file(path: Path) -> FileFeatures:

@@ -5,7 +5,7 @@ import pytest
 
 from clearway.scenes import graph as graphs
 from clearway.scenes.actions import BLOCKED, Action
-from made import corridor_scene, graph_of_cells, grid_scene
+from helpers.made import corridor_scene, graph_of_cells, grid_scene
 
 
 def test_a_blocked_move_stays() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 
 from clearway.scenes.grid import connected_parts, edges_among, neighbour_pairs, pose_graph
-from imported import imported_by
+from helpers.imported import imported_by
 
 
 def test_pose_graph_of_two_cells_side_by_side() -> None:

@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clearway.scenes.feature_spread import feature_spread
 from clearway.scenes.inspect import mean_shortest_path_steps, summary
-from clearway.scenes.spread import feature_spread
-from made import corridor_scene, grid_scene, scene_of_cells, with_depth
+from helpers.made import corridor_scene, grid_scene, scene_of_cells, with_depth
 
 
 def test_a_corridor_in_figures() -> None:

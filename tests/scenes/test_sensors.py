@@ -11,7 +11,7 @@ from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import Readings, Sensor, depth, rgb
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene
-from made import corridor_scene, with_depth
+from helpers.made import corridor_scene, with_depth
 
 TOUCH = Sensor("touch", (4,), "float32", "N", -1.0, 5.0)
 

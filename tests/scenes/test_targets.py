@@ -6,7 +6,7 @@ import pytest
 from clearway.errors import SceneError
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import ZHU_TARGETS, default_targets, seeded_targets, target_order
-from made import grid_scene, scene_of_cells
+from helpers.made import grid_scene, scene_of_cells
 
 ROOM = [[x, z] for x in range(3) for z in range(2)]
 ISLANDS = [[10 * n, 10] for n in range(1, 7)]

@@ -14,8 +14,8 @@ from clearway.scenes.graph import distances
 from clearway.scenes.pictures import FilePictures
 from clearway.scenes.thor_v1 import read_scene, step_length_m, write_scene
 from clearway.scenes.validate import SceneWarning
-from dumps import full_scene, published_dump
-from made import corridor_scene, graph_of_cells
+from helpers.dumps import full_scene, published_dump
+from helpers.made import corridor_scene, graph_of_cells
 
 
 def test_round_trip_keeps_everything(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import check_scene, pose_quirks
-from made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene
 
 
 def changed(scene: Scene, part: str, where: object, value: float) -> Scene:

@@ -11,8 +11,8 @@ from clearway.serve.app import make_app
 from clearway.serve.guard import protected
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
-from serving import TOKEN
-from sums import Sums
+from helpers.serving import TOKEN
+from helpers.sums import Sums
 
 
 @pytest.fixture

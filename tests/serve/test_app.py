@@ -13,8 +13,8 @@ from clearway.errors import DeployError
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
-from serving import TOKEN, grey, picture_bytes
-from sums import CARD, Sums, plain
+from helpers.serving import TOKEN, grey, picture_bytes
+from helpers.sums import CARD, Sums, plain
 
 PNG = {"content-type": "image/png"}
 PATIENT_S = 10  # for what must happen, on a busy machine

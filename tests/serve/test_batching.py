@@ -10,8 +10,8 @@ from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.service import Answer, Service
-from serving import grey
-from sums import Sums, plain
+from helpers.serving import grey
+from helpers.sums import Sums, plain
 
 TARGET = np.array([1.0, 1.0], np.float32)
 PATIENT_S = 10  # for what must happen, on a busy machine

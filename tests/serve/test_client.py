@@ -11,9 +11,9 @@ from PIL import Image
 from clearway.errors import ClearwayError, DeployError
 from clearway.serve import protocol
 from clearway.serve.client import KEEP_ALIVE_S, Client, ClientSession, ServiceError, picture_file
-from imported import imported_by
-from serving import TOKEN, grey, picture_bytes
-from sums import plain
+from helpers.imported import imported_by
+from helpers.serving import TOKEN, grey, picture_bytes
+from helpers.sums import plain
 
 
 def with_service(client, made: Client) -> Client:

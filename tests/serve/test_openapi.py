@@ -8,8 +8,8 @@ from clearway.serve.app import make_app
 from clearway.serve.guard import protected
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
-from serving import TOKEN, grey
-from sums import Sums
+from helpers.serving import TOKEN, grey
+from helpers.sums import Sums
 
 HEADERS = {"Authorization": f"Bearer {TOKEN}"}
 SERVICE = Service(Sums(), Limits(sessions=5000, body_bytes=20_000))

@@ -13,7 +13,7 @@ from PIL import Image
 from clearway.deploy.model import MAX_PICTURE_SIDE
 from clearway.serve.faults import Fault
 from clearway.serve.pictures import decoded
-from serving import picture_bytes
+from helpers.serving import picture_bytes
 
 NOISE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
 LIMIT = 10_000

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from serving import ENVIRONMENT
+from helpers.serving import ENVIRONMENT
 
 resource = pytest.importorskip("resource", reason="only Unix bounds a process's open files")
 

@@ -24,8 +24,8 @@ from websockets.sync.client import connect
 import clearway
 from clearway.serve.client import KEEP_ALIVE_S as CLIENT_KEEP_ALIVE_S
 from clearway.serve.client import Client, ServiceError
-from serving import ENVIRONMENT, TOKEN, grey, picture_bytes
-from sums import Sums, plain
+from helpers.serving import ENVIRONMENT, TOKEN, grey, picture_bytes
+from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
 HEAD = f"Host: x\r\nAuthorization: Bearer {TOKEN}\r\n".encode()
@@ -35,7 +35,7 @@ import json, sys
 from clearway.serve.limits import Limits
 from clearway.serve.run import run_service
 from clearway.web.local import listening, port_of
-from sums import Sums
+from helpers.sums import Sums
 
 asked = json.loads(sys.argv[1])
 listener = listening(0)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-import spread_parts as parts
 from clearway.errors import RunError, SceneError
 from clearway.spread.workers import Work, workers_for
-from spread_parts import died, no_tool, noted
+from helpers import spread_parts as parts
+from helpers.spread_parts import died, no_tool, noted
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 # Ray reads these when it is imported; all processes of a cluster must share the token
@@ -21,7 +21,7 @@ ray = pytest.importorskip("ray")
 
 @pytest.fixture(scope="module", autouse=True)
 def _one_cluster() -> Iterator[None]:
-    path = os.pathsep.join([str(Path(parts.__file__).parent), os.environ.get("PYTHONPATH", "")])
+    path = os.pathsep.join([str(Path(parts.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
     ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": path}})
     yield
     ray.shutdown()

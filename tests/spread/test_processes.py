@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-import spread_parts as parts
 from clearway.errors import RunError, SceneError
 from clearway.spread.workers import Work, workers_for
-from spread_parts import died, no_tool, noted, workers_of
+from helpers import spread_parts as parts
+from helpers.spread_parts import died, no_tool, noted, workers_of
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 
@@ -121,7 +121,7 @@ from functools import partial
 from pathlib import Path
 sys.path.append({tests!r})
 from clearway.spread.workers import Work, workers_for
-from spread_parts import died, noted, square, wait_to_be_told
+from helpers.spread_parts import died, noted, square, wait_to_be_told
 
 folder = Path({folder!r})
 with workers_for(Work(partial(noted, folder), square, died), workers=1) as crew:
@@ -137,7 +137,7 @@ except KeyboardInterrupt:
 def started_script(folder: Path) -> tuple[subprocess.Popen[str], list[int]]:
     """A script without a guard that has two workers under way, in a process group of its own; and the workers."""
     script = folder / "script.py"
-    script.write_text(SCRIPT.format(tests=str(Path(parts.__file__).parent), folder=str(folder)))
+    script.write_text(SCRIPT.format(tests=str(Path(parts.__file__).parents[1]), folder=str(folder)))
     piped = subprocess.PIPE
     process = subprocess.Popen([sys.executable, script], stdout=piped, stderr=piped, text=True, start_new_session=True)
     assert process.stdout is not None

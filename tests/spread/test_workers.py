@@ -7,7 +7,7 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.spread.workers import Work, workers_for
-from spread_parts import died, fail, no_tool, noted, square
+from helpers.spread_parts import died, fail, no_tool, noted, square
 
 
 def test_this_process_does_a_part_when_it_is_asked_for(tmp_path: Path) -> None:

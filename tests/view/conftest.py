@@ -12,7 +12,7 @@ from websockets.sync.client import connect
 
 import clearway as package
 from clearway.view.stage import Stage
-from small_stage import small_stage
+from helpers.small_stage import small_stage
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(package.__file__).parents[1]), "OMP_NUM_THREADS": "1"}
 

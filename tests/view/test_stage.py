@@ -8,9 +8,9 @@ import torch
 from clearway.errors import RunError, SceneError
 from clearway.reward import Reward
 from clearway.view.stage import Stage, _has, run_stage, scene_stage
-from made import corridor_scene, grid_scene
-from small_runs import FEATURES
-from small_stage import small_agent, write_scenes
+from helpers.made import corridor_scene, grid_scene
+from helpers.small_runs import FEATURES
+from helpers.small_stage import small_agent, write_scenes
 
 
 def test_two_agents_share_the_scenes_that_both_know(stage: Stage) -> None:

@@ -3,13 +3,13 @@
 import pytest
 import torch
 
-from clearway.envs.world import World
-from clearway.evaluate.episodes import episode_seeds, run_episodes
-from clearway.evaluate.selection import ActionSelection
+from clearway.evaluation.episodes import episode_seeds, run_episodes
+from clearway.evaluation.selection import ActionSelection
 from clearway.reward import COLLISION_AWARE
 from clearway.view.episode import MOST_STEPS
 from clearway.view.walker import Mind, Walker
-from small_runs import corridor_world
+from clearway.world.tables import World
+from helpers.small_runs import corridor_world
 
 FORWARD, RIGHT, LEFT, BACKWARD = range(4)
 FREE, PRECOLLISION, COLLISION = range(3)

@@ -16,7 +16,7 @@ from clearway.viz.contact_sheet import (
     draw_contact_sheet,
 )
 from clearway.zones import scene_zones
-from made import corridor_scene
+from helpers.made import corridor_scene
 
 STATES = np.array([0, 4, 8, 9, 9])
 ACTIONS = np.array([0, 0, 1, 0])

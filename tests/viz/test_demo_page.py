@@ -13,7 +13,7 @@ from clearway.experiments.demo import DemoRequest, DemoResult, run_demo
 from clearway.viz import demo_page
 from clearway.viz.demo_page import VIEWS, make_demo_page
 from clearway.zones import scene_zones
-from small_demo import shrink_demo
+from helpers.small_demo import shrink_demo
 
 COMMAND = "clearway demo --out 'a <b> & c'"
 

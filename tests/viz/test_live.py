@@ -6,19 +6,19 @@ import numpy as np
 import torch
 from PIL import Image
 
-from clearway.envs.world import make_world
 from clearway.live.episodes import LiveProtocol, run_live_episodes
 from clearway.live.report import Comparison, Figures, LiveResult, summarise
 from clearway.live.run import LiveOutcome, Stage
 from clearway.live.settings import REFERENCE, Perturbations, Setting
 from clearway.perception.encode import encoder_from_record
+from clearway.rooms.camera import eye_view
+from clearway.rooms.render import studio
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.scenes.rooms.camera import eye_view
-from clearway.scenes.rooms.render import studio
 from clearway.viz.figures import CURVES
 from clearway.viz.live import PANELS, ROW_IN, _moves_to, _view, draw_live_figures
-from made import corridor_scene
-from small_live import walkable_live
+from clearway.world.tables import make_world
+from helpers.made import corridor_scene
+from helpers.small_live import walkable_live
 
 
 def figures(value: float) -> Figures:

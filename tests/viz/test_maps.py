@@ -13,7 +13,7 @@ from clearway import colours
 from clearway.viz.figures import LINES
 from clearway.viz.maps import VEIL, Walk, _triangles, draw_map
 from clearway.zones import scene_zones
-from made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene
 
 PATH = np.array([0, 4, 8, 9, 9, 10])  # forward twice, right, blocked, right
 

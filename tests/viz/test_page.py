@@ -1,4 +1,4 @@
-from clearway.evaluate.tables import Cell, TableText
+from clearway.evaluation.tables import Cell, TableText
 from clearway.viz.page import KeyFigure, Page, Picture, write_page
 
 TABLE = TableText(

@@ -13,7 +13,7 @@ from clearway.learn.train import train
 from clearway.viz import run_pictures
 from clearway.viz.run_pictures import draw_run_pictures
 from clearway.zones import scene_zones
-from small_runs import small_learner, small_request, small_scenes, small_targets
+from helpers.small_runs import small_learner, small_request, small_scenes, small_targets
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import pytest
 from PIL import Image
 
 from clearway.errors import ClearwayError, RunError, SceneError
-from clearway.evaluate.single import single_episode
+from clearway.evaluation.single import single_episode
 from clearway.learn.load import Agent, load_agent
 from clearway.learn.train import train
 from clearway.viz.video import LAST_FRAME_TIMES, frames, walked, write_video
-from small_runs import small_learner, small_request, small_scenes
+from helpers.small_runs import small_learner, small_request, small_scenes
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.training import TrainResult
 from clearway.errors import ArgumentError
-from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
-from clearway.evaluate.files import write_evaluations
-from clearway.evaluate.report import Evaluation
-from clearway.evaluate.run import evaluate_run
-from clearway.evaluate.tables import Level, Width, markdown_table
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.files import write_evaluations
+from clearway.evaluation.report import Evaluation
+from clearway.evaluation.run import evaluate_run
+from clearway.evaluation.tables import Level, Width, markdown_table
 from clearway.learn import load
 from clearway.learn.load import Acting
 from clearway.scenes.scene import Scene
@@ -76,7 +76,7 @@ class EvaluateResult:
         """The table as `clearway evaluate` prints it, without colours. Raises ArgumentError: no such level."""
         from rich.console import Console
 
-        from clearway.evaluate.tables import rich_tables
+        from clearway.evaluation.tables import rich_tables
 
         as_choice("level", level, get_args(Level))
         console = Console(width=TEXT_WIDTH, color_system=None, markup=False, legacy_windows=False)

@@ -13,7 +13,7 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.errors import ArgumentError
 from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.plugged import own_encoder
-from clearway.scenes.rooms import ROOM_NAMES
+from clearway.rooms import ROOM_NAMES
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 from clearway.scenes.sensors import RGB, check_names
@@ -174,7 +174,7 @@ def build_room(
         EncoderWarning: "auto" fell back to random weights.
     """
     from clearway.perception.encode import check_sees
-    from clearway.scenes.library import cached_room_scene
+    from clearway.rooms.library import cached_room_scene
 
     room, room_seed = as_choice("name", name, ROOM_NAMES), as_seed("seed", seed)
     path = None if out is None else as_path("out", out)

@@ -110,7 +110,7 @@ def train(
         resume: go on with the run in `out` from its newest checkpoint.
         zone_level: whether zones are those of poses ("pose") or of whole cells ("cell").
         device: of torch, "cpu" or "cuda".
-        feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.envs.feature_store`.
+        feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         show_progress: draw a progress bar.
         settings: single settings of the algorithm by name, such as `envs=200`; all are fields of its class.

@@ -40,7 +40,7 @@ class Demo:
         if self.json:
             print_json([evaluation.to_json() for evaluation in result.evaluations])
             return
-        from clearway.evaluate.tables import rich_tables
+        from clearway.evaluation.tables import rich_tables
 
         stdout_console().print(rich_tables(result.evaluations, ["scenes"]))
         say(f"open {page}")

@@ -82,7 +82,7 @@ class Evaluate:
         if self.json:
             print_json(result.to_json())
             return
-        from clearway.evaluate.tables import Level, rich_tables
+        from clearway.evaluation.tables import Level, rich_tables
 
         levels: list[Level] = ["targets"] if self.targets else []
         levels += ["scenes", "average"] if len(result.scenes) > 1 else ["average"]

@@ -131,7 +131,7 @@ def _named(paths: list[Path], agents: list[Agent]) -> dict[str, Agent]:
 
 def _check_rooms_can_be_built() -> None:
     """MuJoCo is imported by what follows."""
-    from clearway.scenes.build import check_mujoco
+    from clearway.rooms.build import check_mujoco
 
     check_mujoco()
 

@@ -16,7 +16,7 @@ from clearway.errors import ClearwayError
 from clearway.terminal import noted
 
 if TYPE_CHECKING:
-    from clearway.evaluate.optimum import TargetYardstick
+    from clearway.evaluation.optimum import TargetYardstick
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Oracle:
 
     def run(self) -> None:
         """Solve and print."""
-        from clearway.envs.world import make_world
-        from clearway.evaluate.optimum import world_yardsticks
+        from clearway.evaluation.optimum import world_yardsticks
         from clearway.scenes.thor_v1 import read_scene
+        from clearway.world.tables import make_world
 
         check_seeds(seed=self.seed)
         check_finite(entropy=self.entropy)

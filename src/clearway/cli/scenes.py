@@ -45,8 +45,8 @@ class Build:
     def run(self) -> None:
         """Build and write."""
         from clearway.perception import check_sees, encode_scenes
-        from clearway.scenes.library import cached_room_scene
-        from clearway.scenes.rooms import ROOM_NAMES
+        from clearway.rooms import ROOM_NAMES
+        from clearway.rooms.library import cached_room_scene
         from clearway.scenes.sensors import check_names
 
         check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)

@@ -40,7 +40,7 @@ class Video:
 
     def run(self) -> None:
         """Walk the episode and write the film."""
-        from clearway.evaluate.single import single_episode
+        from clearway.evaluation.single import single_episode
         from clearway.learn.load import load_agent, run_scenes
         from clearway.viz.video import frames, walked, write_video
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from clearway.envs.world import DistanceTable, World
 from clearway.errors import EnvError
+from clearway.world.tables import DistanceTable, World
 
 RESET_MASK = "reset_mask"
 EPISODE_OPTIONS = ("scene", "target", "start")

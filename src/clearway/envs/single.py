@@ -11,7 +11,6 @@ from gymnasium.vector import AutoresetMode
 
 from clearway.choices import ZoneLevel
 from clearway.envs.arguments import SceneSource, seed_words
-from clearway.envs.navigation import HISTORY_LENGTH
 from clearway.envs.options import RESET_MASK
 from clearway.envs.render import RENDER_MODES
 from clearway.envs.spaces import ObservationKind
@@ -19,6 +18,7 @@ from clearway.envs.vector import ImageGoalVectorEnv, Info, Observation
 from clearway.errors import EnvError
 from clearway.reward import Reward
 from clearway.scenes.sensors import RGB
+from clearway.world.navigation import HISTORY_LENGTH
 
 
 class ImageGoalEnv(gymnasium.Env[Observation, int]):

@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 from gymnasium import spaces
 
-from clearway.envs.world import World
 from clearway.errors import EnvError, SceneError
 from clearway.scenes.scene import Observations, Scene
 from clearway.scenes.sensors import RGB, Sensor
+from clearway.world.tables import World
 
 ObservationKind = Literal["features", "pictures"]
 OBSERVATION_KINDS = ("features", "pictures")

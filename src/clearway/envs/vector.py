@@ -26,15 +26,15 @@ from clearway.envs.arguments import (
     loaded_scenes,
     seed_words,
 )
-from clearway.envs.navigation import HISTORY_LENGTH, Navigation, TargetChoice
 from clearway.envs.options import EpisodeChoice, environments_to_reset, episode_choice
 from clearway.envs.record import EpisodeRecord
 from clearway.envs.render import RENDER_MODES, Renderer
 from clearway.envs.spaces import ObservationKind, observation_sources, observation_space
-from clearway.envs.world import make_world
 from clearway.reward import Reward, reward_named
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.sensors import RGB
+from clearway.world.navigation import HISTORY_LENGTH, Navigation, TargetChoice
+from clearway.world.tables import make_world
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]

@@ -12,11 +12,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.envs.world import World
-from clearway.evaluate.episodes import episode_starts
-from clearway.evaluate.metrics import METRIC_NAMES, average, by_scene
-from clearway.evaluate.optimum import world_yardsticks
-from clearway.evaluate.oracle import ENTROPY_WEIGHT, Expected
+from clearway.evaluation.episodes import episode_starts
+from clearway.evaluation.metrics import METRIC_NAMES, average, by_scene
+from clearway.evaluation.optimum import world_yardsticks
+from clearway.evaluation.oracle import ENTROPY_WEIGHT, Expected
 from clearway.experiments import table1
 from clearway.experiments.groups import PAIR, all_jobs, all_missing, compared
 from clearway.experiments.kept import keep, kept
@@ -24,6 +23,7 @@ from clearway.experiments.plan import Job
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE, Reward
+from clearway.world.tables import World
 
 FILE = "analysis.json"
 BETAS = (-0.01, -0.02, -0.05, -0.1, -0.2)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from clearway.choices import BudgetName, RoomName
-from clearway.evaluate.episodes import EPISODES_PER_TARGET, STEP_CAP
-from clearway.scenes.rooms import ROOM_NAMES
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.rooms import ROOM_NAMES
 
 
 @dataclass(frozen=True)

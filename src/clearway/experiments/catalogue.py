@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from clearway.choices import ExperimentName
-from clearway.experiments import analysis, fig3, fig4, fig5, fig6, hard, table1
+from clearway.experiments import analysis, fig3, fig4, fig5, fig6, hard_tables, table1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
@@ -29,8 +29,8 @@ EXPERIMENTS: dict[ExperimentName, Experiment] = {
     "table1": Experiment(table1.jobs, table1.section),
     "fig3": Experiment(fig3.jobs, fig3.section),
     "fig4": Experiment(fig4.jobs, fig4.section),
-    "table2": Experiment(hard.TABLE2.jobs, hard.TABLE2.section),
-    "table3": Experiment(hard.TABLE3.jobs, hard.TABLE3.section),
+    "table2": Experiment(hard_tables.TABLE2.jobs, hard_tables.TABLE2.section),
+    "table3": Experiment(hard_tables.TABLE3.jobs, hard_tables.TABLE3.section),
     "fig5": Experiment(fig5.jobs, fig5.section),
     "fig6": Experiment(fig6.jobs, fig6.section),
     "analysis": Experiment(analysis.jobs, analysis.section),

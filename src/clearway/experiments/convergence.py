@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.evaluate.across_seeds import mean_estimate
+from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.groups import Group
 from clearway.experiments.job import episodes_of, run_folder
 from clearway.experiments.plan import TargetSets

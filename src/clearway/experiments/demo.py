@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from clearway.errors import ClearwayError
-from clearway.evaluate.files import write_evaluations
-from clearway.evaluate.report import Evaluation
-from clearway.evaluate.run import evaluate_runs
-from clearway.evaluate.showcase import Showcase, showcases
+from clearway.evaluation.files import write_evaluations
+from clearway.evaluation.report import Evaluation
+from clearway.evaluation.run import evaluate_runs
+from clearway.evaluation.showcase import Showcase, showcases
 from clearway.learn.load import Agent, load_agent, run_world
 from clearway.learn.presets import DEFAULT
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, train
 from clearway.perception import encode_scenes
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from clearway.scenes.library import cached_room_scene
+from clearway.rooms.library import cached_room_scene
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.evaluate.episodes import EpisodeTable
+from clearway.evaluation.episodes import EpisodeTable
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job

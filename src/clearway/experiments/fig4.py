@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clearway.evaluate.across_seeds import failed_targets, mean_estimate
+from clearway.evaluation.across_seeds import failed_targets, mean_estimate
 from clearway.experiments.convergence import settling
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import run_folder

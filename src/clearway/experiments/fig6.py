@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.evaluate.across_seeds import mean_estimate
+from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.generalisation import BAND, HEADINGS, NOTE, TARGET_HEADINGS, Tried, lines, tried
 from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, random_walk
 from clearway.experiments.plan import Job, TargetSets

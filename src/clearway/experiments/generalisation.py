@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.envs.world import World
-from clearway.evaluate.across_seeds import mean_estimate
-from clearway.evaluate.metrics import SC_DETOUR, SC_STEPS
+from clearway.evaluation.across_seeds import mean_estimate
+from clearway.evaluation.metrics import SC_DETOUR, SC_STEPS
 from clearway.experiments.groups import Group, Scores, compared
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import Series, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import Reward
+from clearway.world.tables import World
 
 METRICS = ("sc", "sc_4x", "spl")
 HEADINGS = ("sc", "95 % of sc", "sc within 4 x shortest", "95 % of that", "SPL", "95 % of SPL")

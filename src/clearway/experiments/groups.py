@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.envs.world import World
-from clearway.evaluate.episodes import EpisodeTable, run_episodes
-from clearway.evaluate.metrics import METRIC_NAMES, by_target
-from clearway.evaluate.policies import random_policy
+from clearway.evaluation.episodes import EpisodeTable, run_episodes
+from clearway.evaluation.metrics import METRIC_NAMES, by_target
+from clearway.evaluation.policies import random_policy
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
 from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
+from clearway.world.tables import World
 
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.evaluate.oracle import expected, make_task, optimal_policy
+from clearway.evaluation.oracle import expected, make_task, optimal_policy
 from clearway.reward import SHORTEST
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from clearway.envs.world import make_world
 from clearway.errors import RunError
-from clearway.evaluate.episode_files import read_episodes, write_episodes
-from clearway.evaluate.episodes import EpisodeTable, run_episodes
+from clearway.evaluation.episode_files import read_episodes, write_episodes
+from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.experiments.plan import Job, PlannedRun, Trial
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_agent
@@ -20,6 +19,7 @@ from clearway.learn.run_folder import RunFolder, scene_digest
 from clearway.learn.train import RunRequest, set_threads, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
+from clearway.world.tables import make_world
 
 RUNS, TRIALS = "runs", "trials"
 

@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.envs.world import World
-from clearway.evaluate.across_seeds import failed_targets, mean_estimate
-from clearway.evaluate.episodes import episode_starts
-from clearway.evaluate.metrics import by_scene
-from clearway.evaluate.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
+from clearway.evaluation.across_seeds import failed_targets, mean_estimate
+from clearway.evaluation.episodes import episode_starts
+from clearway.evaluation.metrics import by_scene
+from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
 from clearway.experiments.paper_numbers import THE_PAPER, PaperRow, reminder
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import ReportTable, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import Reward
+from clearway.world.tables import World
 
 METRICS = ("steps", "collisions")
 TARGET_METRICS = ("steps", "shortest_path_steps", "collisions", "success", "sc", "sc_4x", "spl")

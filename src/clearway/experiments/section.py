@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from clearway.evaluate.across_seeds import Estimate
+from clearway.evaluation.across_seeds import Estimate
 
 Verdict = Literal["holds", "does not hold", "undecided"]
 Value = str | int | float | None

@@ -8,7 +8,6 @@ from pathlib import Path
 from urllib.parse import quote
 
 from clearway.choices import LearnerName, ZoneLevel
-from clearway.envs.world import World, make_world
 from clearway.errors import SceneError
 from clearway.experiments.budget import Budget
 from clearway.experiments.plan import PlannedRun, SceneFile, TargetSets, Trial
@@ -17,10 +16,11 @@ from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import scene_digest
 from clearway.perception import encode_scenes
 from clearway.reward import Reward
-from clearway.scenes.library import cached_room_scene
+from clearway.rooms.library import cached_room_scene
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, is_published
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.world.tables import World, make_world
 
 SCENES = "scenes"
 LEARNERS: dict[LearnerName, Learner] = {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from clearway.evaluate.showcase import showcases
+from clearway.evaluation.showcase import showcases
 from clearway.experiments.groups import PAIR, Group
 from clearway.experiments.job import episodes_of, run_folder
 from clearway.experiments.section import ReportMap

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.evaluate.across_seeds import Estimate, difference, failed_targets, mean_estimate, probability_of_less
+from clearway.evaluation.across_seeds import Estimate, difference, failed_targets, mean_estimate, probability_of_less
 from clearway.experiments.section import Claim, Verdict
 
 SAME = 0.02  # means within this share of each other count as equal

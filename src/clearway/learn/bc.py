@@ -18,9 +18,6 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation, TargetChoice
-from clearway.envs.streams import Streams
-from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import Learner, OnFeatures, linear
@@ -34,6 +31,9 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import shortest_path_actions
 from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
+from clearway.world.navigation import Navigation, TargetChoice
+from clearway.world.streams import Streams
+from clearway.world.tables import World
 
 
 @dataclass(frozen=True)

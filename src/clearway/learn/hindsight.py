@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation
 from clearway.learn.losses import Batch
 from clearway.learn.returns import vtrace
 from clearway.learn.rollout import Rollout
 from clearway.model.lookup import LookupNetwork
 from clearway.model.sums import counted
+from clearway.world.navigation import Navigation
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from clearway.errors import RunError
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from clearway.envs.world import World
     from clearway.learn.load import Acting
     from clearway.learn.run_folder import RunRecord
     from clearway.learn.train import Learning
     from clearway.reward import Reward
+    from clearway.world.tables import World
 
 AT_LEAST_ONE = {"frames", "envs", "rollout_steps", "step_limit", "epochs", "minibatches", "width"}
 AT_LEAST_ONE |= {"scene_updates", "history_length"}

@@ -9,7 +9,6 @@ from typing import Protocol, runtime_checkable
 
 from torch import Tensor
 
-from clearway.envs.world import World, make_world, scene_tables
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
 from clearway.learn.learner import OnFeatures
@@ -21,6 +20,7 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import Critic, Policy, network_critic, network_policy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
+from clearway.world.tables import World, make_world, scene_tables
 
 
 @runtime_checkable

@@ -16,10 +16,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation
-from clearway.envs.world import World
 from clearway.model.lookup import LookupNetwork
 from clearway.model.sums import counted
+from clearway.world.navigation import Navigation
+from clearway.world.tables import World
 
 UNKNOWN = -1
 

@@ -10,9 +10,9 @@ from clearway.choices import MatmulPrecision
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 
 if TYPE_CHECKING:
-    from clearway.envs.world import World
     from clearway.learn.trainer import Trainer
     from clearway.reward import Reward
+    from clearway.world.tables import World
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,6 @@ from typing import TYPE_CHECKING, ClassVar
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation
-from clearway.envs.streams import Streams
-from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import Learner, linear
@@ -33,6 +30,9 @@ from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.policy import Policy, sampled
 from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
+from clearway.world.navigation import Navigation
+from clearway.world.streams import Streams
+from clearway.world.tables import World
 
 if TYPE_CHECKING:
     from clearway.learn.run_folder import RunRecord

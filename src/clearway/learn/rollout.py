@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation, Transition
-from clearway.envs.streams import Streams
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.policy import sampled
+from clearway.world.navigation import Navigation, Transition
+from clearway.world.streams import Streams
 
 ACTION_STREAM = 3
 

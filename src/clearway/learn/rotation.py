@@ -9,9 +9,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.on_policy import OnPolicy
+from clearway.world.tables import World
 
 ROTATION_SALT = 1_000_033
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from clearway.envs.feature_store import all_finite, evenly_spaced
-from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.learner import OnFeatures
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.optimiser import Adam, Optimiser, SharedRMSProp
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.network import SiameseActorCritic
+from clearway.world.feature_store import all_finite, evenly_spaced
+from clearway.world.tables import World
 
 FITTED_STATES = 32_768  # states that a feature map is fitted to: evenly spaced ones, where there are more
 SEED_LIMIT = 1 << 31  # seeds of environments are seed * 2**32 + number, in 64 bits

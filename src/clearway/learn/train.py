@@ -17,7 +17,6 @@ import torch
 from torch import Tensor
 
 from clearway.choices import FeatureStore, ZoneLevel
-from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.learn.checkpoint import (
     Progress,
@@ -36,6 +35,7 @@ from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.precision import multiplies_bfloat16
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
+from clearway.world.tables import World, make_world
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
@@ -84,7 +84,7 @@ class RunRequest:
         learner, reward, seed, zone_level: see there.
         paths: file of each scene by name, where it has one.
         device: torch device, for example "cpu" or "cuda".
-        feature_store: where features are kept, see `clearway.envs.feature_store`.
+        feature_store: where features are kept, see `clearway.world.feature_store`.
     """
 
     scenes: Sequence[Scene]

@@ -12,9 +12,6 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation, TargetChoice
-from clearway.envs.streams import Streams
-from clearway.envs.world import World
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.lookahead import Observed, better_policy
@@ -33,6 +30,9 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
 from clearway.model.sums import counted
 from clearway.reward import Reward
+from clearway.world.navigation import Navigation, TargetChoice
+from clearway.world.streams import Streams
+from clearway.world.tables import World
 
 SHUFFLE_SALT = 1_000_003
 

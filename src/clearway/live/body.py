@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from clearway.scenes.rooms.obstacles import AgentShape, CollisionRoom, copy_obstacle, obstacle_geoms
+from clearway.rooms.obstacles import AgentShape, CollisionRoom, copy_obstacle, obstacle_geoms
 
 SAMPLES = 20
 """Sub-steps of a move, and the moments of a step at which the clearance is measured."""

@@ -16,10 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation
-from clearway.envs.streams import Streams
-from clearway.envs.world import World
-from clearway.evaluate.episodes import ACTION_STREAM, episode_seeds
+from clearway.evaluation.episodes import ACTION_STREAM, episode_seeds
 from clearway.live.body import SAMPLES, Body, Step
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
 from clearway.live.layout import Layout, arranged, as_built, furniture_moved, with_obstacle_on_path
@@ -28,9 +25,12 @@ from clearway.live.settings import Perturbations
 from clearway.model.policy import sampled
 from clearway.perception.encoder import Encoder
 from clearway.reward import COLLISION_AWARE
+from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
+from clearway.rooms.render import Camera
 from clearway.scenes.actions import Action
-from clearway.scenes.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
-from clearway.scenes.rooms.render import Camera
+from clearway.world.navigation import Navigation
+from clearway.world.streams import Streams
+from clearway.world.tables import World
 
 LiveSelection = Literal["sampled", "argmax"]
 LivePolicy = Callable[[Tensor, Tensor], Tensor]

@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.scenes.rooms.groups import OBSTACLE_GROUP
-from clearway.scenes.rooms.navigation import find_grid
-from clearway.scenes.rooms.obstacles import AgentShape, CollisionRoom, copy_obstacle, obstacle_geoms
-from clearway.scenes.rooms.pieces import is_loose, loose_obstacles
+from clearway.rooms.groups import OBSTACLE_GROUP
+from clearway.rooms.navigation import find_grid
+from clearway.rooms.obstacles import AgentShape, CollisionRoom, copy_obstacle, obstacle_geoms
+from clearway.rooms.pieces import is_loose, loose_obstacles
 from clearway.scenes.scene import Scene
 
 NEW_RADIUS_M, NEW_HEIGHT_M = 0.15, 0.6

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.evaluate import bootstrap
-from clearway.evaluate.metrics import Metric, average, by_scene, columns, quotients
+from clearway.evaluation import bootstrap
+from clearway.evaluation.metrics import Metric, average, by_scene, columns, quotients
 from clearway.live.episodes import STEP_S, LiveTable
 from clearway.live.settings import Perturbations
 

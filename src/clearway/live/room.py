@@ -13,7 +13,7 @@ from clearway.scenes.scene import Scene
 if TYPE_CHECKING:
     import mujoco
 
-    from clearway.scenes.rooms.obstacles import CollisionRoom
+    from clearway.rooms.obstacles import CollisionRoom
 
 NEW_OBSTACLE_RGBA = (0.72, 0.36, 0.24, 1.0)
 
@@ -46,11 +46,11 @@ def live_room(scene: Scene) -> LiveRoom:
             f"there is no room to walk in: the scene comes from {made.source}",
             "Walk live in a scene that clearway scenes build made",
         )
-    from clearway.scenes.build import check_mujoco
+    from clearway.rooms.build import check_mujoco
 
     check_mujoco()
-    from clearway.scenes.rooms import build_room
-    from clearway.scenes.rooms.navigation import find_grid
+    from clearway.rooms import build_room
+    from clearway.rooms.navigation import find_grid
 
     grid = find_grid(build_room(made.room, made.seed, looks=False))
     if not np.array_equal(grid.graph, scene.graph) or not np.allclose(grid.state_locations_m, scene.locations_m):
@@ -67,7 +67,7 @@ def live_room(scene: Scene) -> LiveRoom:
 def camera_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The compiled room with the new obstacle on a body of its own, out of sight."""
     from clearway.live.layout import OUT_OF_SIGHT_M, add_new_obstacle
-    from clearway.scenes.rooms.groups import SEEN_GROUP
+    from clearway.rooms.groups import SEEN_GROUP
 
     body = spec.worldbody.add_body(name="new obstacle", mocap=True, pos=OUT_OF_SIGHT_M)
     geom = add_new_obstacle(body, (0.0, 0.0, 0.0), SEEN_GROUP)

@@ -7,7 +7,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from clearway.envs.world import World, make_world
 from clearway.errors import RunError
 from clearway.files import json_text, written_whole
 from clearway.learn.load import Agent
@@ -19,10 +18,11 @@ from clearway.live.settings import Setting
 from clearway.live.tables import markdown_tables
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
-from clearway.scenes.rooms.camera import eye_view
-from clearway.scenes.rooms.render import Camera, studio
+from clearway.rooms.camera import eye_view
+from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
+from clearway.world.tables import World, make_world
 
 JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
 JSON_PART, MARKDOWN_PART = "live.part.json", "live.part.md"

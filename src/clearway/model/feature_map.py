@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.envs.feature_store import BLOCK_ROWS, FEW_STATES, empty_store
-from clearway.envs.world import World
+from clearway.world.feature_store import BLOCK_ROWS, FEW_STATES, empty_store
+from clearway.world.tables import World
 
 SPANNED = 1e-5  # a direction counts where its singular value is at least this share of the largest
 

@@ -27,12 +27,12 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from clearway.envs.feature_store import FEW_STATES
 from clearway.model.first_layer import AllStates, FirstLayer, VisitedStates
 from clearway.model.network import OUTPUTS, SiameseActorCritic, grad_of
 from clearway.model.padding import Padding, row_step
 from clearway.model.sums import add_up, counted, multiply, sum_ascending, sum_listed
 from clearway.scenes.actions import ACTION_COUNT
+from clearway.world.feature_store import FEW_STATES
 
 FEW_TARGETS = 1_024  # up to so many, the target branch is computed of all, beyond of those that occur
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
-from clearway.envs.world import DistanceTable, World
 from clearway.model.lookup import LookupNetwork
+from clearway.world.tables import DistanceTable, World
 
 Policy = Callable[[Tensor, Tensor], Tensor]
 """history (B, K) int64 states in the world's numbering, target (B,) int64 -> probabilities of actions (B, A).

@@ -1,6 +1,6 @@
 """Floor plans: which cells of a grid can be entered. `floor_plan_scene` makes one a scene, with made-up features.
 
-`clearway.scenes.build.build_floor_plan` makes one a furnished room, with pictures.
+`clearway.rooms.build.build_floor_plan` makes one a furnished room, with pictures.
 
 Axis letters: C cells, E edges, S = 4 C states.
 """

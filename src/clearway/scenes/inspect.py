@@ -8,8 +8,8 @@ import numpy as np
 
 from clearway.scenes import graph as graphs
 from clearway.scenes.actions import BLOCKED, Action
+from clearway.scenes.feature_spread import FeatureSpread, feature_spread
 from clearway.scenes.scene import Scene
-from clearway.scenes.spread import FeatureSpread, feature_spread
 
 PATH_SOURCES = 512  # states from which shortest paths are averaged, evenly spaced where there are more
 

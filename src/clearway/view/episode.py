@@ -14,7 +14,7 @@ from typing import get_args
 from urllib.parse import parse_qsl, urlencode
 
 from clearway.errors import ClearwayError
-from clearway.evaluate.selection import ActionSelection
+from clearway.evaluation.selection import ActionSelection
 from clearway.learn.setup import SEED_LIMIT
 
 LETTERS = "FRLB"

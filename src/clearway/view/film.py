@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from clearway import colours
 from clearway.errors import ClearwayError
-from clearway.evaluate.episodes import Trajectory
+from clearway.evaluation.episodes import Trajectory
 from clearway.view.episode import Episode
 from clearway.view.session import Session
 from clearway.view.stage import Stage

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from clearway.envs.world import World
 from clearway.errors import ClearwayError
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
 from clearway.view.stage import Stage
 from clearway.view.walker import Mind, Walker
+from clearway.world.tables import World
 
 Message = dict[str, Any]
 YOU = "you"

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.envs.world import World, scene_tables
 from clearway.errors import RunError
 from clearway.learn.load import Agent, load_agent, run_scenes, run_tables
 from clearway.model.lookup import LookupNetwork
@@ -18,6 +17,7 @@ from clearway.model.policy import Critic, network_critic
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
+from clearway.world.tables import World, scene_tables
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation
-from clearway.envs.streams import Streams
-from clearway.envs.world import World
-from clearway.evaluate.episodes import ACTION_STREAM
-from clearway.evaluate.selection import ActionSelection, UntriedActions
+from clearway.evaluation.episodes import ACTION_STREAM
+from clearway.evaluation.selection import ActionSelection, UntriedActions
 from clearway.model.policy import Critic, sampled
 from clearway.reward import Reward
 from clearway.view.episode import MOST_STEPS
+from clearway.world.navigation import Navigation
+from clearway.world.streams import Streams
+from clearway.world.tables import World
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.evaluate.report import Evaluation
-from clearway.evaluate.tables import table_text
+from clearway.evaluation.report import Evaluation
+from clearway.evaluation.tables import table_text
 from clearway.experiments.demo import DemoResult
 from clearway.learn.provenance import facts_text, hardware, package_versions
 from clearway.viz.contact_sheet import draw_contact_sheet

@@ -12,9 +12,9 @@ from clearway import colours
 from clearway.live.draws import Draws
 from clearway.live.report import LiveResult
 from clearway.live.run import LiveOutcome, Stage
+from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
+from clearway.rooms.topview import render_top_view
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
-from clearway.scenes.rooms.topview import render_top_view
 from clearway.scenes.scene import Scene
 from clearway.viz.figures import CURVES, LINES, Look, new_figure
 

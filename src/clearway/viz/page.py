@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from clearway.evaluate.tables import TableText
+from clearway.evaluation.tables import TableText
 from clearway.files import written_whole
 from clearway.viz.html import rendered_html
 

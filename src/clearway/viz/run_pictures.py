@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from clearway.evaluate.showcase import showcases
+from clearway.evaluation.showcase import showcases
 from clearway.learn.load import Acting, run_world
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.scene import Scene

@@ -14,13 +14,13 @@ from PIL import Image, ImageDraw, ImageFont
 from clearway import colours
 from clearway.envs.record import Episode
 from clearway.envs.render import Renderer
-from clearway.envs.world import World
 from clearway.errors import ClearwayError
-from clearway.evaluate.episodes import Trajectory
+from clearway.evaluation.episodes import Trajectory
 from clearway.files import written_whole
 from clearway.model.policy import Policy
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
+from clearway.world.tables import World
 
 STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
 FRAMES_PER_S = 3

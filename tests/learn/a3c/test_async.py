@@ -27,8 +27,8 @@ from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
-from plain_a3c import PlainA3C
-from small_runs import equal_bits, small_learner, small_network, small_request, small_world
+from helpers.plain_a3c import PlainA3C
+from helpers.small_runs import equal_bits, small_learner, small_network, small_request, small_world
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 
@@ -150,7 +150,7 @@ import sys
 from pathlib import Path
 import torch
 from clearway.learn.train import train
-from small_runs import small_learner, small_request
+from helpers.small_runs import small_learner, small_request
 from clearway.learn.presets import PAPER_A3C
 torch.set_num_threads(2)
 train(small_request(learner=small_learner(PAPER_A3C, frames=10_000_000, rollout_steps=5)), Path(sys.argv[1]))

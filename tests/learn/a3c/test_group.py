@@ -14,8 +14,8 @@ from clearway.learn.optimiser import EPSILON
 from clearway.learn.presets import PAPER_A3C
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import ACTION_COUNT
-from plain_a3c import PlainA3C
-from small_runs import small_learner, small_network, small_world
+from helpers.plain_a3c import PlainA3C
+from helpers.small_runs import small_learner, small_network, small_world
 
 SMALL = small_learner(PAPER_A3C, frames=1000, envs=5, rollout_steps=5, lr_start=0.05)
 

@@ -39,7 +39,7 @@ class ImportDumps:
 
     def run(self) -> None:
         """Import and write."""
-        from clearway.scenes.importers.archives import unpacked
+        from clearway.importers.archives import unpacked
         from clearway.scenes.thor_v1 import read_scene
 
         encoding = Encoding(self.encoder or "auto", self.encoder_seed, self.workers, self.ray)
@@ -79,7 +79,7 @@ class ImportSavn:
 
     def run(self) -> None:
         """Read, encode and write."""
-        from clearway.scenes.importers.savn import read_savn
+        from clearway.importers.savn import read_savn
 
         check_named("folder", self.folders)
         encoding = Encoding(self.encoder or "auto", self.encoder_seed, self.workers, self.ray)
@@ -110,7 +110,7 @@ class ImportAvd:
 
     def run(self) -> None:
         """Read, encode and write."""
-        from clearway.scenes.importers.avd import read_avd
+        from clearway.importers.avd import read_avd
 
         check_named("folder", self.folders)
         check_at_least(1, height=self.height)

@@ -62,8 +62,8 @@ class ImportFloorPlan:
     def _render(self, plans: Sequence[FloorPlan]) -> None:
         """Make rooms, encode their pictures and write."""
         from clearway.perception import check_sees
-        from clearway.scenes.library import cached_plan_scene
-        from clearway.scenes.rooms.plans.limits import check_can_be_rendered
+        from clearway.rooms.library import cached_plan_scene
+        from clearway.rooms.plans.limits import check_can_be_rendered
         from clearway.scenes.sensors import check_names
 
         self.encoding.check()
@@ -104,7 +104,7 @@ class ImportImages:
 
     def run(self) -> None:
         """Read, encode and write."""
-        from clearway.scenes.importers.images import read_images
+        from clearway.importers.images import read_images
 
         check_at_least(1, height=self.height)
         name = self.name or place_name(self.table)

@@ -29,7 +29,7 @@ class ImportPlugin:
 
     def run(self) -> None:
         """Read, encode where the importer leaves that to us, and write."""
-        from clearway.scenes.importers.plugged import plugged_scenes
+        from clearway.importers.plugged import plugged_scenes
 
         check_named("file", self.files)
         self.encoding.check()

@@ -35,7 +35,7 @@ class ImportAi2Thor:
 
     def run(self) -> None:
         """Photograph, encode and write."""
-        from clearway.scenes.importers.ai2thor import photographed, started
+        from clearway.importers.ai2thor import photographed, started
 
         check_named("room", self.rooms)
         check_at_least(1, width=self.width, height=self.height)
@@ -89,16 +89,16 @@ class ImportMjcf:
     def run(self) -> None:
         """Compile, find the free cells, render, encode and write."""
         from clearway.perception import check_sees
-        from clearway.scenes.build import check_mujoco
+        from clearway.rooms.build import check_mujoco
 
         check_positive(step=self.step, agent_radius=self.agent_radius, agent_height=self.agent_height)
         check_finite(floor_height=self.floor_height, camera_height=self.camera_height)
         self.encoding.check()
         check_sees(self.encoding.encoder, self.sensors)
         check_mujoco()
-        from clearway.scenes.importers.mjcf import read_mjcf
-        from clearway.scenes.importers.mjcf_floor import World
-        from clearway.scenes.rooms.obstacles import AgentShape
+        from clearway.importers.mjcf import read_mjcf
+        from clearway.importers.mjcf_floor import World
+        from clearway.rooms.obstacles import AgentShape
 
         workers, ray = self.encoding.workers, self.encoding.ray
         with kept_connected(ray, workers):
@@ -140,8 +140,8 @@ class ImportMiniWorld:
 
     def run(self) -> None:
         """Photograph, encode and write."""
-        from clearway.scenes.build import scene_name
-        from clearway.scenes.importers.miniworld import photographed, started
+        from clearway.importers.miniworld import photographed, started
+        from clearway.rooms.build import scene_name
 
         check_named("environment", self.environments)
         check_positive(step=self.step)

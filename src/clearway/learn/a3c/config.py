@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 
 if TYPE_CHECKING:
-    from clearway.envs.world import World
     from clearway.learn.a3c.trainer import AsyncTrainer
     from clearway.reward import Reward
+    from clearway.world.tables import World
 
 
 @dataclass(frozen=True)

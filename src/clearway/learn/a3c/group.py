@@ -16,9 +16,6 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from clearway.envs.navigation import Navigation, Transition
-from clearway.envs.streams import Streams
-from clearway.envs.world import World
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.gradients import clip_scales, clipped, squared_norms, window_rows
 from clearway.learn.a3c.local import LocalNetwork
@@ -31,6 +28,9 @@ from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
 from clearway.model.network import NetworkShape
 from clearway.reward import Reward
+from clearway.world.navigation import Navigation, Transition
+from clearway.world.streams import Streams
+from clearway.world.tables import World
 
 
 @dataclass(frozen=True)

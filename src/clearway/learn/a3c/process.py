@@ -15,13 +15,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.envs.world import World
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import Round, WorkerGroup
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.figures import Figures
 from clearway.learn.named_tensors import part_of
 from clearway.reward import Reward
+from clearway.world.tables import World
 
 
 class Message(Enum):

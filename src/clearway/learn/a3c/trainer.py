@@ -18,7 +18,6 @@ import torch
 from torch import Tensor
 
 from clearway.children import signals_held
-from clearway.envs.world import World
 from clearway.errors import RunError
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import WorkerGroup
@@ -31,6 +30,7 @@ from clearway.learn.setup import check_seed, network_input
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
+from clearway.world.tables import World
 
 PLACES = {"parameters": "network", "squares": "optimiser.square_plus_epsilon", "workers": "workers"}
 """Parts of the shared memory, and what they are called in a checkpoint."""

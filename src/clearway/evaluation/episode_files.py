@@ -1,0 +1,48 @@
+"""Episode tables as JSON files: every episode kept, so that any figure can be computed again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clearway.errors import RunError
+from clearway.evaluation.episodes import EpisodeTable
+from clearway.files import read_json, written_whole
+
+FORMAT_VERSION = 1
+_FLAGS = ("reached", "looped")
+_COLUMNS = tuple(field.name for field in fields(EpisodeTable) if field.name != "trajectories")
+
+
+def write_episodes(path: Path, table: EpisodeTable, about: Mapping[str, object]) -> None:
+    """Write a table without its trajectories, and what it is about (JSON values)."""
+    columns = {name: getattr(table, name).astype(np.int64).tolist() for name in _COLUMNS}
+    content = {"format_version": FORMAT_VERSION, "about": dict(about), "episodes": columns}
+    with written_whole(path) as part:
+        part.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+def read_episodes(path: Path) -> tuple[EpisodeTable, dict[str, Any]]:
+    """The table and what it is about.
+
+    Raises:
+        RunError: the file is missing, damaged or of a newer version.
+    """
+    try:
+        content = read_json(path)
+        if int(content["format_version"]) > FORMAT_VERSION:
+            raise RunError(f"{path}: written by a newer clearway. Upgrade clearway")
+        columns = {name: np.array(content["episodes"][name], np.int64) for name in _COLUMNS}
+        about = dict(content["about"])
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        raise RunError(f"{path}: not readable ({error}). Remove it, and it is made again") from error
+    for name in _FLAGS:
+        columns[name] = columns[name].astype(bool)
+    if len({len(column) for column in columns.values()}) != 1:
+        raise RunError(f"{path}: its columns differ in length. Remove it, and it is made again")
+    return EpisodeTable(**columns, trajectories=None), about

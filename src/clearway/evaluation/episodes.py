@@ -1,0 +1,247 @@
+"""Episodes by the paper's protocol, walked side by side: random starts, a cap on the steps.
+
+Axis letters: N episodes, B of them still walking, K poses of history, A actions, M targets, Z zones, T steps.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from clearway.evaluation.loops import LoopSkipper, Tally
+from clearway.evaluation.policies import argmax
+from clearway.evaluation.selection import ActionSelection, UntriedActions
+from clearway.model.policy import Policy, sampled
+from clearway.reward import COLLISION_AWARE
+from clearway.world.navigation import HISTORY_LENGTH, Navigation, Transition
+from clearway.world.streams import Streams, stream_keys
+from clearway.world.tables import World
+
+EPISODES_PER_TARGET = 100
+STEP_CAP = 10_000
+EPISODES_AT_ONCE = 4096
+TARGET_STREAM, ACTION_STREAM = 11, 12
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One walk: states (T + 1,) int64 in the world's numbering, and the actions (T,) int64 between them."""
+
+    states: np.ndarray
+    actions: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeTable:
+    """What happened in N episodes.
+
+    Attributes:
+        target: (N,) int64, index of the world's target, ascending.
+        start: (N,) int64, first state in the world's numbering.
+        steps: (N,) int64, steps taken; the cap where the target was not reached.
+        collisions: (N,) int64, blocked moves.
+        reached: (N,) bool, the target was reached before the cap.
+        shortest_path_steps: (N,) int64, fewest steps from the start to the target.
+        zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
+        looped: (N,) bool, found before the cap to be in a circle of actions without choice, so never to arrive.
+        trajectories: the walks, one an episode; None unless asked for.
+    """
+
+    target: np.ndarray
+    start: np.ndarray
+    steps: np.ndarray
+    collisions: np.ndarray
+    reached: np.ndarray
+    shortest_path_steps: np.ndarray
+    zone_steps: np.ndarray
+    looped: np.ndarray
+    trajectories: tuple[Trajectory, ...] | None = None
+
+    def __len__(self) -> int:
+        """N."""
+        return len(self.target)
+
+
+def run_episodes(
+    world: World,
+    policy: Policy,
+    *,
+    selection: ActionSelection = "sampled",
+    episodes_per_target: int = EPISODES_PER_TARGET,
+    step_cap: int = STEP_CAP,
+    seed: int = 0,
+    record: bool = False,
+    history_length: int = HISTORY_LENGTH,
+    episodes_at_once: int = EPISODES_AT_ONCE,
+) -> EpisodeTable:
+    """Walk episodes to every target of a world.
+
+    Episode i of a target draws its start and its actions from its own random streams, named by the seed, the
+    scene, the target's state and i: it is the same whatever runs beside it, and all policies face the same
+    starts.
+
+    Args:
+        world: the tables; the walk happens on their device.
+        policy: a pure function of history and target. A walk in a circle of actions that it is certain of is
+            completed by arithmetic instead of walked to the cap; the counts are the same.
+        selection: how actions are chosen by the policy's probabilities.
+        episodes_per_target: how many.
+        step_cap: steps after which an episode has failed.
+        seed: another seed gives other starts and other chances.
+        record: keep the trajectories too (then circles are walked to the cap).
+        history_length: K.
+        episodes_at_once: most episodes to walk side by side; changes memory and speed, not the result.
+    """
+    assert episodes_per_target > 0 and step_cap > 0 and episodes_at_once > 0
+    target = torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target)
+    seeds = episode_seeds(world, episodes_per_target, seed)
+    policy = argmax(policy) if selection == "argmax" else policy
+    untried = selection == "argmax-untried"
+    parts = []
+    with torch.no_grad():
+        for chosen in torch.arange(len(target), device=world.device).split(episodes_at_once):
+            walk = _Walk(world, seeds[chosen], target[chosen], history_length, step_cap, record, untried)
+            parts.append(walk.to_the_end(policy))
+    return _joined(parts)
+
+
+def episode_seeds(world: World, episodes_per_target: int, seed: int) -> Tensor:
+    """One seed an episode, (M * episodes_per_target,) int64, target after target."""
+    names = [world.scene_names[scene] for scene in world.target_scene.tolist()]
+    labels = [f"{name}:{world.scene_state(target)}" for target, name in enumerate(names)]
+    of_target = torch.tensor([zlib.crc32(label.encode()) for label in labels])
+    first = stream_keys(stream_keys(torch.tensor([seed]), TARGET_STREAM) + of_target, TARGET_STREAM)
+    return (first[:, None] + torch.arange(episodes_per_target)).reshape(-1).to(world.device)
+
+
+def episode_starts(world: World, episodes_per_target: int, seed: int) -> np.ndarray:
+    """Where the episodes of `run_episodes` begin, (M, episodes_per_target) int64 in the world's numbering."""
+    env = Navigation(world, COLLISION_AWARE, episode_seeds(world, episodes_per_target, seed))
+    env.reset(target=torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target))
+    return env.state.view(world.target_count, episodes_per_target).cpu().numpy()
+
+
+class _Walk:
+    """A batch of episodes on the way. Episodes that end are written down and dropped from the batch."""
+
+    def __init__(
+        self,
+        world: World,
+        seeds: Tensor,
+        target: Tensor,
+        history_length: int,
+        step_cap: int,
+        record: bool,
+        untried: bool,
+    ) -> None:
+        count = len(seeds)
+        self.world, self.step_cap = world, step_cap
+        self.chances = Streams(seeds, ACTION_STREAM)
+        # No number here rests on the reward; the environment wants one.
+        self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=history_length)
+        self.env.reset(target=target)
+        self.target, self.start = target, self.env.state.clone()
+        self.walking = torch.arange(count, device=world.device)  # (B,) episode of each row of the batch
+        self.tally = Tally.zero(count, world.device)
+        self.final = Tally.zero(count, world.device)
+        self.reached = torch.zeros(count, dtype=torch.bool, device=world.device)
+        self.looped = torch.zeros_like(self.reached)
+        self.loops = LoopSkipper(self.env.history, self.tally)
+        self.untried = UntriedActions(count, int(world.scene_offset.diff().max()), world.device) if untried else None
+        self.diary: list[tuple[Tensor, Tensor, Tensor]] | None = [] if record else None
+
+    def to_the_end(self, policy: Policy) -> EpisodeTable:
+        """Walk until every episode has ended."""
+        while len(self.walking):
+            action, certain = self._choose(policy(self.env.history, self.env.target))
+            happened = self.env.step(action)
+            self.tally = self.tally.plus_step(happened)
+            self._close_circles(certain)
+            if self.diary is not None:
+                self.diary.append((self.walking, happened.state, action))
+            self._drop_ended(happened)
+        return self._table()
+
+    def _choose(self, probabilities: Tensor) -> tuple[Tensor, Tensor]:
+        """Actions (B,) int64 by (B, A) probabilities, and where the history left no choice, (B,) bool."""
+        _check(probabilities.to(torch.float64).sum(1))
+        if self.untried is not None:
+            scene_state = self.env.state - self.world.scene_offset[self.world.target_scene[self.env.target]]
+            action = self.untried.choose(self.walking, scene_state, probabilities)
+            return action, torch.zeros_like(action, dtype=torch.bool)
+        action = sampled(probabilities, self.chances.at(self.walking))
+        return action, (probabilities > 0).sum(1) == 1
+
+    def _close_circles(self, certain: Tensor) -> None:
+        """Note who walks in a circle for ever, and add its rounds up to the cap, unless every step is recorded."""
+        tally, closed = self.loops.skip(self.env.history, self.tally, certain, self.step_cap)
+        self.looped[self.walking[closed]] = True
+        if self.diary is None:
+            self.tally = tally
+
+    def _drop_ended(self, happened: Transition) -> None:
+        ended = happened.reached | (self.tally.steps >= self.step_cap)
+        if not bool(ended.any()):
+            return
+        episode = self.walking[ended]
+        self.reached[episode] = happened.reached[ended]
+        self.final.write(episode, self.tally.at(ended))
+        still = ~ended
+        self.walking, self.tally = self.walking[still], self.tally.at(still)
+        # There is no reset from here on, so the environment's start and target streams may keep their length.
+        self.env.load_tensors({name: value[still] for name, value in self.env.tensors().items()})
+        self.loops.keep(still)
+
+    def _table(self) -> EpisodeTable:
+        distance = self.world.distance_table()[self.target, self.start]
+        return EpisodeTable(
+            target=_array(self.target),
+            start=_array(self.start),
+            steps=_array(self.final.steps),
+            collisions=_array(self.final.collisions),
+            reached=_array(self.reached),
+            shortest_path_steps=_array(distance),
+            zone_steps=_array(self.final.zone_steps),
+            looped=_array(self.looped),
+            trajectories=None if self.diary is None else _trajectories(self.start, self.final.steps, self.diary),
+        )
+
+
+def _check(total: Tensor) -> None:
+    valid = (total > 0) & torch.isfinite(total)
+    assert bool(valid.all()), "a policy gave probabilities that are not finite or all zero"
+
+
+def _array(tensor: Tensor) -> np.ndarray:
+    return tensor.cpu().numpy()
+
+
+def _trajectories(start: Tensor, steps: Tensor, diary: list[tuple[Tensor, Tensor, Tensor]]) -> tuple[Trajectory, ...]:
+    """Sort the pages of the diary, (episodes, states, actions) of each step, by episode."""
+    episode, state, action = (_array(torch.cat(column)) for column in zip(*diary, strict=True))
+    order = np.argsort(episode, kind="stable")
+    ends = np.cumsum(_array(steps))[:-1]
+    walks = zip(_array(start), np.split(state[order], ends), np.split(action[order], ends), strict=True)
+    return tuple(Trajectory(np.concatenate([[first], states]), actions) for first, states, actions in walks)
+
+
+def _joined(parts: list[EpisodeTable]) -> EpisodeTable:
+    def column(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    walks = [part.trajectories for part in parts if part.trajectories is not None]
+    return EpisodeTable(
+        target=column("target"),
+        start=column("start"),
+        steps=column("steps"),
+        collisions=column("collisions"),
+        reached=column("reached"),
+        shortest_path_steps=column("shortest_path_steps"),
+        zone_steps=column("zone_steps"),
+        looped=column("looped"),
+        trajectories=tuple(walk for part in walks for walk in part) if walks else None,
+    )

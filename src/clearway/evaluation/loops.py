@@ -1,0 +1,102 @@
+"""Counting an episode's steps, and completing walks in a circle without walking them.
+
+An agent that is certain of every action repeats itself for ever once its history repeats. `LoopSkipper` finds
+that by Brent's method (a snapshot, renewed at the powers of two, is compared with every later history) and
+adds as many whole rounds as fit below the cap; the rest is walked. The counts are exactly those of walking on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from clearway.world.navigation import Transition
+from clearway.zones import ZONE_COUNT
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Counts of B episodes: steps (B,) int64, collisions (B,) int64, zone_steps (B, Z) int64."""
+
+    steps: Tensor
+    collisions: Tensor
+    zone_steps: Tensor
+
+    @classmethod
+    def zero(cls, count: int, device: torch.device) -> Tally:
+        """Nothing has happened yet."""
+        none = torch.zeros(count, dtype=torch.int64, device=device)
+        return cls(none, none.clone(), none[:, None].repeat(1, ZONE_COUNT))
+
+    def plus_step(self, happened: Transition) -> Tally:
+        """One step later."""
+        arrived = torch.nn.functional.one_hot(happened.zone, ZONE_COUNT) * ~happened.reached[:, None]
+        return Tally(self.steps + 1, self.collisions + happened.blocked, self.zone_steps + arrived)
+
+    def plus_rounds(self, rounds: Tensor, since: Tally) -> Tally:
+        """`rounds` (B,) int64 times all that was counted since `since`, on top."""
+        return Tally(
+            self.steps + rounds * (self.steps - since.steps),
+            self.collisions + rounds * (self.collisions - since.collisions),
+            self.zone_steps + rounds[:, None] * (self.zone_steps - since.zone_steps),
+        )
+
+    def at(self, index: Tensor) -> Tally:
+        """The counts of some episodes, by index or mask."""
+        return Tally(self.steps[index], self.collisions[index], self.zone_steps[index])
+
+    def write(self, index: Tensor, other: Tally) -> None:
+        """Set the counts of the episodes in index (B,) int64."""
+        self.steps[index] = other.steps
+        self.collisions[index] = other.collisions
+        self.zone_steps[index] = other.zone_steps
+
+
+class LoopSkipper:
+    """Watches B episodes for histories that repeat.
+
+    Args:
+        history: (B, K) int64, the histories at the start.
+        tally: the counts at the start.
+    """
+
+    def __init__(self, history: Tensor, tally: Tally) -> None:
+        self.walked, self.renew_at = 0, 1
+        self.snapshot, self.tally = history.clone(), tally
+        self.certain = torch.ones(len(history), dtype=torch.bool, device=history.device)
+
+    def skip(self, history: Tensor, tally: Tally, certain: Tensor, step_cap: int) -> tuple[Tally, Tensor]:
+        """The counts after one more step, with all whole rounds below the cap where a circle has closed; where, (B,).
+
+        Args:
+            history: (B, K) int64, after the step.
+            tally: the counts after the step.
+            certain: (B,) bool, the step's action was the only one that the history and target allow.
+            step_cap: the episodes' last step.
+        """
+        self.walked += 1
+        self.certain = self.certain & certain
+        closed = self.certain & (history == self.snapshot).all(1)
+        if bool(closed.any()):
+            tally = self._rounds_added(tally, closed, step_cap)
+        if self.walked == self.renew_at:
+            self.snapshot, self.tally, self.renew_at = history.clone(), tally, 2 * self.renew_at
+            self.certain = torch.ones_like(self.certain)
+        return tally, closed
+
+    def keep(self, still: Tensor) -> None:
+        """Forget the episodes where still (B,) is False."""
+        self.snapshot, self.tally, self.certain = (
+            self.snapshot[still],
+            self.tally.at(still),
+            self.certain[still],
+        )
+
+    def _rounds_added(self, tally: Tally, closed: Tensor, step_cap: int) -> Tally:
+        """Whole rounds added where closed; those episodes are not watched until the snapshot is renewed."""
+        length = (tally.steps - self.tally.steps).clamp(min=1)
+        rounds = torch.where(closed, (step_cap - tally.steps) // length, 0)
+        self.certain = self.certain & ~closed
+        return tally.plus_rounds(rounds, self.tally)

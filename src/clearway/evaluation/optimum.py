@@ -1,0 +1,91 @@
+"""The exact yardsticks of `oracle` for a world: as figures, and as policies that can be walked beside an agent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, make_task, yardstick
+from clearway.model.policy import Policy
+from clearway.reward import Reward
+from clearway.world.tables import World
+
+OPTIMUM, SOFT_FIXED_POINT = "optimum", "soft fixed point"  # names of the two policies in tables
+
+
+@dataclass(frozen=True)
+class TargetYardstick:
+    """The yardstick of one target of a world; `target` is its state in the scene's own numbering."""
+
+    scene: str
+    target: int
+    yardstick: Yardstick
+
+    def to_json(self) -> dict[str, object]:
+        """Figures as JSON values; a policy that may never arrive has null."""
+        found = self.yardstick
+        soft = _figures(found.soft)
+        optimal = {key: value for key, value in _figures(found.optimal).items() if key != "collisions"}
+        return {
+            "scene": self.scene,
+            "target": self.target,
+            "shortest_path_steps": found.shortest_path_steps,
+            "optimal": optimal,
+            "soft": soft,
+        }
+
+
+def world_yardsticks(
+    world: World,
+    reward: Reward,
+    *,
+    discount: float = DISCOUNT,
+    entropy_weight: float = ENTROPY_WEIGHT,
+    starts: np.ndarray | None = None,
+) -> list[TargetYardstick]:
+    """Yardsticks of all targets of a world, in its order.
+
+    Args:
+        world: see there.
+        reward: is earned.
+        discount: see `oracle`.
+        entropy_weight: see there.
+        starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
+    """
+    zone, clearance_m = world.zone.cpu().numpy(), world.clearance_m.cpu().numpy()
+    found = []
+    for target, scene in enumerate(world.target_scene.tolist()):
+        first, last = world.scene_offset[scene : scene + 2].tolist()
+        tables = zone[first:last], world.scene_state(target), reward, clearance_m[first:last]
+        task = make_task(world.graph(scene), *tables)
+        exact = yardstick(task, discount, entropy_weight, None if starts is None else starts[target] - first)
+        found.append(TargetYardstick(world.scene_names[scene], task.target, exact))
+    return found
+
+
+def optimum_policies(world: World, yardsticks: list[TargetYardstick]) -> tuple[Policy, Policy]:
+    """The optimal and the soft policy of a world's yardsticks, to be walked like any agent."""
+    rows = [
+        (target, slice(*world.scene_offset[scene : scene + 2].tolist()))
+        for target, scene in enumerate(world.target_scene.tolist())
+    ]
+    optimal = torch.zeros(world.target_count, world.state_count, world.next_state.shape[1])
+    soft = torch.zeros_like(optimal)
+    for (target, states), found in zip(rows, yardsticks, strict=True):
+        optimal[target, states] = torch.from_numpy(found.yardstick.optimal_policy).float()
+        soft[target, states] = torch.from_numpy(found.yardstick.soft_policy).float()
+    return _table_policy(optimal.to(world.device)), _table_policy(soft.to(world.device))
+
+
+def _table_policy(table: Tensor) -> Policy:
+    def probabilities(history: Tensor, target: Tensor) -> Tensor:
+        return table[target, history[:, -1]]
+
+    return probabilities
+
+
+def _figures(expected: Expected) -> dict[str, float | None]:
+    return {key: value if np.isfinite(value) else None for key, value in vars(expected).items()}

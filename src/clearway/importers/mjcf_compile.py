@@ -1,0 +1,110 @@
+"""MuJoCo models of others, compiled in a process of their own with bounded memory and time.
+
+MuJoCo reads whatever files a model names and makes whatever sizes it asks for; a model that is broken, or meant to do
+harm, ends that process and not ours. The process writes the model in MuJoCo's binary format to standard output, or
+the reason why there is none to standard error.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clearway.errors import SceneError
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from clearway.rooms.obstacles import AgentShape
+
+MEMORY_LIMIT_BYTES = 8 << 30  # of the process's address space
+MODEL_LIMIT_BYTES = 1 << 30  # of the compiled model
+TIME_LIMIT_S = 300
+COMMAND = "import sys; sys.path[:] = {path!r}; from clearway.importers.mjcf_compile import main; main()"
+REFUSED = 3
+MESSAGE_LENGTH = 300
+REMEDY = "Correct the model; the files that it names must lie where it says"
+
+
+def compiled(path: Path, agent: AgentShape) -> mujoco.MjModel:
+    """The model in an MJCF file, with the agent's body in it (see `obstacles.add_body`).
+
+    Raises:
+        SceneError: there is no such file, MuJoCo refuses it, or it takes more than the limits of memory and time.
+    """
+    from clearway.rooms.render_worker import model_of_binary
+
+    if not path.is_file():
+        raise SceneError(path, "there is no such file", "Check the path")
+    search = [folder or os.getcwd() for folder in sys.path]
+    job = json.dumps({"path": str(path.resolve()), "agent": asdict(agent), "memory_bytes": MEMORY_LIMIT_BYTES})
+    with tempfile.TemporaryDirectory() as folder:  # MuJoCo leaves a log of warnings where it runs
+        try:
+            done = subprocess.run(
+                [sys.executable, "-c", COMMAND.format(path=search), job],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                cwd=folder,
+                env={**os.environ, "MUJOCO_GL": "disabled"},
+                timeout=TIME_LIMIT_S,
+            )
+        except subprocess.TimeoutExpired as fault:
+            raise SceneError(path, f"MuJoCo took more than {TIME_LIMIT_S} s to compile it", "Simplify it") from fault
+    if done.returncode != 0:
+        raise SceneError(path, _failure(done.returncode, done.stderr), REMEDY)
+    return model_of_binary(done.stdout)
+
+
+def _failure(code: int, messages: bytes) -> str:
+    """What went wrong in the process, in one line."""
+    words = " ".join(messages.decode(errors="replace").split())
+    if code == REFUSED:
+        return f"MuJoCo cannot use it ({words[-MESSAGE_LENGTH:]})"
+    how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    limit = f"it may use {MEMORY_LIMIT_BYTES >> 30} GiB of memory"
+    return f"MuJoCo ended with {how} when it compiled it; {limit} ({words[-MESSAGE_LENGTH:] or 'no message'})"
+
+
+def main() -> None:
+    """Compile the model that the command line names; the process's work."""
+    with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as output:
+        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what MuJoCo prints must not mix with the model
+        job = json.loads(sys.argv[1])
+        _limit_memory(job["memory_bytes"])
+        import mujoco
+
+        from clearway.rooms.obstacles import AgentShape, add_body
+        from clearway.rooms.render_worker import binary_model
+
+        try:
+            spec = mujoco.MjSpec.from_file(job["path"])
+            spec.compiler.discardvisual = False  # the agent's body collides with nothing, and must stay
+            add_body(spec, AgentShape(**job["agent"]))
+            model = spec.compile()
+            mujoco.mj_forward(model, mujoco.MjData(model))  # its data must fit as well
+            size = mujoco.mj_sizeModel(model)
+            if size > MODEL_LIMIT_BYTES:
+                raise ValueError(f"the compiled model has {size >> 20} MiB, more than {MODEL_LIMIT_BYTES >> 20}")
+        except (ValueError, TypeError, MemoryError, mujoco.FatalError, mujoco.UnexpectedError) as error:
+            print(f"{error}" or type(error).__name__, file=sys.stderr, flush=True)
+            sys.exit(REFUSED)
+        output.write(binary_model(model))
+
+
+def _limit_memory(limit_bytes: int) -> None:
+    """Bound the process's address space, where the system can."""
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (limit_bytes, limit_bytes))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""A floor plan as a furnished room, and the plan that the room's obstacles make."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+
+from clearway.rooms.light import bake
+from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
+from clearway.rooms.plans.decoration import decorate
+from clearway.rooms.plans.finish import finish_of
+from clearway.rooms.plans.layout import GAP, Layout, lay_out
+from clearway.rooms.plans.limits import check_can_be_rendered
+from clearway.rooms.plans.pieces import furnish
+from clearway.rooms.room import Room
+from clearway.rooms.shell import add_surfaces, add_walls
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.grid import neighbour_pairs
+
+HEIGHT_M = 2.6
+AGENT_RADIUS = 0.35  # cells: less than to a partition, more than half of what is open between two pieces
+CLEARANCE = 0.02  # cells
+LAYOUT_STREAM = 3  # of random numbers, beside the room's own
+
+
+def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True) -> tuple[Room, Layout]:
+    """The room of a plan, and where its parts stand. Its obstacles leave the plan's cells and edges open, no others.
+
+    Args:
+        plan: the plan. Its name and the seed choose furniture, colours and textures.
+        seed: 0 or more.
+        looks: bake the light, so that `room.spec.compile()` is ready to render (seconds); False gives obstacles only.
+
+    Raises:
+        SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
+    """
+    check_can_be_rendered(plan, seed)
+    layout = lay_out(plan, np.random.default_rng([seed, zlib.crc32(plan.name.encode()), LAYOUT_STREAM]))
+    first_m = (0.5 + GAP) * plan.cell_size_m
+    room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks)
+    columns = layout.walls + layout.partitions
+    add_walls(room, columns)
+    if looks:
+        add_surfaces(room, finish_of(room, layout), columns)
+    tops_m = furnish(room, layout.pieces, first_m)
+    decorate(room, layout, tops_m)
+    cells, edges = open_plan(room, layout)
+    assert _same(cells, plan.cells) and _same(edges, plan.cells[plan.edges]), f"the room of {plan.name} is another plan"
+    if looks:
+        bake(room, count_hidden=False)
+    return room, layout
+
+
+def open_plan(room: Room, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """The cells of the layout's map where an agent stands free of every obstacle, and the free moves between them.
+
+    Returns:
+        cells: (C, 2) int64, x and z in the plan's numbers; by x, then z.
+        edges: (E, 2, 2) int64, x and z of the two cells of each free move, the lower cell first.
+    """
+    size_m = layout.cell_size_m
+    agent = AgentShape(radius_m=AGENT_RADIUS * size_m, step_m=size_m, clearance_m=CLEARANCE * size_m)
+    obstacles = Obstacles(collision_model(room, agent), agent)
+    places = np.argwhere(np.ones(layout.free.shape, bool))
+    middles_m = layout.middles_m(places)
+    free = obstacles.standing_gaps_m(middles_m) > agent.clearance_m
+    cells, middles_m = places[free], middles_m[free]
+    pairs, axes = neighbour_pairs(cells)
+    clear = obstacles.moving_gaps_m(middles_m[pairs].mean(axis=1), axes) > agent.clearance_m
+    numbered = cells + np.array(layout.first_cell)
+    return numbered, numbered[pairs[clear]]
+
+
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two arrays hold the same rows, in whatever order."""
+    return np.array_equal(np.unique(one, axis=0), np.unique(other, axis=0))

@@ -1,0 +1,204 @@
+"""The transition rule, for many episodes at once: table look-ups only. Every environment here rests on it.
+
+Axis letters: N environments, K poses of history (newest last), M targets, G groups of targets.
+
+An episode starts in a pose drawn uniformly from those that can reach the target, itself excluded; its history is that
+pose K times. A blocked move leaves the agent where it is, and its repeated pose enters the history like any other. The
+episode ends in the exact target pose (`reached`), or is cut at the step limit (`truncated`); see Zhu et al., ICRA 2017.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from clearway.reward import Reward
+from clearway.world.streams import Streams
+from clearway.world.tables import World
+
+HISTORY_LENGTH = 4
+START_STREAM, TARGET_STREAM = 1, 2
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What one step did, for each environment.
+
+    Attributes:
+        state: (N,) int64, the pose arrived in.
+        reward: (N,) float32 (or the `reward_dtype` asked for).
+        reached: (N,) bool, the pose is the target.
+        truncated: (N,) bool, the step limit was met first.
+        blocked: (N,) bool, the move was blocked: one collision.
+        zone: (N,) int64, zone of the pose arrived in.
+    """
+
+    state: Tensor
+    reward: Tensor
+    reached: Tensor
+    truncated: Tensor
+    blocked: Tensor
+    zone: Tensor
+
+    @property
+    def ended(self) -> Tensor:
+        """(N,) bool: the episode is over, either way."""
+        return self.reached | self.truncated
+
+
+class TargetChoice:
+    """How a target is drawn for a new episode: by weight among the targets of the environment's group.
+
+    Args:
+        groups: (N,) int64, the group of each environment.
+        members: (G, J) int64, targets of each group, padded with any target.
+        weights: (G, J) float64, 0 at the padding; set anew at any time with `reweigh`.
+    """
+
+    def __init__(self, groups: Tensor, members: Tensor, weights: Tensor) -> None:
+        self.groups, self.members = groups, members
+        self.reweigh(weights)
+
+    def reweigh(self, weights: Tensor) -> None:
+        """Set the weights (G, J); 0 keeps a target from being drawn."""
+        self.weights = weights
+        total = weights.cumsum(1)
+        self.bounds = total / total[:, -1:]  # the last bound is exactly 1, above every uniform number
+
+    def draw(self, uniform: Tensor, index: Tensor | None = None) -> Tensor:
+        """Targets (B,) int64 for the environments in index (B,), all by default, from uniform numbers (B,) below 1."""
+        group = self.groups if index is None else self.groups[index]
+        column = (uniform[:, None] >= self.bounds[group]).sum(1)
+        return self.members[group, column]
+
+    @classmethod
+    def uniform(cls, world: World, env_count: int) -> TargetChoice:
+        """Every environment draws from all targets of the world alike."""
+        groups = torch.zeros(env_count, dtype=torch.int64, device=world.device)
+        members = torch.arange(world.target_count, device=world.device)[None]
+        return cls(groups, members, torch.ones(members.shape, dtype=torch.float64, device=world.device))
+
+    @classmethod
+    def by_scene(cls, world: World, env_scene: Tensor) -> TargetChoice:
+        """Every environment draws from the targets of its scene, env_scene (N,) int64."""
+        count = torch.bincount(world.target_scene, minlength=world.scene_count)
+        first = count.cumsum(0) - count
+        slot = torch.arange(int(count.max()), device=world.device)[None]
+        members = torch.minimum(first[:, None] + slot, (first + count - 1)[:, None])
+        return cls(env_scene, members, (slot < count[:, None]).to(torch.float64))
+
+
+class Navigation:
+    """N episodes side by side.
+
+    Args:
+        world: the tables.
+        reward: what is earned.
+        seeds: (N,) int64, one random stream an environment: environment i draws the same numbers in any batch.
+        choice: how targets are drawn; by default uniformly from all.
+        step_limit: steps after which an episode is truncated; None for no limit.
+        history_length: K.
+        reward_dtype: precision of the rewards.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        reward: Reward,
+        seeds: Tensor,
+        *,
+        choice: TargetChoice | None = None,
+        step_limit: int | None = None,
+        history_length: int = HISTORY_LENGTH,
+        reward_dtype: torch.dtype = torch.float32,
+    ) -> None:
+        count = len(seeds)
+        self.world, self.reward, self.step_limit = world, reward, step_limit
+        self.choice = choice or TargetChoice.uniform(world, count)
+        self.reward_table = torch.from_numpy(reward.table(world.moves())).to(world.device, reward_dtype)
+        seeds = seeds.to(world.device)
+        self.start_stream, self.target_stream = Streams(seeds, START_STREAM), Streams(seeds, TARGET_STREAM)
+        self.history = torch.zeros(count, history_length, dtype=torch.int64, device=world.device)
+        self.target = torch.zeros(count, dtype=torch.int64, device=world.device)
+        self.elapsed = torch.zeros(count, dtype=torch.int64, device=world.device)
+
+    @property
+    def state(self) -> Tensor:
+        """(N,) int64, where every agent is."""
+        return self.history[:, -1]
+
+    def reset(self, index: Tensor | None = None, target: Tensor | None = None, start: Tensor | None = None) -> None:
+        """Begin new episodes.
+
+        Args:
+            index: (B,) int64, the environments that begin anew; None for all.
+            target: (B,) int64, their targets; None to draw them.
+            start: (B,) int64, their first states; None to draw them.
+        """
+        if index is None:
+            index = torch.arange(len(self.target), device=self.world.device)
+        if target is None:
+            target = self.choice.draw(self.target_stream.at(index), index)
+        if start is None:
+            start = self._draw_start(self.start_stream.at(index), target)
+        self.target[index] = target
+        self.history[index] = start[:, None]
+        self.elapsed[index] = 0
+
+    def restart(self, ended: Tensor) -> None:
+        """Begin new episodes where `ended` (N,) is True, as `reset` does, without telling the host where that is.
+
+        Tensors are replaced, not written to.
+        """
+        target = self.choice.draw(self.target_stream.uniform(ended))
+        start = self._draw_start(self.start_stream.uniform(ended), target)
+        self.target = torch.where(ended, target, self.target)
+        self.history = torch.where(ended[:, None], start[:, None], self.history)
+        self.elapsed = torch.where(ended, 0, self.elapsed)
+
+    def reseed(self, seeds: Tensor, index: Tensor) -> None:
+        """Begin the random streams of the environments in index (B,) anew, from seeds (B,) int64."""
+        self.start_stream.reseed(seeds, index)
+        self.target_stream.reseed(seeds, index)
+
+    def step(self, action: Tensor) -> Transition:
+        """Move every agent by its action (N,) int64 and say what happened. Ended episodes wait for their `reset`."""
+        here = self.state
+        arrived = self.world.next_state[here, action]
+        blocked = self.world.blocked[here, action]
+        reached = arrived == self.world.target_state[self.target]
+        zone = self.world.zone[arrived]
+        self.history = torch.cat([self.history[:, 1:], arrived[:, None]], 1)
+        self.elapsed += 1
+        limit_met = torch.zeros_like(reached) if self.step_limit is None else self.elapsed >= self.step_limit
+        reward = self.earned(here, action, reached)
+        return Transition(arrived, reward, reached, limit_met & ~reached, blocked, zone)
+
+    def earned(self, state: Tensor, action: Tensor, reached: Tensor) -> Tensor:
+        """What actions (B,) earn in states (B,) int64, both, where they reach the target or not, (B,) bool."""
+        return self.reward_table[reached.long(), state, action]
+
+    def _draw_start(self, uniform: Tensor, target: Tensor) -> Tensor:
+        rank = (uniform * self.world.start_count[target]).long()
+        return self.world.start_state[self.world.start_offset[target] + rank]
+
+    def tensors(self) -> dict[str, Tensor]:
+        """All that `load_tensors` needs to go on from here."""
+        return {
+            "history": self.history,
+            "target": self.target,
+            "elapsed": self.elapsed,
+            "starts_drawn": self.start_stream.drawn,
+            "targets_drawn": self.target_stream.drawn,
+        }
+
+    def load_tensors(self, tensors: dict[str, Tensor]) -> None:
+        """Go on from where `tensors` was called."""
+        here = self.world.device
+        self.history = tensors["history"].to(here).clone()
+        self.target = tensors["target"].to(here).clone()
+        self.elapsed = tensors["elapsed"].to(here).clone()
+        self.start_stream.seek(tensors["starts_drawn"].to(here).clone())
+        self.target_stream.seek(tensors["targets_drawn"].to(here).clone())

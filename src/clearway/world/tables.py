@@ -1,0 +1,278 @@
+"""`World`: the look-up tables of a scene set, and the targets that are walked to in it.
+
+States of all scenes share one numbering. Tables are made once; `World.with_targets` gives them other targets and shares
+everything else.
+
+Axis letters: S states of all scenes, A actions, F features, M targets, C scenes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from clearway.choices import FeatureStore, ZoneLevel
+from clearway.clearance import scene_clearance_m
+from clearway.errors import SceneError
+from clearway.reward import Moves
+from clearway.scenes.actions import BLOCKED
+from clearway.scenes.graph import UNREACHABLE, next_states
+from clearway.scenes.scene import Scene
+from clearway.world.feature_store import LARGEST_FLOAT16, empty_store
+from clearway.world.targets import Starts, checked_states, starts_to
+from clearway.zones import scene_zones
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Tables of a scene set; all tensors on one device.
+
+    Attributes:
+        scene_names: name of each scene.
+        scene_offset: (C + 1,) int64, first state of each scene, and S at the end.
+        next_state: (S, A) int64; a blocked move leads back to its own state.
+        blocked: (S, A) bool.
+        zone: (S,) int64 (`zones.Zone`).
+        clearance_m: (S,) float64, distance to the nearest obstacle, see `clearance`.
+        largest_part: (C,) int64, states of each scene's largest strongly connected component.
+        features: (S, F) float32, or as `feature_store` says; None where the scenes have none.
+        target_state: (M,) int64, in the numbering of all scenes.
+        target_scene: (M,) int64, ascending.
+        start_state: (K,) int64, for target after target all states from which it can be reached, itself excluded.
+        start_steps: (K,) int64, the shortest-path distance of each of those starts.
+        start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
+        feature_store: where features are kept, see there.
+    """
+
+    scene_names: tuple[str, ...]
+    scene_offset: Tensor
+    next_state: Tensor
+    blocked: Tensor
+    zone: Tensor
+    clearance_m: Tensor
+    largest_part: Tensor
+    features: Tensor | None
+    target_state: Tensor
+    target_scene: Tensor
+    start_state: Tensor
+    start_steps: Tensor
+    start_offset: Tensor
+    start_count: Tensor
+    feature_store: FeatureStore = "memory"
+
+    @property
+    def scene_count(self) -> int:
+        """C."""
+        return len(self.scene_names)
+
+    @property
+    def target_count(self) -> int:
+        """M."""
+        return len(self.target_state)
+
+    @property
+    def state_count(self) -> int:
+        """S."""
+        return len(self.next_state)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the tables lie."""
+        return self.next_state.device
+
+    def mean_shortest_path(self) -> Tensor:
+        """Mean distance from all starts to each target, (M,) float64 steps."""
+        target = torch.repeat_interleave(torch.arange(self.target_count), self.start_count.cpu())
+        total = torch.zeros(self.target_count, dtype=torch.float64)
+        return total.index_add_(0, target, self.start_steps.cpu().double()) / self.start_count.cpu()
+
+    def distance_table(self) -> DistanceTable:
+        """Steps from states to targets, to be looked up."""
+        return DistanceTable(self)
+
+    def moves(self) -> Moves:
+        """What a reward's terms look at."""
+        tables = (self.next_state, self.blocked, self.zone, self.clearance_m)
+        return Moves(*(table.cpu().numpy() for table in tables))
+
+    def graph(self, scene: int) -> np.ndarray:
+        """Moves of one scene in its own numbering, (S of the scene, A) int64; -1 where one is blocked."""
+        first, last = self.scene_offset[scene : scene + 2].tolist()
+        onward = (self.next_state[first:last] - first).cpu().numpy()
+        return np.where(self.blocked[first:last].cpu().numpy(), BLOCKED, onward)
+
+    def with_targets(self, targets: Mapping[str, Sequence[int]]) -> World:
+        """The same tables, shared, with other targets; scenes that are not named have none.
+
+        Args:
+            targets: state ids by scene name, in the scene's own numbering; at least one.
+
+        Raises:
+            SceneError: a scene is not there, or a target is no state id, out of range, repeated or out of reach.
+        """
+        _check_names(self.scene_names, targets)
+        starts: list[Starts] = []
+        state, scene = [], []
+        for index, name in enumerate(self.scene_names):
+            if name not in targets:
+                continue
+            first, last = self.scene_offset[index : index + 2].tolist()
+            own = checked_states(name, targets[name], last - first)
+            starts += starts_to(name, self.graph(index), own, first, int(self.largest_part[index]))
+            state += [first + one for one in own]
+            scene += [index] * len(own)
+        count = np.array([len(one.state) for one in starts], np.int64)
+
+        def table(values: np.ndarray) -> Tensor:
+            return torch.from_numpy(values).to(self.device)
+
+        return replace(
+            self,
+            target_state=table(np.array(state, np.int64)),
+            target_scene=table(np.array(scene, np.int64)),
+            start_state=table(np.concatenate([one.state for one in starts])),
+            start_steps=table(np.concatenate([one.steps for one in starts])),
+            start_offset=table(np.cumsum(count) - count),
+            start_count=table(count),
+        )
+
+    def scene_state(self, target: int) -> int:
+        """The target's state in its own scene's numbering."""
+        return int(self.target_state[target] - self.scene_offset[self.target_scene[target]])
+
+    def to(self, device: torch.device | str) -> World:
+        """The same tables on another device."""
+        moved = {f.name: getattr(self, f.name) for f in fields(self)}
+        moved = {name: value.to(device) for name, value in moved.items() if isinstance(value, Tensor)}
+        return replace(self, **moved)
+
+
+class DistanceTable:
+    """Steps from states to targets. Only a target's own scene is kept, not all S states for each of the M targets.
+
+    Args:
+        world: the tables.
+    """
+
+    def __init__(self, world: World) -> None:
+        states = torch.diff(world.scene_offset)[world.target_scene]  # (M,) of the target's scene
+        self._first, self._states = world.scene_offset[world.target_scene], states
+        self._offset = states.cumsum(0) - states
+        self._steps = torch.full((int(states.sum()),), UNREACHABLE, dtype=torch.int32, device=world.device)
+        target = torch.repeat_interleave(torch.arange(world.target_count, device=world.device), world.start_count)
+        self._steps[(self._offset - self._first)[target] + world.start_state] = world.start_steps.int()
+        self._steps[self._offset + world.target_state - self._first] = 0
+
+    def __getitem__(self, index: tuple[Tensor | int, Tensor | int]) -> Tensor:
+        """Steps (...) int64 to targets (...) from states (...), int64 both: 0 at the target, -1 without a path."""
+        target, state = index
+        place = state - self._first[target]
+        inside = (place >= 0) & (place < self._states[target])
+        steps = self._steps[torch.where(inside, self._offset[target] + place, 0)]
+        return torch.where(inside, steps, UNREACHABLE).long()
+
+
+def make_world(
+    scenes: Sequence[Scene],
+    targets: Mapping[str, Sequence[int]],
+    zone_level: ZoneLevel = "pose",
+    feature_store: FeatureStore = "memory",
+) -> World:
+    """The tables of some scenes, with targets in each of them.
+
+    Args:
+        scenes: scenes with distinct names.
+        targets: state ids of each scene's targets by scene name, in the scene's own numbering.
+        zone_level: whether zones are those of poses or of cells.
+        feature_store: where to keep the features; features that lie in files are read scene by scene.
+
+    Raises:
+        SceneError: names repeat, a scene has no target, targets are given for a scene that is not there, a target is
+            no state id, out of range, repeated or out of reach, or the scenes' features do not belong together or fit
+            the store.
+        RunError: there is no room for the features.
+    """
+    names = [scene.name for scene in scenes]
+    _check_distinct(names)
+    _check_names(names, targets)
+    for name in names:
+        checked_states(name, targets.get(name, ()), scenes[names.index(name)].state_count)
+    return scene_tables(scenes, zone_level, feature_store).with_targets(targets)
+
+
+def scene_tables(
+    scenes: Sequence[Scene], zone_level: ZoneLevel = "pose", feature_store: FeatureStore = "memory"
+) -> World:
+    """The tables of some scenes, without targets; arguments and errors as of `make_world`."""
+    _check_distinct([scene.name for scene in scenes])
+    offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
+    graph = np.concatenate([_shifted(scene.graph, first) for scene, first in zip(scenes, offset, strict=False)])
+    none = torch.empty(0, dtype=torch.int64)
+    return World(
+        scene_names=tuple(scene.name for scene in scenes),
+        scene_offset=torch.from_numpy(offset),
+        next_state=torch.from_numpy(next_states(graph)),
+        blocked=torch.from_numpy(graph == BLOCKED),
+        zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
+        clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
+        largest_part=torch.tensor([np.count_nonzero(scene.components == 0) for scene in scenes]),
+        features=_joined_features(scenes, feature_store),
+        target_state=none,
+        target_scene=none,
+        start_state=none,
+        start_steps=none,
+        start_offset=none,
+        start_count=none,
+        feature_store=feature_store,
+    )
+
+
+def _shifted(graph: np.ndarray, first: int) -> np.ndarray:
+    return np.where(graph == BLOCKED, BLOCKED, graph.astype(np.int64) + first)
+
+
+def _check_distinct(names: Sequence[str]) -> None:
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise SceneError(name, "two scenes have this name", "Rename one of the files")
+
+
+def _check_names(names: Sequence[str], targets: Mapping[str, Sequence[int]]) -> None:
+    for name in targets:
+        if name not in names:
+            problem = "targets are given for this scene, which is not among the scenes"
+            raise SceneError(name, problem, f"Name targets of {', '.join(names)} alone, or add the scene")
+
+
+def _joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | None:
+    """The scenes' features one after the other, (S, F), or None where they have none."""
+    if all(scene.features is None for scene in scenes):
+        return None
+    first = scenes[0]
+    for scene in scenes:
+        if scene.features is None or first.features is None:
+            raise SceneError(scene.name, "only some of the scenes have features", "Encode all scenes together")
+        if scene.features.shape[1] != first.features.shape[1]:
+            sizes = f"{scene.features.shape[1]} features a state, {first.name} has {first.features.shape[1]}"
+            raise SceneError(scene.name, sizes, "Encode all scenes with the same encoder", "resnet_feature")
+        if _identity(scene) != _identity(first):
+            problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
+            raise SceneError(scene.name, problem, "Encode all scenes together with one encoder", "resnet_feature")
+    assert first.features is not None
+    joined = empty_store(sum(scene.state_count for scene in scenes), first.features.shape[1], store)
+    for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
+        features = np.asarray(scene.features, np.float32)
+        if store == "float16" and np.abs(features).max() > LARGEST_FLOAT16:
+            problem = f"holds features beyond {LARGEST_FLOAT16:,.0f}, the largest of float16"
+            raise SceneError(scene.name, problem, "Keep features in another store, mapped", "resnet_feature")
+        rows.numpy()[:] = features
+    return joined
+
+
+def _identity(scene: Scene) -> str:
+    return f"{scene.encoder.name} ({scene.encoder.identity})" if scene.encoder else "an unknown encoder"

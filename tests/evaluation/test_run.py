@@ -1,0 +1,51 @@
+"""Evaluation of a run: what stands beside its agent, and what is said of it."""
+
+from pathlib import Path
+
+import torch
+
+from clearway.evaluation.optimum import world_yardsticks
+from clearway.evaluation.run import _optima, evaluate_run
+from clearway.evaluation.tables import markdown_table
+from clearway.learn.load import load_agent
+from clearway.learn.train import train
+from clearway.reward import COLLISION_AWARE
+from helpers.made import grid_scene
+from helpers.small_runs import small_learner, small_request
+
+NAME = "collision-aware, beta -0.5"
+SCENE = grid_scene(3, width=9, depth=9, feature_count=12)
+
+
+def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> None:
+    request = small_request(
+        learner=small_learner(frames=160, clip_rewards=True),
+        reward=COLLISION_AWARE.with_changes(beta=-0.5),
+        zone_level="cell",
+    )
+    agent = load_agent(train(request, tmp_path / "run").path)
+    sampled, *others = evaluate_run(agent, request.scenes, episodes_per_target=1, step_cap=10)
+    found = sampled.to_json()["trained"]
+    assert found["frames"] == 160 and found["seed"] == 3 and found["zone_level"] == "cell"
+    assert found["reward"]["beta"] == -0.5 and found["reward"]["clip"]
+    told = f"{NAME}: 160 frames, seed 3, reward alpha -0.01, beta -0.5, gamma -0.011, terminal 10, clipped to "
+    assert markdown_table([sampled, *others]).count(f"{told}[-1, 1], zones of cells.") == 1
+    assert f"optimum ({NAME})" in [other.agent for other in others]  # not the unclipped one
+    assert [other.agent for other in others if other.trained] == [NAME] * 2  # the other ways to choose
+
+
+def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:
+    request = small_request(scenes=[SCENE], targets={SCENE.name: (5, 100)}, learner=small_learner(clip_rewards=True))
+    record, world = request.record(), request.trainer().world
+    state = torch.arange(world.state_count)
+    target = torch.zeros_like(state)
+    policies = []
+    for reward in (record.reward, record.paid):
+        (exact, _) = world_yardsticks(world, reward)
+        policies.append(torch.from_numpy(exact.yardstick.optimal_policy)[state])
+    assert not torch.allclose(*policies)
+    best = _optima(world, [record.paid])["optimum (collision-aware)"]
+    walking = state != world.target_state[0]
+    found = best(state[:, None].expand(-1, 4), target)[walking]
+    torch.testing.assert_close(found.double(), policies[1][walking], rtol=1e-5, atol=1e-6)
+    assert "optimum (collision-aware, unclipped)" in _optima(world, [record.reward])

@@ -1,0 +1,1 @@
+"""What several tests share: made-up scenes, small runs, stand-ins."""

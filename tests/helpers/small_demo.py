@@ -1,0 +1,38 @@
+"""The demo on a made-up room with a tiny network, for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import pytest
+
+from clearway.evaluation.run import evaluate_runs
+from clearway.scenes.scene import Scene
+from helpers.made import grid_scene
+from helpers.small_runs import FEATURES, small_learner
+
+ROOM_CELLS = (4, 3)
+
+
+def small_bathroom() -> Scene:
+    """What stands in for the bathroom; its features are there already."""
+    width, depth = ROOM_CELLS
+    return grid_scene(1, width=width, depth=depth, obstacle_share=0.1, feature_count=FEATURES, name="bathroom")
+
+
+def shrink_demo(patch: pytest.MonkeyPatch) -> None:
+    """Let the demo take the small room as it is, learn with few environments and walk few, short episodes."""
+
+    def room(name: str, *, progress: bool) -> Scene:
+        assert name == "bathroom"
+        return small_bathroom()
+
+    def encode(scenes: Sequence[Scene], encoder: str, *, progress: bool) -> list[Scene]:
+        return list(scenes)
+
+    patch.setattr("clearway.experiments.demo.cached_room_scene", room)
+    patch.setattr("clearway.experiments.demo.encode_scenes", encode)
+    patch.setattr("clearway.experiments.demo.DEFAULT", small_learner())
+    brief = partial(evaluate_runs, episodes_per_target=5, step_cap=60)
+    patch.setattr("clearway.experiments.demo.evaluate_runs", brief)

@@ -1,0 +1,46 @@
+"""The setting of experiments on two small scenes, with learners that finish in a blink."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from clearway.experiments.budget import SMOKE
+from clearway.experiments.plan import SceneFile
+from clearway.experiments.setting import Setting
+from clearway.learn.presets import DEFAULT, PAPER_A2C
+from clearway.learn.run_folder import scene_digest
+from clearway.scenes.scene import Scene
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from helpers.made import grid_scene
+from helpers.small_runs import FEATURES, small_learner
+
+BUDGET = replace(SMOKE, episodes_per_target=3, step_cap=60)
+
+
+def small_rooms() -> list[Scene]:
+    """Two grids, large enough for the experiments' targets."""
+    return [
+        grid_scene(seed, width=5, depth=5, obstacle_share=0.1, feature_count=FEATURES, name=name)
+        for seed, name in ((1, "bathroom"), (2, "kitchen"))
+    ]
+
+
+def small_setting(out: Path, seeds: int = 2) -> Setting:
+    """Both learners on two small rooms, three targets in one and two in the other."""
+    paths = []
+    for scene in small_rooms():
+        path = out / "scenes" / f"{scene.name}.h5"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_scene(scene, path)
+        paths.append(path)
+    scenes = tuple(read_scene(path) for path in paths)
+    return Setting(
+        out=out,
+        files=tuple(SceneFile(s.name, p, scene_digest(s)) for s, p in zip(scenes, paths, strict=True)),
+        scenes=scenes,
+        targets=((0, 13, 30), (5, 22)),
+        budget=BUDGET,
+        seeds=tuple(range(seeds)),
+        learners={"published": small_learner(PAPER_A2C), "default": small_learner(DEFAULT)},
+    )

@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from clearway.rooms.plans.layout import GAP, Layout, Piece, lay_out
+from clearway.rooms.shell import Column
+from clearway.scenes.floor_plans import FloorPlan
+from helpers.plan_maps import ELL, ISLAND, SINGLE, plan_of
+
+EXAMPLES = settings(max_examples=30, deadline=None, derandomize=True)
+
+
+def laid_out(plan: FloorPlan, seed: int = 0) -> Layout:
+    return lay_out(plan, np.random.default_rng(seed))
+
+
+def rectangle_of(piece: Piece) -> np.ndarray:
+    """Lowest and highest corner, (2, 2), of a piece's footprint."""
+    along_x_m, along_y_m = (
+        (piece.width_m, piece.depth_m) if piece.at.yaw_deg % 180 == 0 else (piece.depth_m, piece.width_m)
+    )
+    half = np.array([along_x_m, along_y_m]) / 2
+    middle = np.array([piece.at.x_m, piece.at.y_m])
+    return np.array([middle - half, middle + half])
+
+
+def column_of(column: Column) -> np.ndarray:
+    return np.array([[column.x_min_m, column.y_min_m], [column.x_max_m, column.y_max_m]])
+
+
+def places_m(plan: FloorPlan, layout: Layout) -> np.ndarray:
+    """Room coordinates of the plan's cells."""
+    return plan.cells * plan.cell_size_m - np.array(layout.origin_m)
+
+
+def distances_m(points_m: np.ndarray, rectangles: np.ndarray) -> np.ndarray:
+    """Larger of the distances along x and y from each point to each rectangle, (points, rectangles); 0 inside."""
+    low, high = rectangles[None, :, 0], rectangles[None, :, 1]
+    points_m = points_m[:, None]
+    return np.maximum(np.maximum(low - points_m, points_m - high), 0).max(axis=2)
+
+
+def test_a_wide_notch_is_wall_and_an_island_is_furniture() -> None:
+    ell, island = laid_out(plan_of("ell", ELL)), laid_out(plan_of("island", ISLAND))
+    assert len(ell.walls) > 0 and len(island.walls) == 0
+    corner = places_m(plan_of("ell", ELL), ell).max(axis=0)  # of the notch's far end
+    covered = distances_m(corner[None], np.array([column_of(wall) for wall in ell.walls]))
+    assert covered.min() == 0
+    middle_m = places_m(plan_of("island", ISLAND), island).mean(axis=0)
+    table = min(island.pieces, key=lambda piece: np.hypot(piece.at.x_m - middle_m[0], piece.at.y_m - middle_m[1]))
+    assert (table.at.x_m, table.at.y_m) == pytest.approx(tuple(middle_m))
+    # 2 x 2 cells of 0.5 m, drawn in by 0.2 cells on every side
+    assert (table.width_m, table.depth_m, table.back_at_wall) == (pytest.approx(0.8), pytest.approx(0.8), False)
+
+
+def test_a_blocked_edge_becomes_a_partition_on_the_border() -> None:
+    plan = plan_of("island", ISLAND, [[[0, 0], [1, 0]], [[5, 2], [5, 1]]])
+    layout = laid_out(plan)
+    first_m, last_m = places_m(plan, layout)[0], places_m(plan, layout).max(axis=0)
+    across, along = (column_of(partition) - first_m for partition in layout.partitions)
+    assert across == pytest.approx(np.array([[0.225, -0.25], [0.275, 0.25]]))  # 5 cm thick, as long as a cell
+    low, high = along + first_m
+    assert (low + high) / 2 == pytest.approx([last_m[0], first_m[1] + 0.75])
+    assert high - low == pytest.approx([0.5, 0.05])
+    assert all(partition.top_m is not None and 1.0 < partition.top_m < 1.5 for partition in layout.partitions)
+
+
+def test_one_cell_is_a_room_with_furniture() -> None:
+    layout = laid_out(plan_of("single", SINGLE))
+    assert layout.free.sum() == 1 and len(layout.pieces) >= 2
+    assert (
+        1.2 - 1e-9 <= layout.width_m <= 1.7 + 1e-9
+    )  # the cell, 0.5 m of furniture on one side or both, 0.2 m to the walls
+
+
+def test_furniture_faces_the_free_cells_with_its_back_to_the_wall() -> None:
+    plan = plan_of("row", ("....",))
+    layout = laid_out(plan)
+    row_m = places_m(plan, layout)[0, 1]
+    behind = [piece for piece in layout.pieces if piece.at.y_m > row_m + 0.3 and piece.width_m > 0.6]
+    before = [piece for piece in layout.pieces if piece.at.y_m < row_m - 0.3 and piece.width_m > 0.6]
+    assert behind or before
+    assert all(piece.at.yaw_deg == 180 and piece.back_at_wall for piece in behind)
+    assert all(piece.at.yaw_deg == 0 and piece.back_at_wall for piece in before)
+
+
+def test_stretches_lie_on_the_walls_of_the_room() -> None:
+    layout = laid_out(plan_of("ell", ELL))
+    outer = [stretch for stretch in layout.stretches if stretch.outer]
+    assert sum(stretch.length_m for stretch in outer) > 6
+    for stretch in outer:
+        wall_m = stretch.at.point(0, 0, 0)[:2]
+        gaps = [*wall_m, layout.width_m - wall_m[0], layout.depth_m - wall_m[1]]
+        assert min(np.abs(gaps)) < 1e-9
+        inside_m = stretch.at.point(0, 0.1, 0)[:2]
+        assert (inside_m > 0).all() and (inside_m < [layout.width_m, layout.depth_m]).all()
+    assert any(not stretch.outer and stretch.piece is None for stretch in layout.stretches)  # the notch's sides
+
+
+@EXAMPLES
+@given(
+    arrays(bool, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.booleans()).filter(np.any),
+    st.integers(0, 9),
+    st.sampled_from([0.25, 0.5, 1.3]),
+)
+def test_everything_keeps_its_distance_and_every_blocked_cell_is_covered(reachable, seed, cell_size_m) -> None:
+    plan = FloorPlan.of_map("any", reachable, cell_size_m=cell_size_m)
+    layout = laid_out(plan, seed)
+    solids = np.array([*map(column_of, layout.walls), *map(rectangle_of, layout.pieces)])
+    nearest_m = (0.5 + GAP) * cell_size_m
+    places = places_m(plan, layout)
+    beside = distances_m(places, solids)
+    # beside a corner, what stands diagonally ahead may come as near as the border of the cell
+    assert beside.min() > 0.5 * cell_size_m
+    straight = [
+        beside[row, number]
+        for row, place in enumerate(places)
+        for number, (low, high) in enumerate(solids)
+        if ((low < place) & (place < high)).any()
+    ]
+    assert min(straight, default=nearest_m) >= nearest_m - 1e-9
+    assert (places >= nearest_m - 1e-9).all()
+    assert (places <= [layout.width_m - nearest_m + 1e-9, layout.depth_m - nearest_m + 1e-9]).all()
+    blocked = layout.middles_m(np.argwhere(~layout.free))
+    assert (distances_m(blocked, solids).min(axis=1) == 0).all()
+    assert layout.free.sum() == len(plan.cells)
+
+
+def test_the_seed_chooses_the_walls_with_furniture() -> None:
+    plan = plan_of("island", ISLAND)
+    assert laid_out(plan, 3).pieces == laid_out(plan, 3).pieces
+    assert len({laid_out(plan, seed).free.shape for seed in range(12)}) > 1

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from clearway.rooms.frame import Frame
+from clearway.rooms.groups import OBSTACLE_GROUP
+from clearway.rooms.plans.layout import Piece
+from clearway.rooms.plans.pieces import ANYWHERE, LAST_RESORT, THEMES, Kind, furnish
+from clearway.rooms.room import Room
+
+KINDS = sorted({*(kind for theme in THEMES for kind in theme), *ANYWHERE, LAST_RESORT}, key=lambda kind: str(kind))
+NEAREST_M = 0.35
+MIDDLE_M = 5.0
+
+
+def room_with(pieces: list[Piece], seed: int = 0, *, looks: bool = False) -> tuple[Room, list[float]]:
+    room = Room("any", 2 * MIDDLE_M, 2 * MIDDLE_M, 2.6, (0.5, 0.5), seed, looks)
+    return room, furnish(room, pieces, NEAREST_M)
+
+
+def place(width_m: float, depth_m: float, back_at_wall: bool = False) -> Piece:
+    return Piece(Frame(MIDDLE_M, MIDDLE_M), width_m, depth_m, back_at_wall)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.place.__name__)
+def test_every_kind_fills_its_place_and_is_as_high_as_it_says(kind: Kind) -> None:
+    for end in (0, 1):
+        size_m = [max(0.1, min(side[end], 3.0)) for side in (kind.widths_m, kind.depths_m)]
+        room = Room("any", 2 * MIDDLE_M, 2 * MIDDLE_M, 2.6, (0.5, 0.5))
+        kind.place(room, Frame(MIDDLE_M, MIDDLE_M), *size_m)
+        for geom in room.spec.geoms:
+            if geom.group == OBSTACLE_GROUP:
+                reach_m = np.abs(geom.pos[:2] - MIDDLE_M) + geom.size[:2]
+                assert (reach_m <= np.array(size_m) / 2 + 1e-6).all()
+        tops_m, reaches_m = [], []
+        for part in room.parts:
+            corners_m = part.mesh.vertices_m @ part.rotation.T + part.position_m
+            tops_m.append(corners_m[:, 2].max())
+            if part.material not in ("leaf", "young leaf"):
+                reaches_m.append(np.abs(corners_m[:, :2] - MIDDLE_M).max(axis=0))
+        assert kind.top_m - 0.1 < max(tops_m) < 2.6 + 0.01
+        low = 0.3 if min(size_m) > 0.3 else 0.0  # smaller ones are narrower than the knick-knacks on them
+        assert (np.max(reaches_m, axis=0) > low * np.array(size_m)).all()
+
+
+def test_what_stands_in_a_place_can_be_seen_from_beside_it() -> None:
+    for seed in range(12):
+        for depth_m in (0.2, 0.5, 0.8, 1.4):
+            _, (top_m,) = room_with([place(1.4, depth_m)], seed)
+            seen_at_m = NEAREST_M + min(1.4, depth_m) / 2
+            assert top_m >= 1.0 - seen_at_m * math.tan(math.radians(30))
+
+
+def test_there_is_one_bed_at_most() -> None:
+    for seed in range(3):
+        room, tops_m = room_with([place(1.5, 0.5, True)] * 6 + [place(1.6, 2.0, True)] * 3, seed, looks=True)
+        assert len(tops_m) == 9
+        covers = sum(part.material == "duvet" for part in room.parts)
+        assert covers <= 1
+
+
+def test_a_place_that_nothing_fits_gets_a_cupboard() -> None:
+    _, tops_m = room_with([place(5.0, 4.0)])
+    assert tops_m == [LAST_RESORT.top_m]
+
+
+def test_the_seed_repeats_and_another_differs() -> None:
+    places = [place(1.2, 0.5, True)] * 8
+    assert room_with(places, 3)[1] == room_with(places, 3)[1]
+    assert len({tuple(room_with(places, seed)[1]) for seed in range(6)}) > 1

@@ -1,0 +1,185 @@
+"""The rooms of floor plans: what MuJoCo measures in them is the plan, and what the camera sees."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from clearway.errors import SceneError
+from clearway.rooms.camera import first_person_view
+from clearway.rooms.groups import SEEN_GROUP
+from clearway.rooms.plans import plan_room
+from clearway.rooms.plans.plan_room import build_plan_room, open_plan
+from clearway.rooms.render import render
+from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
+from clearway.scenes.floor_plans import FloorPlan
+from helpers.imported import imported_by
+from helpers.plan_maps import ELL, ISLAND, MAPS, plan_of
+
+EXAMPLES = settings(max_examples=25, deadline=None, derandomize=True)
+REAL_PLANS = Path(
+    os.environ.get("CLEARWAY_FLOOR_PLANS") or Path(__file__).parents[3] / "../shared/data/ithor_floor_plans.npz"
+)
+REAL_PLAN_COUNT = 48
+STEPS = {0: (0, 1), 90: (1, 0), 180: (0, -1), 270: (-1, 0)}
+
+
+def rows(array: np.ndarray) -> list:
+    return sorted(row.ravel().tolist() for row in array)
+
+
+def free_edges(plan: FloorPlan) -> list:
+    """Every pair of neighbouring cells that is not blocked, the lower cell first: by definition."""
+    cells = {tuple(cell) for cell in plan.cells.tolist()}
+    blocked = {frozenset(map(tuple, edge)) for edge in plan.blocked_edges.tolist()}
+    pairs = [((x, z), (x + dx, z + dz)) for x, z in cells for dx, dz in ((1, 0), (0, 1))]
+    return sorted([*a, *b] for a, b in pairs if b in cells and frozenset((a, b)) not in blocked)
+
+
+def assert_room_is_the_plan(plan: FloorPlan, seed: int = 0) -> None:
+    cells, edges = open_plan(*build_plan_room(plan, seed, looks=False))
+    assert rows(cells) == rows(plan.cells)
+    assert rows(edges) == free_edges(plan)
+
+
+@pytest.mark.parametrize("cell_size_m", [0.2, 0.25, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("name", MAPS)
+def test_the_obstacles_leave_exactly_the_plan_open(name: str, cell_size_m: float) -> None:
+    for seed in range(2):
+        assert_room_is_the_plan(plan_of(name, MAPS[name], cell_size_m=cell_size_m), seed)
+
+
+def test_a_blocked_edge_blocks_that_move_and_no_other() -> None:
+    blocked = [[[0, 0], [0, 1]], [[1, 0], [1, 1]], [[4, 2], [5, 2]]]  # two side by side, one across
+    for cell_size_m in (0.2, 0.5, 2.0):
+        assert_room_is_the_plan(plan_of("island", ISLAND, blocked, cell_size_m))
+
+
+def test_cells_may_lie_anywhere_in_any_order() -> None:
+    assert_room_is_the_plan(FloorPlan("far", np.array([[-7, 40], [-8, 40], [-3, 42]], np.int16)))
+
+
+@EXAMPLES
+@given(arrays(bool, st.tuples(st.integers(1, 9), st.integers(1, 9))).filter(np.any), st.integers(0, 99))
+def test_any_map_with_any_blocked_edges(reachable: np.ndarray, seed: int) -> None:
+    open_way = FloorPlan.of_map("any", reachable)
+    some = open_way.cells[open_way.edges][:: 1 + seed % 4]
+    assert_room_is_the_plan(FloorPlan.of_map("any", reachable, some), seed)
+
+
+def test_a_room_that_leaves_another_plan_open_is_not_passed_on(monkeypatch) -> None:
+    monkeypatch.setattr(plan_room, "furnish", lambda room, pieces, nearest_m: [0.0] * len(pieces))
+    with pytest.raises(AssertionError, match="the room of island is another plan"):
+        build_plan_room(plan_of("island", ISLAND), looks=False)
+
+
+@pytest.mark.parametrize(
+    ("plan", "seed", "message"),
+    [
+        (plan_of("fine", ("...",), cell_size_m=0.1), 0, r"fine: has cells of 0.1 m, those of 0.2 to 2.0 m"),
+        (plan_of("coarse", ("...",), cell_size_m=3.0), 0, r"coarse: has cells of 3.0 m"),
+        (plan_of("hall", ("." * 46,) * 46), 0, r"hall: has 2116 reachable cells, 2048 can be rendered"),
+        (FloorPlan("long", np.array([[0, 0], [200, 0]])), 0, r"long: spans 50.2 x 0.2 m, 40 m to a side"),
+        (FloorPlan("wide", np.array([[0, 0], [99, 99]])), 0, r"wide: spans 25.0 x 25.0 m, .* 400 square metres"),
+        (plan_of("ell", ELL), -1, r"ell: the seed must be 0 or more, found -1"),
+    ],
+)
+def test_plans_that_are_no_rooms(plan: FloorPlan, seed: int, message: str) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        build_plan_room(plan, seed, looks=False)
+    assert "\n" not in str(caught.value)
+
+
+def test_limits_need_no_simulator() -> None:
+    assert "mujoco" not in imported_by("import clearway.rooms.plans.limits")
+
+
+@dataclass(frozen=True)
+class Furnished:
+    """A plan with one blocked cell and one blocked edge, its compiled room, and the room coordinates of its cells."""
+
+    plan: FloorPlan
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    places_m: np.ndarray
+
+    def seen_m(self, place_m: np.ndarray, azimuth_deg: float, elevations_deg: np.ndarray) -> float:
+        """Distance across the floor to the nearest thing seen from 1 m above a place, in one direction."""
+        shown = np.zeros(6, np.uint8)
+        shown[SEEN_GROUP] = 1
+        azimuth, reached = np.radians(azimuth_deg), [np.inf]
+        for elevation in np.radians(elevations_deg):
+            flat = np.cos(elevation)
+            ray = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
+            hit = np.zeros(1, np.int32)
+            distance_m = mujoco.mj_ray(self.model, self.data, np.array([*place_m, 1.0]), ray, shown, 1, -1, hit)
+            if hit[0] >= 0 and self.model.geom(int(hit[0])).name != "floor":
+                reached.append(distance_m * flat)
+        return min(reached)
+
+
+@pytest.fixture(scope="module")
+def furnished() -> Furnished:
+    plan = plan_of("ring", ("...", ".#.", "..."), [[[0, 0], [0, 1]]])
+    room, layout = build_plan_room(plan)
+    model = room.spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return Furnished(plan, model, data, plan.cells * plan.cell_size_m - np.array(layout.origin_m))
+
+
+def test_no_camera_stands_in_anything(furnished: Furnished) -> None:
+    nearest_m = min(
+        furnished.seen_m(place_m, azimuth_deg, np.array([-25.0, 0.0, 25.0]))
+        for place_m in furnished.places_m
+        for azimuth_deg in range(0, 360, 30)
+    )
+    assert nearest_m > 0.2  # 0.4 cells; the near plane is at 0.05 m
+
+
+def test_a_blocked_move_shows_something_close_ahead(furnished: Furnished) -> None:
+    plan = furnished.plan
+    open_moves = {tuple(edge) for edge in plan.cells[plan.edges].reshape(-1, 4).tolist()}
+    blocked = 0
+    for (x, z), place_m in zip(plan.cells.tolist(), furnished.places_m, strict=True):
+        for heading_deg, (dx, dz) in STEPS.items():
+            if (x, z, x + dx, z + dz) in open_moves or (x + dx, z + dz, x, z) in open_moves:
+                continue
+            blocked += 1
+            ahead_m = furnished.seen_m(place_m, 90.0 - heading_deg, np.linspace(-29, 10, 14))
+            assert ahead_m < 1.0, (x, z, heading_deg)  # two cells
+    assert blocked == 4 * 3 + 4 + 2  # around, around the blocked cell, the edge from both its sides
+
+
+def real_plans() -> list[FloorPlan]:
+    if not REAL_PLANS.is_file():
+        pytest.skip(f"the real floor plans are not here: {REAL_PLANS}. Name the file with CLEARWAY_FLOOR_PLANS")
+    return [read_floor_plan(REAL_PLANS, name) for name in floor_plan_names(REAL_PLANS)]
+
+
+@pytest.mark.slow
+def test_all_real_plans_come_out_as_given() -> None:
+    plans = real_plans()
+    assert len(plans) == REAL_PLAN_COUNT
+    for plan in plans:
+        assert_room_is_the_plan(plan)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["FloorPlan302", "FloorPlan405"])
+def test_views_of_real_rooms_differ_and_are_well_lit(name: str) -> None:
+    plan = next(plan for plan in real_plans() if plan.name == name)
+    room, layout = build_plan_room(plan)
+    places_m = (plan.cells * plan.cell_size_m - np.array(layout.origin_m))[::9]
+    view = first_person_view(np.repeat(places_m, 4, axis=0), np.tile(list(STEPS), len(places_m)))
+    pictures = render(room.spec.compile(), view, workers=1)
+    assert len({picture.tobytes() for picture in pictures}) == len(pictures)
+    assert 60 < pictures.mean() < 170
