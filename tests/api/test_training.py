@@ -105,7 +105,7 @@ def test_a3c_by_name(corridor) -> None:
     [
         ({"algorithm": "sac"}, "algorithm='sac': no such algorithm. Use one of 'ppo', 'a2c', 'a3c'"),
         ({"algorithm": 3}, "no such algorithm"),
-        ({"learning_rate": 3}, "learning_rate: no such setting. Use one of frames, envs"),
+        ({"learning_rate": 3}, "learning_rate: no such setting. Use one of frames, centre_features"),
         ({"envs": 2.5}, r"envs=2\.5: expected a whole number"),
         ({"envs": True}, "envs=True: expected a whole number"),
         ({"discount": "0.9"}, r"discount='0\.9': expected a number"),

@@ -8,7 +8,7 @@ import pytest
 
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.policies import random_policy, shortest_path_policy
-from clearway.experiments import fig5, fig6, hard
+from clearway.experiments import fig5, fig6, hard_tables
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.scenes.scene import Scene
 from clearway.world.tables import make_world
@@ -54,14 +54,14 @@ def test_where_too_few_lie_apart_they_stand_as_far_as_they_can(cells: int, count
 
 def test_hard_targets_are_written_once_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     setting = small_setting(tmp_path)
-    first = hard.chosen(setting)
-    content = json.loads((tmp_path / hard.FILE).read_text())
+    first = hard_tables.chosen(setting)
+    content = json.loads((tmp_path / hard_tables.FILE).read_text())
     assert {name: found["targets"] for name, found in content["found"].items()} == {
         "bathroom": list(first[0]),
         "kitchen": list(first[1]),
     }
-    monkeypatch.setattr(hard, "hard_targets", lambda scene: pytest.fail("chosen again"))
-    assert hard.chosen(setting) == first
+    monkeypatch.setattr(hard_tables, "hard_targets", lambda scene: pytest.fail("chosen again"))
+    assert hard_tables.chosen(setting) == first
 
 
 @pytest.mark.parametrize("steps", [1, 2, 4, 50])

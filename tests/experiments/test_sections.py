@@ -12,7 +12,7 @@ from clearway.choices import ExperimentName
 from clearway.evaluation.episode_files import read_episodes
 from clearway.evaluation.episodes import EpisodeTable, episode_starts
 from clearway.evaluation.optimum import world_yardsticks
-from clearway.experiments import analysis, fig3, fig5, fig6, generalisation, hard, job, navigation_tables, table1
+from clearway.experiments import analysis, fig3, fig5, fig6, generalisation, hard_tables, job, navigation_tables, table1
 from clearway.experiments.analysis import pareto_front
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.groups import Scores, compared
@@ -267,10 +267,10 @@ def test_the_analysis_is_solved_once(setting: Setting, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"scenes": {}}', "[" * 10**5, "found"])
 def test_a_damaged_file_of_kept_results_is_made_anew(setting: Setting, sections: dict, damage: str) -> None:
     if damage == "found":
-        damage = json.dumps(json.loads((setting.out / hard.FILE).read_text()) | {"found": {}})
-    (setting.out / hard.FILE).write_text(damage)
+        damage = json.dumps(json.loads((setting.out / hard_tables.FILE).read_text()) | {"found": {}})
+    (setting.out / hard_tables.FILE).write_text(damage)
     assert EXPERIMENTS["table2"].section(setting) == sections["table2"]
-    assert json.loads((setting.out / hard.FILE).read_text())["rule"] == hard.RULE
+    assert json.loads((setting.out / hard_tables.FILE).read_text())["rule"] == hard_tables.RULE
 
 
 def test_pareto_front_by_hand() -> None:

@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from clearway.deploy.card import Card
-from clearway.deploy.model import Step
+from clearway.deploy.model import ModelOutput
 from clearway.deploy.onnx_file import shifted
 from clearway.scenes.sensors import rgb
 
@@ -28,13 +28,13 @@ class Sums:
         self.seconds = seconds
         self.batches: list[int] = []
 
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> Step:
+    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
         time.sleep(self.seconds)
         self.batches.append(len(seen))
         features = np.stack([seen.mean(axis=(1, 2, 3)), np.ones(len(seen))], axis=1).astype(np.float32)
         after = shifted(history, features, start)
         probabilities = np.array([[0.1, 0.2, 0.3, 0.4]], np.float32).repeat(len(seen), axis=0)
-        return Step(probabilities, after[:, :, :1].sum(1) + 1000 * target[:, :1], after)
+        return ModelOutput(probabilities, after[:, :, :1].sum(1) + 1000 * target[:, :1], after)
 
 
 def plain(level: int, size: tuple[int, int] = (3, 4)) -> np.ndarray:

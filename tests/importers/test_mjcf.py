@@ -9,7 +9,7 @@ from clearway.errors import SceneError
 from clearway.importers import limits
 from clearway.importers import mjcf as importer
 from clearway.importers.mjcf import read_mjcf
-from clearway.importers.mjcf_floor import World
+from clearway.importers.mjcf_floor import FloorChoice
 from clearway.rooms.obstacles import AgentShape
 from clearway.scenes.actions import Action
 from clearway.scenes.validate import pose_quirks
@@ -37,7 +37,7 @@ def columns_of(picture: np.ndarray, rgb: tuple[float, float, float]) -> np.ndarr
 
 
 def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
-    world = World(floor_m=2.0, camera_m=0.8, extent_m=(-1.3, 1.3, -3.3, 3.3), spawn_m=(0.0, 0.0))
+    world = FloorChoice(floor_m=2.0, camera_m=0.8, extent_m=(-1.3, 1.3, -3.3, 3.3), spawn_m=(0.0, 0.0))
     scene = read_mjcf(
         path, world, AgentShape(step_m=1.0), height_px=60, width_px=80, sensors=("rgb", "depth"), workers=1
     )
@@ -74,7 +74,7 @@ def test_hidden_geoms_and_limits_of_the_model_s_own_hide_nothing(path: Path) -> 
     hidden = '<geom type="box" size=".15 .15 .6" pos="1 3 2.5" group="3"/>'  # around the red post, to collide with
     far = '<statistic extent="200"/>'  # MuJoCo would draw nothing nearer than a hundredth of it
     path.write_text(WORLD.replace("</worldbody>", f"{hidden}</worldbody>{far}"))
-    world = World(floor_m=2.0, camera_m=0.8, extent_m=(0.7, 1.3, 0.7, 3.3), spawn_m=(1.0, 2.0))
+    world = FloorChoice(floor_m=2.0, camera_m=0.8, extent_m=(0.7, 1.3, 0.7, 3.3), spawn_m=(1.0, 2.0))
     scene = read_mjcf(path, world, AgentShape(step_m=1.0), height_px=30, width_px=40, workers=1)
     assert scene.locations_m[::4].tolist() == [[1.0, 1.0], [1.0, 2.0]]
     assert 20 in columns_of(scene.observations[4], RED)
@@ -87,10 +87,10 @@ def test_more_than_fits_is_refused_before_any_picture_is_taken(path: Path, monke
     monkeypatch.setattr(limits, "MAX_PICTURE_BYTES", 20 << 20)
     problem = r"\d+ pictures of 400 x 300 pixels take \d+ MiB of memory, expected at most 20\. .*--step"
     with pytest.raises(SceneError, match=problem):
-        read_mjcf(path, World(floor_m=2.0))
+        read_mjcf(path, FloorChoice(floor_m=2.0))
     monkeypatch.setattr(limits, "MAX_STATES", 8)
     with pytest.raises(SceneError, match=r"has \d+ poses on free cells, expected at most 8\. .*--step"):
-        read_mjcf(path, World(floor_m=2.0), height_px=30, width_px=40)
+        read_mjcf(path, FloorChoice(floor_m=2.0), height_px=30, width_px=40)
 
 
 def test_bodies_and_pictures_that_cannot_be_are_refused(path: Path) -> None:

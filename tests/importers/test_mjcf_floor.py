@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.importers.mjcf_floor import World, find_cells, floor_of
+from clearway.importers.mjcf_floor import FloorChoice, find_cells, floor_of
 from clearway.rooms import build_room
 from clearway.rooms.navigation import NavigationGrid, find_grid
 from clearway.rooms.obstacles import AgentShape, add_body
@@ -28,14 +28,14 @@ def model_of(words: str) -> mujoco.MjModel:
     return spec.compile()
 
 
-def grid_of(model: mujoco.MjModel, world: World) -> NavigationGrid:
+def grid_of(model: mujoco.MjModel, world: FloorChoice) -> NavigationGrid:
     agent, data = AgentShape(), mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     return find_cells(PATH, model, data, floor_of(PATH, model, data, world, agent.step_m), world, agent)
 
 
-def found(words: str, world: World | None = None) -> NavigationGrid:
-    return grid_of(model_of(f"<worldbody>{words}</worldbody>"), world or World())
+def found(words: str, world: FloorChoice | None = None) -> NavigationGrid:
+    return grid_of(model_of(f"<worldbody>{words}</worldbody>"), world or FloorChoice())
 
 
 def places(grid: NavigationGrid) -> list[tuple[float, float]]:
@@ -75,7 +75,7 @@ def test_one_of_our_own_rooms_keeps_its_cells_and_moves_through_a_file() -> None
     spec = mujoco.MjSpec.from_string(room.spec.to_xml())
     add_body(spec, AgentShape())
     x_m, z_m = expected.locations_m[0]
-    world = World(spawn_m=(float(x_m), float(z_m)), extent_m=(0.0, room.width_m, 0.0, room.depth_m))
+    world = FloorChoice(spawn_m=(float(x_m), float(z_m)), extent_m=(0.0, room.width_m, 0.0, room.depth_m))
     grid = grid_of(spec.compile(), world)
     np.testing.assert_allclose(grid.locations_m, expected.locations_m, atol=1e-6)
     np.testing.assert_array_equal(grid.graph, expected.graph)
@@ -84,7 +84,7 @@ def test_one_of_our_own_rooms_keeps_its_cells_and_moves_through_a_file() -> None
 def test_what_collides_with_nothing_is_only_seen_unless_asked() -> None:
     ghost = '<geom type="box" size=".05 .05 1" pos=".5 .5 1" contype="0" conaffinity="0"/>'
     assert len(found(ENDLESS_FLOOR + WALLS + ghost).cells) == 12
-    assert len(found(ENDLESS_FLOOR + WALLS + ghost, World(unfelt_too=True)).cells) == 11
+    assert len(found(ENDLESS_FLOOR + WALLS + ghost, FloorChoice(unfelt_too=True)).cells) == 11
 
 
 def test_bodies_stand_where_the_model_starts() -> None:
@@ -98,7 +98,7 @@ def test_meshes_block_their_convex_hull() -> None:
     asset = f'<asset><mesh name="spike" vertex="{corners}"/></asset>'
     words = f'{asset}<worldbody>{ENDLESS_FLOOR}{WALLS}<geom type="mesh" mesh="spike" pos=".5 .5 0"/></worldbody>'
     # MuJoCo puts a mesh's frame to its centre, and back by the geom's place
-    assert len(grid_of(model_of(words), World()).cells) == 11
+    assert len(grid_of(model_of(words), FloorChoice()).cells) == 11
 
 
 def test_a_plane_that_stands_is_a_wall() -> None:
@@ -134,23 +134,23 @@ def test_a_floor_counts_down_to_0_1_m_below_the_height_given(lower_m: float, col
 def test_a_floor_may_lie_at_any_height() -> None:
     storey = '<geom type="box" size="1.05 .8 .1" pos=".75 .5 2.9"/>'
     post = '<geom type="cylinder" size=".05 .5" pos=".5 .5 3.5"/>'
-    grid = found(ENDLESS_FLOOR + WALLS + storey + post, World(floor_m=3.0))
+    grid = found(ENDLESS_FLOOR + WALLS + storey + post, FloorChoice(floor_m=3.0))
     assert places(grid) == [place for place in FULL if place != (0.5, 0.5)]
 
 
 def test_the_spawn_point_sets_the_grid_and_the_part() -> None:
     divider = '<geom type="box" size=".05 1 1" pos="1.15 .5 1"/>'  # no room at x = 1
     assert len(found(ENDLESS_FLOOR + WALLS + divider).cells) == 6  # x = 0 and 0.5
-    grid = found(ENDLESS_FLOOR + WALLS + divider, World(spawn_m=(1.5, 0.25)))
+    grid = found(ENDLESS_FLOOR + WALLS + divider, FloorChoice(spawn_m=(1.5, 0.25)))
     assert places(grid) == [(1.5, 0.25), (1.5, 0.75)]
     with pytest.raises(SceneError, match=r"fits not at the spawn point \(1\.15, 0\)"):
-        found(ENDLESS_FLOOR + WALLS + divider, World(spawn_m=(1.15, 0.0)))
+        found(ENDLESS_FLOOR + WALLS + divider, FloorChoice(spawn_m=(1.15, 0.0)))
 
 
 def test_a_floor_reaches_as_far_as_finite_geoms_or_as_said() -> None:
     drawn = '<geom type="plane" size=".8 .55 1" pos=".5 .25 0"/>'  # x from -0.3 to 1.3, z from -0.3 to 0.8
     assert places(found(drawn)) == [place for place in FULL if place[0] < 1.3 and place[1] < 0.8]
-    assert len(found(ENDLESS_FLOOR, World(extent_m=(-0.3, 1.3, -0.3, 0.8))).cells) == 6
+    assert len(found(ENDLESS_FLOOR, FloorChoice(extent_m=(-0.3, 1.3, -0.3, 0.8))).cells) == 6
     with pytest.raises(SceneError, match=r"no geom of a finite size\. .*--extent"):
         found(ENDLESS_FLOOR)
 
@@ -169,7 +169,7 @@ def test_a_world_too_large_is_refused_before_any_work(
     extent_m: tuple[float, float, float, float], problem: str
 ) -> None:
     with pytest.raises(SceneError, match=problem):
-        found(ENDLESS_FLOOR, World(extent_m=extent_m))
+        found(ENDLESS_FLOOR, FloorChoice(extent_m=extent_m))
     far = '<geom type="sphere" size="1" pos="5000 5000 0"/>'
     with pytest.raises(SceneError, match=r"maze\.xml: its floor spans .* places to try.*--extent"):
         found(ENDLESS_FLOOR + WALLS + far)
@@ -178,9 +178,9 @@ def test_a_world_too_large_is_refused_before_any_work(
 @pytest.mark.parametrize("spawn_m", [(9.0, 0.0), (float("nan"), 0.0), (0.0, float("inf"))])
 def test_a_spawn_point_off_the_floor_is_refused(spawn_m: tuple[float, float]) -> None:
     with pytest.raises(SceneError, match=r"not to the spawn point \(.*--spawn"):
-        found(ENDLESS_FLOOR + WALLS, World(spawn_m=spawn_m))
+        found(ENDLESS_FLOOR + WALLS, FloorChoice(spawn_m=spawn_m))
 
 
 def test_no_cell_where_the_floor_is_smaller_than_the_agent() -> None:
     with pytest.raises(SceneError, match="fits nowhere"):
-        found(ENDLESS_FLOOR, World(extent_m=(0.1, 0.2, 0.1, 0.2)))
+        found(ENDLESS_FLOOR, FloorChoice(extent_m=(0.1, 0.2, 0.1, 0.2)))

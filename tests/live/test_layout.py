@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clearway.live.layout import (
-    Layout,
+    Arrangement,
     arranged,
     as_built,
     furniture_moved,
@@ -39,9 +39,9 @@ def test_a_moved_piece_blocks_other_cells(live):
 
 
 def test_bodies_of_a_layout_are_its_pieces_and_the_new_obstacle_out_of_sight_or_on_the_floor():
-    layout = Layout(((0.1, 0.2), (0.0, 0.0)))
+    layout = Arrangement(((0.1, 0.2), (0.0, 0.0)))
     assert layout.bodies_m == ((0.1, 0.2, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -10.0))
-    assert Layout((), (1.0, 2.0)).bodies_m == ((1.0, 2.0, 0.0),)
+    assert Arrangement((), (1.0, 2.0)).bodies_m == ((1.0, 2.0, 0.0),)
 
 
 def test_the_new_obstacle_stands_on_the_shortest_path_and_leaves_a_way(live, ends):

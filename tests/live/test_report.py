@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from clearway.live.episodes import LiveProtocol, LiveTable
-from clearway.live.layout import Layout
+from clearway.live.layout import Arrangement
 from clearway.live.report import LiveResult, summarise
 from clearway.live.settings import Perturbations
 from clearway.live.tables import agent_rows, compared_rows, markdown_tables, rich_tables
@@ -33,7 +33,9 @@ def table(**columns: list[float]) -> LiveTable:
         "changed": [False, False, False, False],
     }
     arrays = {name: np.array(values) for name, values in (plain | columns).items()}
-    return LiveTable(target=np.array([0, 0, 1, 1]), layouts=(Layout(()),) * 4, walks=(np.zeros((1, 3)),) * 4, **arrays)
+    return LiveTable(
+        target=np.array([0, 0, 1, 1]), layouts=(Arrangement(()),) * 4, walks=(np.zeros((1, 3)),) * 4, **arrays
+    )
 
 
 def wary() -> LiveTable:

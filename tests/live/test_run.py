@@ -13,8 +13,8 @@ from clearway.learn.load import Agent
 from clearway.live.agent import live_policy
 from clearway.live.episodes import LiveProtocol
 from clearway.live.room import LiveRoom
-from clearway.live.run import Stage, check_alike, finish_live, stages, walk_setting
-from clearway.live.settings import Perturbations, Setting
+from clearway.live.run import LiveScene, check_alike, finish_live, stages, walk_setting
+from clearway.live.settings import Condition, Perturbations
 from clearway.perception import depth_grid
 from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
@@ -81,8 +81,8 @@ def test_in_every_scene_its_own_layers_decide(live) -> None:
         for room in rooms:
             name = room.scene.name
             world = make_world([room.scene], {name: agent.record.targets[name]})
-            places.append(Stage(room, world, encoder, camera))
-        outcome = walk_setting(places, {"agent": agent}, Setting("none", Perturbations()), protocol)
+            places.append(LiveScene(room, world, encoder, camera))
+        outcome = walk_setting(places, {"agent": agent}, Condition("none", Perturbations()), protocol)
     ahead, turning = outcome.tables["agent"]
     for walk in ahead.walks:
         assert (np.diff(walk[:, 2]) == 0).all()

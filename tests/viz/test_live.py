@@ -8,8 +8,8 @@ from PIL import Image
 
 from clearway.live.episodes import LiveProtocol, run_live_episodes
 from clearway.live.report import Comparison, Figures, LiveResult, summarise
-from clearway.live.run import LiveOutcome, Stage
-from clearway.live.settings import REFERENCE, Perturbations, Setting
+from clearway.live.run import LiveOutcome, LiveScene
+from clearway.live.settings import REFERENCE, Condition, Perturbations
 from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
@@ -76,8 +76,8 @@ def test_the_view_is_what_the_agent_saw_in_that_episode() -> None:
     with studio(live.model, eye_view(), workers=1) as camera:
         table = run_live_episodes(live, world, uniform, Looking(), camera, REFERENCE, protocol)
         result = summarise("all", REFERENCE, {"uniform": (table,)}, seed=0)
-        outcome = LiveOutcome(Setting("all", REFERENCE), result, {"uniform": (table,)})
-        stage = Stage(live, world, encoder, camera)
+        outcome = LiveOutcome(Condition("all", REFERENCE), result, {"uniform": (table,)})
+        stage = LiveScene(live, world, encoder, camera)
         for episode, start in enumerate(seen[0]):
             x_m, z_m, heading_deg = table.walks[episode][0].tolist()
             np.testing.assert_array_equal(_view(stage, 0, outcome, episode, (x_m, z_m, heading_deg)), start)

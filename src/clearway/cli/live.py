@@ -15,7 +15,7 @@ from clearway.live.settings import MOST, REFERENCE, Perturbations
 
 if TYPE_CHECKING:
     from clearway.learn.load import Agent
-    from clearway.live.run import LiveOutcome, Stage
+    from clearway.live.run import LiveOutcome, LiveScene
 
 EPISODES, STEP_CAP = 10, 100
 
@@ -78,7 +78,7 @@ def evaluate_live(
 ) -> None:
     """Walk the episodes, print, leave live.json and live.md in the run folder, and draw what is asked for."""
     from clearway.learn.load import load_agent, run_scenes
-    from clearway.live.settings import Setting, label_of, sweep_settings
+    from clearway.live.settings import Condition, label_of, sweep_settings
     from clearway.scenes.scene import encoder_names
 
     check_at_least(1, episodes=episodes, step_cap=step_cap)
@@ -92,7 +92,7 @@ def evaluate_live(
     from clearway.live.tables import rich_tables
 
     check_alike(agents)
-    one = Setting(label_of(options.perturbations), options.perturbations)
+    one = Condition(label_of(options.perturbations), options.perturbations)
     settings = sweep_settings(options.strengths) if options.sweep else [one]
     history = next(iter(agents.values())).record.learner.history_length
     protocol = LiveProtocol(episodes, step_cap, seed, options.selection, history)
@@ -113,7 +113,7 @@ def evaluate_live(
     stdout_console().print(rich_tables(results, protocol, encoder))
 
 
-def _draw(folder: Path, places: list[Stage], outcomes: list[LiveOutcome]) -> None:
+def _draw(folder: Path, places: list[LiveScene], outcomes: list[LiveOutcome]) -> None:
     from clearway.viz.live import draw_live_pictures
 
     made = draw_live_pictures(folder, places, outcomes)

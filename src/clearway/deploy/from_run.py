@@ -11,7 +11,7 @@ import torch
 
 from clearway.deploy.card import Card
 from clearway.deploy.graph import PolicyGraph
-from clearway.deploy.model import Step
+from clearway.deploy.model import ModelOutput
 from clearway.deploy.onnx_file import shifted
 from clearway.errors import DeployError, EncoderError
 from clearway.learn.learner import OnFeatures
@@ -144,9 +144,9 @@ class RunModel:
         self._policy = PolicyGraph(chosen.agent, chosen.index)
         self.card: Card = chosen.card(self._encoder)
 
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> Step:
+    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
         """One step of B agents, see `AgentModel.step`."""
         after = shifted(history, self._encoder.encode(seen), start)
         with torch.inference_mode():
             probabilities, value = self._policy(torch.from_numpy(after), torch.from_numpy(target))
-        return Step(probabilities.numpy(), value.numpy(), after)
+        return ModelOutput(probabilities.numpy(), value.numpy(), after)

@@ -15,7 +15,7 @@ from clearway.errors import DeployError
 MAX_PICTURE_SIDE = 4_096  # pixels
 
 
-class Step(NamedTuple):
+class ModelOutput(NamedTuple):
     """What agents make of what they see.
 
     Attributes:
@@ -36,7 +36,7 @@ class AgentModel(Protocol):
     def card(self) -> Card:
         """What the agent is."""
 
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> Step:
+    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
         """One step of B agents, each with its own target.
 
         Args:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from clearway.deploy.card import EXPORT_AGAIN, Card, card_from_json
-from clearway.deploy.model import Step
+from clearway.deploy.model import ModelOutput
 from clearway.errors import DeployError
 
 CARD_KEY, CHECKSUM_KEY = "clearway", "clearway.sha256"
@@ -60,14 +60,14 @@ class OnnxModel:
         metadata = self._session.get_modelmeta().custom_metadata_map
         self.card: Card = card_from_json(metadata.get(CARD_KEY, ""), str(path))
 
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> Step:
+    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
         """One step of B agents, see `AgentModel.step`."""
         if self.card.takes_pictures:
             given = {"picture": seen, "start": start, "history": history, "target": target}
-            return Step(*self._session.run(["probabilities", "value", "history_after"], given))
+            return ModelOutput(*self._session.run(["probabilities", "value", "history_after"], given))
         after = shifted(history, seen, start)
         probabilities, value = self._session.run(["probabilities", "value"], {"history": after, "target": target})
-        return Step(probabilities, value, after)
+        return ModelOutput(probabilities, value, after)
 
 
 def shifted(history: np.ndarray, features: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Episode:
+class EpisodeSoFar:
     """One episode so far.
 
     Attributes:
@@ -43,7 +43,7 @@ class EpisodeRecord:
         del self._rows[:unused]
         self._dropped += unused
 
-    def episode(self, env: int) -> Episode:
+    def episode(self, env: int) -> EpisodeSoFar:
         """The episode in progress of one environment."""
         rows = np.stack([row[env] for row in self._rows[self._first[env] - self._dropped :]])
-        return Episode(rows[:, 0], rows[rows[:, 2] == 1, :2])
+        return EpisodeSoFar(rows[:, 0], rows[rows[:, 2] == 1, :2])

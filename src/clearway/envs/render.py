@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from clearway import colours
 from clearway.envs.floor_map import FloorMap
 from clearway.envs.marks import FINENESS, draw_agent, draw_bump, draw_target, paint_zone
-from clearway.envs.record import Episode
+from clearway.envs.record import EpisodeSoFar
 from clearway.scenes.scene import Scene
 from clearway.world.tables import World
 from clearway.zones import ZONE_NAMES, Zone
@@ -40,7 +40,7 @@ class Renderer:
         self._steps_to = world.distance_table()
         self._maps: dict[int, FloorMap] = {}
 
-    def rgb(self, episode: Episode, target: int) -> np.ndarray:
+    def rgb(self, episode: EpisodeSoFar, target: int) -> np.ndarray:
         """The frame, (height, width, 3) uint8.
 
         Args:
@@ -54,7 +54,7 @@ class Renderer:
         captions = ("view", "target", f"{scene.name} from above, a triangle for each heading")
         return np.asarray(_side_by_side(panels, captions, self._status(episode, target)))
 
-    def ansi(self, episode: Episode, target: int) -> str:
+    def ansi(self, episode: EpisodeSoFar, target: int) -> str:
         """The map as text: an arrow for the agent, T for the target, each cell by the worst zone of its headings."""
         index, states, _, goal = self._in_scene(episode, target)
         scene = self._scenes[index]
@@ -69,7 +69,7 @@ class Renderer:
         rows = [" ".join(text[x][z] for x in range(width)).rstrip() for z in reversed(range(depth))]
         return "\n".join([self._status(episode, target), *rows])
 
-    def _in_scene(self, episode: Episode, target: int) -> tuple[int, np.ndarray, np.ndarray, int]:
+    def _in_scene(self, episode: EpisodeSoFar, target: int) -> tuple[int, np.ndarray, np.ndarray, int]:
         """The target's scene; path, bumps and target state in that scene's own numbering."""
         index = int(self._target_scene[target])
         first = int(self._first[index])
@@ -84,7 +84,7 @@ class Renderer:
             self._maps[index] = FloorMap(self._scenes[index], self._scene_zones(index), size)
         return self._maps[index]
 
-    def _status(self, episode: Episode, target: int) -> str:
+    def _status(self, episode: EpisodeSoFar, target: int) -> str:
         here, bumps = int(episode.states[-1]), len(episode.bumps)
         to_go = int(self._steps_to[target, here])
         zone = ZONE_NAMES[self._zones[here]]

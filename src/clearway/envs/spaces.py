@@ -20,7 +20,7 @@ ObservationKind = Literal["features", "pictures"]
 OBSERVATION_KINDS = ("features", "pictures")
 
 
-class Features:
+class FeatureSource:
     """The features of states.
 
     Args:
@@ -50,7 +50,7 @@ class Features:
         return self._table[states]
 
 
-class Pictures:
+class PictureSource:
     """The first-person pictures of states by one sensor, read from the scenes when they are asked for.
 
     The pictures of the last call are kept, since an agent's history repeats them: a step reads one new picture.
@@ -124,7 +124,7 @@ def _power_of_two_above(values: np.ndarray) -> float:
     return float(2.0 ** np.ceil(np.log2(max(largest, 1.0))))
 
 
-Sources = dict[tuple[str, str], Features | Pictures]
+Sources = dict[tuple[str, str], FeatureSource | PictureSource]
 """Where observations come from, by the keys of the poses' and of the target's."""
 
 
@@ -141,10 +141,10 @@ def observation_sources(
     if isinstance(sensors, str) or not sensors or len(set(sensors)) < len(sensors):
         raise EnvError(f"sensors={sensors!r}: expected names, each once, such as ('rgb', 'depth')")
     if kind == "pictures":
-        return {_keys(name): Pictures(scenes, name) for name in sensors}
+        return {_keys(name): PictureSource(scenes, name) for name in sensors}
     if tuple(sensors) != (RGB,):
         raise EnvError(f"sensors={sensors!r}: features are of one encoder. Ask for observations='pictures'")
-    return {_keys(RGB): Features(world)}
+    return {_keys(RGB): FeatureSource(world)}
 
 
 def _keys(sensor: str) -> tuple[str, str]:

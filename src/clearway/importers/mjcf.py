@@ -16,7 +16,7 @@ import numpy as np
 from clearway.errors import SceneError
 from clearway.importers.limits import check_picture_count, check_picture_size
 from clearway.importers.mjcf_compile import compiled
-from clearway.importers.mjcf_floor import World, find_cells, floor_of, span_of
+from clearway.importers.mjcf_floor import FloorChoice, find_cells, floor_of, span_of
 from clearway.rooms.build import shaping_versions
 from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, first_person_view
 from clearway.rooms.navigation import Floor
@@ -38,7 +38,7 @@ SMALLER = "Give a smaller --extent or a larger --step"
 
 def read_mjcf(
     path: Path,
-    world: World | None = None,
+    world: FloorChoice | None = None,
     agent: AgentShape | None = None,
     *,
     name: str | None = None,
@@ -68,7 +68,7 @@ def read_mjcf(
         RenderError: MuJoCo cannot render on this machine.
     """
     check_names(sensors)
-    world, agent = world or World(), agent or AgentShape()
+    world, agent = world or FloorChoice(), agent or AgentShape()
     title = path.stem if name is None else name
     _check_body(path, agent)
     check_picture_size(path, height_px, width_px)

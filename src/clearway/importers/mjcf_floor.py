@@ -25,7 +25,7 @@ EXTENT = "--extent X_MIN X_MAX Z_MIN Z_MAX"
 
 
 @dataclass(frozen=True)
-class World:
+class FloorChoice:
     """What a model does not say of itself as a room.
 
     Attributes:
@@ -44,7 +44,7 @@ class World:
     unfelt_too: bool = False
 
 
-def floor_of(path: Path, model: mujoco.MjModel, data: mujoco.MjData, world: World, step_m: float) -> Floor:
+def floor_of(path: Path, model: mujoco.MjModel, data: mujoco.MjData, world: FloorChoice, step_m: float) -> Floor:
     """The rectangle that the agent may stand in.
 
     Raises:
@@ -92,7 +92,7 @@ def span_of(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.
 
 
 def find_cells(
-    path: Path, model: mujoco.MjModel, data: mujoco.MjData, floor: Floor, world: World, agent: AgentShape
+    path: Path, model: mujoco.MjModel, data: mujoco.MjData, floor: Floor, world: FloorChoice, agent: AgentShape
 ) -> NavigationGrid:
     """The cells where the agent fits, and the moves between them.
 

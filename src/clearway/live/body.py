@@ -24,7 +24,7 @@ EDGE_M = 0.1  # thickness of the walls around the floor
 
 
 @dataclass(frozen=True)
-class Step:
+class Motion:
     """What a step of the body did.
 
     Attributes:
@@ -86,11 +86,11 @@ class Body:
             gap_m = min(gap_m, mujoco.mj_geomDistance(self._model, self._data, self._agent, other, gap_m, None))
         return gap_m
 
-    def wait(self) -> Step:
+    def wait(self) -> Motion:
         """A step in place: a turn changes nothing about a round body."""
-        return Step(0.0, False, np.full(SAMPLES, self.gap_m()))
+        return Motion(0.0, False, np.full(SAMPLES, self.gap_m()))
 
-    def move(self, distance_m: float, heading_deg: float) -> Step:
+    def move(self, distance_m: float, heading_deg: float) -> Motion:
         """Move along a heading, backwards where the distance is negative, until done or in contact."""
         heading = np.radians(heading_deg)
         start_m, way_m = self.place_m, distance_m * np.array([np.sin(heading), np.cos(heading)])
@@ -99,9 +99,9 @@ class Body:
             self.stand_at(start_m + share * way_m)
             if self.touches:
                 share = self._draw_back(start_m, way_m, share - 1 / SAMPLES, share)
-                return Step(share * distance_m, True, gaps_m)
+                return Motion(share * distance_m, True, gaps_m)
             gaps_m[sample] = self.gap_m()
-        return Step(distance_m, False, gaps_m)
+        return Motion(distance_m, False, gaps_m)
 
     def _draw_back(self, start_m: np.ndarray, way_m: np.ndarray, free: float, touching: float) -> float:
         """Stand just before the contact between two shares of a way; returns the share travelled."""

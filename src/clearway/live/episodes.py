@@ -17,9 +17,9 @@ import torch
 from torch import Tensor
 
 from clearway.evaluation.episodes import ACTION_STREAM, episode_seeds
-from clearway.live.body import SAMPLES, Body, Step
+from clearway.live.body import SAMPLES, Body, Motion
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
-from clearway.live.layout import Layout, arranged, as_built, furniture_moved, with_obstacle_on_path
+from clearway.live.layout import Arrangement, arranged, as_built, furniture_moved, with_obstacle_on_path
 from clearway.live.room import LiveRoom
 from clearway.live.settings import Perturbations
 from clearway.model.policy import sampled
@@ -75,7 +75,7 @@ class LiveTable:
     close_s: np.ndarray
     near_s: np.ndarray
     changed: np.ndarray
-    layouts: tuple[Layout, ...]
+    layouts: tuple[Arrangement, ...]
     walks: tuple[np.ndarray, ...]
 
     def __len__(self) -> int:
@@ -168,7 +168,7 @@ class _Walker:
         self.target_m, self.target_heading_deg = scene.locations_m[target], float(scene.headings_deg[target])
         self.cell_size_m, self.turn_deg = scene.cell_size_m, scene.turn_deg
         self.changed = self.layout != as_built(live.room)
-        self.steps: list[Step] = []
+        self.steps: list[Motion] = []
         self.walk = [self._pose()]
 
     def _pose(self) -> tuple[float, float, float]:
@@ -199,7 +199,7 @@ class _Walker:
         return self._pose(), CAMERA_HEIGHT_M + self.draws.height_error_m(), self.draws.pitch_error_deg()
 
 
-def _layout(live: LiveRoom, start: int, target: int, draws: Draws) -> Layout:
+def _layout(live: LiveRoom, start: int, target: int, draws: Draws) -> Arrangement:
     """The layout of an episode."""
     layout, wanted = as_built(live.room), draws.perturbations
     if wanted.move_furniture:

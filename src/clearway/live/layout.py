@@ -27,7 +27,7 @@ Offset = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Layout:
+class Arrangement:
     """How a room is arranged.
 
     Attributes:
@@ -44,9 +44,9 @@ class Layout:
         new_m = OUT_OF_SIGHT_M if self.new_m is None else (*self.new_m, 0.0)
         return (*((x_m, z_m, 0.0) for x_m, z_m in self.moved_m), new_m)
 
-    def with_piece(self, piece: int, offset_m: Offset) -> Layout:
+    def with_piece(self, piece: int, offset_m: Offset) -> Arrangement:
         """The same with one piece moved."""
-        return Layout((*self.moved_m[:piece], offset_m, *self.moved_m[piece + 1 :]), self.new_m)
+        return Arrangement((*self.moved_m[:piece], offset_m, *self.moved_m[piece + 1 :]), self.new_m)
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,12 @@ class ArrangedRoom:
     spec: mujoco.MjSpec
 
 
-def as_built(room: CollisionRoom) -> Layout:
+def as_built(room: CollisionRoom) -> Arrangement:
     """Nothing moved, nothing new."""
-    return Layout(((0.0, 0.0),) * len(loose_obstacles(room.spec)))
+    return Arrangement(((0.0, 0.0),) * len(loose_obstacles(room.spec)))
 
 
-def arranged(room: CollisionRoom, layout: Layout) -> ArrangedRoom:
+def arranged(room: CollisionRoom, layout: Arrangement) -> ArrangedRoom:
     """The obstacles of a room in a layout."""
     spec = mujoco.MjSpec()
     offsets = iter(layout.moved_m)
@@ -91,7 +91,7 @@ def add_new_obstacle(body: mujoco.MjsBody, at_m: tuple[float, float, float], gro
 
 def furniture_moved(
     room: CollisionRoom, scene: Scene, start: int, target: int, most_m: float, rng: np.random.Generator
-) -> Layout:
+) -> Arrangement:
     """Each piece moved in a random direction by up to `most_m`, as far as it runs into nothing and a way remains.
 
     Args:
@@ -114,15 +114,15 @@ def furniture_moved(
 
 
 def with_obstacle_on_path(
-    room: CollisionRoom, scene: Scene, layout: Layout, start: int, target: int, rng: np.random.Generator
-) -> Layout:
+    room: CollisionRoom, scene: Scene, layout: Arrangement, start: int, target: int, rng: np.random.Generator
+) -> Arrangement:
     """The layout with a bin in a cell of a shortest path, if there is one that leaves another way; else as it was."""
     path = shortest_path(scene, start, target)
     ends = {scene.cells[start], scene.cells[target]}
     cells = [state for state in path if scene.cells[state] not in ends]
     for state in rng.permutation(np.unique(cells)).tolist() if cells else []:
         x_m, z_m = scene.locations_m[state].tolist()
-        tried = Layout(layout.moved_m, (x_m, z_m))
+        tried = Arrangement(layout.moved_m, (x_m, z_m))
         if way_remains(room, scene, tried, start, target):
             return tried
     return layout
@@ -139,7 +139,7 @@ def shortest_path(scene: Scene, start: int, target: int) -> list[int]:
     return path
 
 
-def way_remains(room: CollisionRoom, scene: Scene, layout: Layout, start: int, target: int) -> bool:
+def way_remains(room: CollisionRoom, scene: Scene, layout: Arrangement, start: int, target: int) -> bool:
     """Whether free moves of the grid still lead from the start to the target."""
     try:
         grid = find_grid(arranged(room, layout), AgentShape())
@@ -150,7 +150,7 @@ def way_remains(room: CollisionRoom, scene: Scene, layout: Layout, start: int, t
     return bool((apart_m.min(axis=1) < scene.cell_size_m / 10).all())
 
 
-def _runs_into(room: CollisionRoom, before: Layout, after: Layout, piece: int) -> bool:
+def _runs_into(room: CollisionRoom, before: Arrangement, after: Arrangement, piece: int) -> bool:
     """Whether a piece overlaps an obstacle or the floor's edge more than it did before."""
     overlap_m = [_overlaps_m(arranged(room, layout), piece) for layout in (before, after)]
     return bool((overlap_m[1] > overlap_m[0] + MOST_OVERLAP_M).any())

@@ -14,7 +14,7 @@ from clearway.live.agent import live_policy
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.report import LiveResult, summarise
 from clearway.live.room import LiveRoom, live_room
-from clearway.live.settings import Setting
+from clearway.live.settings import Condition
 from clearway.live.tables import markdown_tables
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
@@ -29,7 +29,7 @@ JSON_PART, MARKDOWN_PART = "live.part.json", "live.part.md"
 
 
 @dataclass(frozen=True)
-class Stage:
+class LiveScene:
     """One scene, ready to be walked in.
 
     Attributes:
@@ -49,7 +49,7 @@ class Stage:
 class LiveOutcome:
     """One setting: the result, and for each agent's name its episodes, a table a scene."""
 
-    setting: Setting
+    setting: Condition
     result: LiveResult
     tables: Mapping[str, tuple[LiveTable, ...]]
 
@@ -68,7 +68,7 @@ def check_alike(agents: Mapping[str, Agent]) -> None:
 
 
 @contextmanager
-def stages(agents: Mapping[str, Agent], scenes: Sequence[Scene]) -> Iterator[list[Stage]]:
+def stages(agents: Mapping[str, Agent], scenes: Sequence[Scene]) -> Iterator[list[LiveScene]]:
     """Build the rooms of the agents' scenes and open a camera in each, for the block.
 
     Raises:
@@ -84,7 +84,7 @@ def stages(agents: Mapping[str, Agent], scenes: Sequence[Scene]) -> Iterator[lis
             live = live_room(scene)
             encoder = encoder_from_record(record_of_encoder)
             world = make_world([scene], {scene.name: record.targets[scene.name]}, record.zone_level)
-            found.append(Stage(live, world, encoder, opened.enter_context(studio(live.model, eye_view()))))
+            found.append(LiveScene(live, world, encoder, opened.enter_context(studio(live.model, eye_view()))))
         yield found
 
 
@@ -100,9 +100,9 @@ def _encoder_record(scene: Scene) -> EncoderRecord:
 
 
 def walk_setting(
-    places: Sequence[Stage],
+    places: Sequence[LiveScene],
     agents: Mapping[str, Agent],
-    setting: Setting,
+    setting: Condition,
     protocol: LiveProtocol,
     show: Callable[[str], None] | None = None,
 ) -> LiveOutcome:

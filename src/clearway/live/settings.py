@@ -71,7 +71,7 @@ MOST = {
 
 
 @dataclass(frozen=True)
-class Setting:
+class Condition:
     """A row of a sweep: its label and what is changed."""
 
     label: str
@@ -96,14 +96,14 @@ def label_of(perturbations: Perturbations) -> str:
     return ", ".join(LABELS[name].format(value) for name, value in changed.items()) or "none"
 
 
-def sweep_settings(strengths: tuple[float, ...], reference: Perturbations = REFERENCE) -> list[Setting]:
+def sweep_settings(strengths: tuple[float, ...], reference: Perturbations = REFERENCE) -> list[Condition]:
     """Nothing changed; every perturbation alone, then all together, at every strength (a share of `reference`)."""
-    settings = [Setting("none", Perturbations())]
+    settings = [Condition("none", Perturbations())]
     for name, value in reference.to_json().items():
         for scaled in (reference.scaled(strength) for strength in strengths):
             single = scaled.alone(name)
-            settings.append(Setting(label_of(single), single))
+            settings.append(Condition(label_of(single), single))
             if isinstance(value, bool):
                 break
-    settings += [Setting(f"all, strength {strength:g}", reference.scaled(strength)) for strength in strengths]
+    settings += [Condition(f"all, strength {strength:g}", reference.scaled(strength)) for strength in strengths]
     return settings

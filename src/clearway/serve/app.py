@@ -65,7 +65,7 @@ class StepAnswer(BaseModel):
     step: int
 
 
-class Agent(BaseModel):
+class AgentDescription(BaseModel):
     """What the agent is."""
 
     scene: str
@@ -107,10 +107,10 @@ def make_app(service: Service) -> FastAPI:
         return Response(service.metrics.text(), media_type="text/plain; version=0.0.4")
 
     @app.get("/agent", dependencies=token, responses=_faults("unauthorised"))
-    async def agent() -> Agent:
+    async def agent() -> AgentDescription:
         """What the agent is."""
         card = service.card
-        return Agent(
+        return AgentDescription(
             scene=card.scene,
             actions=list(card.actions),
             history_length=card.history_length,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.deploy.model import AgentModel, Step
+from clearway.deploy.model import AgentModel, ModelOutput
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 
@@ -33,7 +33,7 @@ class Waiting:
     seen: np.ndarray
     history: np.ndarray | None
     target: np.ndarray | None
-    answer: asyncio.Future[Step]
+    answer: asyncio.Future[ModelOutput]
 
 
 class Batcher:
@@ -56,7 +56,7 @@ class Batcher:
         """Pictures that wait."""
         return len(self._waiting)
 
-    async def step(self, seen: np.ndarray, history: np.ndarray | None, target: np.ndarray | None) -> Step:
+    async def step(self, seen: np.ndarray, history: np.ndarray | None, target: np.ndarray | None) -> ModelOutput:
         """What the model makes of one picture, its row alone; see `Waiting`. Forgotten when cancelled.
 
         Raises:
@@ -94,7 +94,7 @@ class Batcher:
         self._waiting = deque(asked for asked in live if id(asked) not in chosen)
         return batch
 
-    def _compute(self, batch: list[Waiting]) -> tuple[list[Step], float]:
+    def _compute(self, batch: list[Waiting]) -> tuple[list[ModelOutput], float]:
         card, begun = self._model.card, time.perf_counter()
         blank = np.zeros((card.history_length, card.feature_count), np.float32)
         step = self._model.step(
@@ -103,5 +103,5 @@ class Batcher:
             np.stack([blank if asked.history is None else asked.history for asked in batch]),
             np.stack([blank[0] if asked.target is None else asked.target for asked in batch]),
         )
-        rows = [Step(*(part[row].copy() for part in step)) for row in range(len(batch))]
+        rows = [ModelOutput(*(part[row].copy() for part in step)) for row in range(len(batch))]
         return rows, time.perf_counter() - begun

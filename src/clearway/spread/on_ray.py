@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from uuid import uuid4
 
 from clearway.errors import ClearwayError, RunError
 from clearway.ray_cluster import connected
+from clearway.spread.messages import to_message
 from clearway.spread.worker import done, packed
 from clearway.spread.workers import Part, Result, Tool, Work
 
@@ -37,7 +37,7 @@ def on_ray(
         under_way: set[Any] = set()
 
         def submit(part: Part) -> Future[Result]:
-            reference = remote.remote(dict(work.environment), key, [message], pickle.dumps(part))
+            reference = remote.remote(dict(work.environment), key, [message], to_message(part))
             under_way.add(reference)
             told: Future[Result] = Future()
 

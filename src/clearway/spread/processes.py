@@ -8,7 +8,6 @@ subprocesses rather than `multiprocessing`'s: their environment can differ from 
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import cached_property
 from typing import IO, Any
 
+from clearway.spread.messages import from_message, to_message
 from clearway.spread.worker import packed, read_message, write_message
 from clearway.spread.workers import Part, Result, Tool, Work
 
@@ -75,7 +75,7 @@ class _Crew:
         Raises:
             ClearwayError: what `work.died` makes of a process that died, or what the part raised.
         """
-        message = pickle.dumps(part, pickle.HIGHEST_PROTOCOL)
+        message = to_message(part)
         attempt = 0
         while True:
             attempt += 1
@@ -160,7 +160,7 @@ class _Process:
         answer = read_message(self.process.stdout)
         if answer is None:
             raise self._death()
-        succeeded, result = pickle.loads(answer)
+        succeeded, result = from_message(answer)
         if not succeeded:
             raise result
         return result

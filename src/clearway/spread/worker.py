@@ -1,20 +1,21 @@
 """What a worker does, a process of this machine or one of Ray's: set up once, then part after part.
 
 A process of this machine reads messages from standard input: first what `packed` makes of the work, then part after
-part; it answers each on standard output. A message is its length, 8 bytes, and a pickle; only processes that started
-each other exchange them. When standard input ends, its parent is gone, and it ends at once.
+part; it answers each on standard output. A message is its length, 8 bytes, and what `messages` makes of an object; only
+processes that started each other exchange them. When standard input ends, its parent is gone, and it ends at once.
 """
 
 from __future__ import annotations
 
 import os
-import pickle
 import sys
 import threading
 import traceback
 from collections.abc import Callable
 from queue import SimpleQueue
 from typing import IO, Any
+
+from clearway.spread.messages import from_message, to_message
 
 ORPHANED = 1  # exit codes; nobody is left to see this one
 INTERRUPTED = 130
@@ -25,7 +26,7 @@ _set_up: dict[str, tuple[Callable[[Any, Any], Any], Any]] = {}  # by key, one at
 
 def packed(set_up: Callable[[], Any], do: Callable[[Any, Any], Any]) -> bytes:
     """A work as a message."""
-    return pickle.dumps((set_up, do), pickle.HIGHEST_PROTOCOL)
+    return to_message((set_up, do))
 
 
 def done(key: str, work: Callable[[], bytes], part: bytes) -> Any:
@@ -34,14 +35,14 @@ def done(key: str, work: Callable[[], bytes], part: bytes) -> Any:
     Args:
         key: of the work; a process sets up again when it gets another.
         work: gives what `packed` made; asked only to set up.
-        part: a pickle.
+        part: a message.
     """
     if key not in _set_up:
         _set_up.clear()
-        set_up, do = pickle.loads(work())
+        set_up, do = from_message(work())
         _set_up[key] = do, set_up()
     do, tool = _set_up[key]
-    return do(tool, pickle.loads(part))
+    return do(tool, from_message(part))
 
 
 def write_message(stream: IO[bytes], message: bytes) -> None:
@@ -70,13 +71,13 @@ def main() -> None:
     while True:
         part = messages.get()
         try:
-            answer = pickle.dumps((True, done("", lambda: work[0], part)), pickle.HIGHEST_PROTOCOL)
+            answer = to_message((True, done("", lambda: work[0], part)))
             work.clear()  # it may be large
         except KeyboardInterrupt as error:
-            write_message(answers, pickle.dumps((False, error)))
+            write_message(answers, to_message((False, error)))
             sys.exit(INTERRUPTED)
         except Exception as error:  # whatever it is, the parent raises it
-            answer = pickle.dumps((False, _sendable(error)))
+            answer = to_message((False, _sendable(error)))
         write_message(answers, answer)
 
 
@@ -91,7 +92,7 @@ def _sendable(error: Exception) -> Exception:
     """The error with where it was raised, or one with its words where it cannot be sent."""
     told = "".join(traceback.format_exception(error))
     try:
-        pickle.loads(pickle.dumps(error))
+        from_message(to_message(error))
     except Exception:  # whatever its own pickling raises
         return RuntimeError(told)
     error.add_note(f"in a worker:\n{told}")

@@ -11,7 +11,7 @@ import numpy as np
 from clearway import colours
 from clearway.live.draws import Draws
 from clearway.live.report import LiveResult
-from clearway.live.run import LiveOutcome, Stage
+from clearway.live.run import LiveOutcome, LiveScene
 from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
 from clearway.rooms.topview import render_top_view
 from clearway.scenes.actions import BLOCKED, Action
@@ -32,7 +32,7 @@ COLUMNS, COLUMN_IN, PAIR_IN = 3, 2.8, 4.4
 VIEW_MOVES = 3  # the view that shows a new obstacle is taken from at most so far
 
 
-def draw_live_pictures(folder: Path, places: Sequence[Stage], outcomes: Sequence[LiveOutcome]) -> list[Path]:
+def draw_live_pictures(folder: Path, places: Sequence[LiveScene], outcomes: Sequence[LiveOutcome]) -> list[Path]:
     """Draw the figures by setting, and for each scene one episode under every setting; returns the paths."""
     made = [folder / "live.png"]
     draw_live_figures([outcome.result for outcome in outcomes], made[0])
@@ -71,7 +71,7 @@ def _draw_panel(axes: Axes, results: Sequence[LiveResult], metric: str, scale: f
     axes.tick_params(length=0)
 
 
-def draw_live_episode(stage: Stage, scene_index: int, outcomes: Sequence[LiveOutcome], path: Path) -> None:
+def draw_live_episode(stage: LiveScene, scene_index: int, outcomes: Sequence[LiveOutcome], path: Path) -> None:
     """The same episode under every setting: the walks from above, and below what the agent sees at one pose."""
     episode = _telling_episode(outcomes, scene_index)
     pose = _telling_pose(stage, scene_index, outcomes, episode)
@@ -98,7 +98,7 @@ def _telling_episode(outcomes: Sequence[LiveOutcome], scene_index: int) -> int:
 
 
 def _telling_pose(
-    stage: Stage, scene_index: int, outcomes: Sequence[LiveOutcome], episode: int
+    stage: LiveScene, scene_index: int, outcomes: Sequence[LiveOutcome], episode: int
 ) -> tuple[float, float, float]:
     """A pose from which free moves lead to the place of a new obstacle, if a setting has one; else the start's."""
     scene = stage.live.scene
@@ -124,7 +124,7 @@ def _moves_to(scene: Scene, state: int, place_m: np.ndarray) -> int:
     return 0
 
 
-def _draw_from_above(axes: Axes, stage: Stage, scene_index: int, outcome: LiveOutcome, episode: int) -> None:
+def _draw_from_above(axes: Axes, stage: LiveScene, scene_index: int, outcome: LiveOutcome, episode: int) -> None:
     live = stage.live
     first = next(iter(outcome.tables.values()))[scene_index]
     moved_m = first.layouts[episode].bodies_m
@@ -141,7 +141,7 @@ def _draw_from_above(axes: Axes, stage: Stage, scene_index: int, outcome: LiveOu
 
 
 def _view(
-    stage: Stage, scene_index: int, outcome: LiveOutcome, episode: int, pose: tuple[float, float, float]
+    stage: LiveScene, scene_index: int, outcome: LiveOutcome, episode: int, pose: tuple[float, float, float]
 ) -> np.ndarray:
     """What the agent would see at a pose, first of all in this setting's episode, (height, width, 3) uint8."""
     table = next(iter(outcome.tables.values()))[scene_index]

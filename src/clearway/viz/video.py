@@ -12,7 +12,7 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from clearway import colours
-from clearway.envs.record import Episode
+from clearway.envs.record import EpisodeSoFar
 from clearway.envs.render import Renderer
 from clearway.errors import ClearwayError
 from clearway.evaluation.episodes import Trajectory
@@ -64,7 +64,7 @@ def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
     blocked = shown.world.blocked.numpy()[states[:-1], actions]
     for step in range(len(states)):
         bumps = np.stack([states[:step], actions[:step]], axis=1)[blocked[:step]]
-        picture = Image.fromarray(renderer.rgb(Episode(states[: step + 1], bumps), shown.target))
+        picture = Image.fromarray(renderer.rgb(EpisodeSoFar(states[: step + 1], bumps), shown.target))
         chosen = int(actions[step]) if step < len(actions) else None
         thought = None if shown.probabilities is None else shown.probabilities[step]
         yield np.asarray(_with_strip(picture, thought, chosen))

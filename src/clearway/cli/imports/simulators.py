@@ -97,14 +97,14 @@ class ImportMjcf:
         check_sees(self.encoding.encoder, self.sensors)
         check_mujoco()
         from clearway.importers.mjcf import read_mjcf
-        from clearway.importers.mjcf_floor import World
+        from clearway.importers.mjcf_floor import FloorChoice
         from clearway.rooms.obstacles import AgentShape
 
         workers, ray = self.encoding.workers, self.encoding.ray
         with kept_connected(ray, workers):
             scene = read_mjcf(
                 self.file,
-                World(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
+                FloorChoice(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
                 AgentShape(self.agent_radius, self.agent_height, self.step),
                 name=self.name or place_name(self.file),
                 height_px=self.height,

@@ -34,7 +34,7 @@ from clearway.world.tables import World
 
 
 @dataclass(frozen=True)
-class Segments:
+class WorkerSegments:
     """What R workers saw in up to T steps each.
 
     Attributes:
@@ -144,7 +144,7 @@ class WorkerGroup:
         }
         return Round(steps, updates, totals, figures)
 
-    def _walk(self, totals: Tensor) -> Segments:
+    def _walk(self, totals: Tensor) -> WorkerSegments:
         """Walk until T steps are taken or the episode ends; new episodes begin at once, to be walked in next round."""
         nav, steps = self.navigation, self.learner.rollout_steps
         shape = steps, len(self.target)
@@ -164,7 +164,7 @@ class WorkerGroup:
             walking = walking & ~step.ended
         self.local.output_at(steps)
         nav.reset(torch.nonzero(~walking)[:, 0], target=self.target[~walking])
-        return Segments(reward, action, walked, ended, cut)
+        return WorkerSegments(reward, action, walked, ended, cut)
 
     def _step(self, action: Tensor, walking: Tensor) -> Transition:
         """Move the workers that still walk; the others stay as they are (their part of the result means nothing)."""
@@ -188,7 +188,7 @@ class WorkerGroup:
             totals.index_add_(0, self.target[ended], rows)
             self.open_collisions[ended] = 0
 
-    def _loss(self, segments: Segments, settings: LossSettings) -> tuple[LossTerms, Tensor, float]:
+    def _loss(self, segments: WorkerSegments, settings: LossSettings) -> tuple[LossTerms, Tensor, float]:
         """The loss of all steps taken, its gradient (R, T, A + 1), and the explained variance of the values."""
         learner, taken = self.learner, segments.walked
         output = self.local.output.transpose(0, 1)  # (T + 1, R, A + 1)
@@ -219,7 +219,7 @@ class WorkerGroup:
         explained = 1 - batch.advantage.var(correction=0) / batch.value_target.var(correction=0).clamp_min(1e-12)
         return terms, placed.transpose(0, 1), float(explained)
 
-    def _value_at_cuts(self, segments: Segments, value: Tensor) -> Tensor:
+    def _value_at_cuts(self, segments: WorkerSegments, value: Tensor) -> Tensor:
         """(T, R) discounted value of the pose where an episode was cut, to be added to that step's reward; else 0."""
         bonus = torch.zeros_like(segments.reward)
         if self.learner.bootstrap_cut:
