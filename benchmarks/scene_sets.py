@@ -10,7 +10,7 @@ import torch
 
 from clearway.errors import SceneError
 from clearway.learn.presets import DEFAULT
-from clearway.learn.setup import fitted_features
+from clearway.model.feature_map import fitted_features
 from clearway.perception import encode_scenes
 from clearway.rooms import ROOM_NAMES
 from clearway.rooms.library import cached_room_scene

@@ -3,13 +3,20 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
 from clearway.choices import FeatureStore
 from clearway.model import feature_map
-from clearway.model.feature_map import FeatureMap, prepared_features, principal_directions
+from clearway.model.feature_map import (
+    FeatureMap,
+    all_finite,
+    evenly_spaced,
+    prepared_features,
+    principal_directions,
+)
 from helpers.small_runs import small_world
 
 
@@ -122,3 +129,17 @@ def test_features_of_many_states_are_prepared_block_by_block(
     assert blocks.dtype == (torch.float16 if store == "float16" else torch.float32)
     tolerance = 2e-3 if store == "float16" else 1e-5
     assert torch.allclose(blocks.float(), whole, atol=tolerance, rtol=tolerance)
+
+
+def test_evenly_spaced_rows() -> None:
+    features = torch.arange(10.0)[:, None].half()
+    assert evenly_spaced(features, 4)[:, 0].tolist() == [0, 3, 6, 9]
+    assert evenly_spaced(features, 4).dtype == torch.float32
+    assert torch.equal(evenly_spaced(features, 10), features.float())
+
+
+def test_one_feature_that_is_not_finite_is_found() -> None:
+    features = torch.zeros(20_000, 2)
+    assert all_finite(features)
+    features[19_999, 1] = np.inf
+    assert not all_finite(features)

@@ -4,14 +4,13 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 
 from clearway.choices import FeatureStore
 from clearway.errors import RunError, SceneError
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.world.feature_store import all_finite, empty_store, evenly_spaced
+from clearway.world.feature_store import empty_store
 from clearway.world.tables import World, make_world
 from helpers.made import corridor_scene, grid_scene
 
@@ -69,17 +68,3 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path, monkeypatch) -> None:
 def test_memory_that_cannot_be_had_is_one_clear_error() -> None:
     with pytest.raises(RunError, match=r"need 8388608\.0 GiB of memory.*--feature-store mapped"):
         empty_store(2**31, 2**20, "memory")
-
-
-def test_evenly_spaced_rows() -> None:
-    features = torch.arange(10.0)[:, None].half()
-    assert evenly_spaced(features, 4)[:, 0].tolist() == [0, 3, 6, 9]
-    assert evenly_spaced(features, 4).dtype == torch.float32
-    assert torch.equal(evenly_spaced(features, 10), features.float())
-
-
-def test_one_feature_that_is_not_finite_is_found() -> None:
-    features = torch.zeros(20_000, 2)
-    assert all_finite(features)
-    features[19_999, 1] = np.inf
-    assert not all_finite(features)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from clearway.errors import ArgumentError
-from clearway.learn.setup import SEED_LIMIT
+from clearway.learn.seeds import SEED_LIMIT
 
 
 def as_path(name: str, value: object) -> Path:

@@ -35,7 +35,7 @@ def check_at_least(lowest: int, **values: int | None) -> None:
 
 def check_seeds(**seeds: int) -> None:
     """Check options that are seeds, by name. Raises ClearwayError."""
-    from clearway.learn.setup import SEED_LIMIT
+    from clearway.learn.seeds import SEED_LIMIT
 
     for name, seed in seeds.items():
         if not 0 <= seed < SEED_LIMIT:

@@ -24,8 +24,9 @@ from clearway.learn.learner import Learner, OnFeatures, linear
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import Adam, clip_gradients
 from clearway.learn.rollout import ACTION_STREAM, Collector, as_rows
-from clearway.learn.setup import check_seed, network_input
+from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.feature_map import network_input
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import shortest_path_actions

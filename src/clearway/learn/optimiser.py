@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
 from torch.nn import Parameter
+
+from clearway.model.network import SiameseActorCritic
 
 ALPHA, EPSILON = 0.99, 0.1  # of the published RMSProp
 
@@ -86,6 +88,14 @@ class SharedRMSProp:
         """Set the mean squares."""
         for name, value in self.mean_square.items():
             value.copy_(tensors[f"mean_square.{name}"])
+
+
+def optimisers(network: SiameseActorCritic, kind: Literal["adam", "rmsprop"]) -> tuple[Optimiser, Optimiser]:
+    """Of the first layer's weight, and of all other parameters."""
+    made = Adam if kind == "adam" else SharedRMSProp
+    named = dict(network.named_parameters())
+    siamese = {"siamese_weight": named.pop("siamese_weight")}
+    return made(siamese), made(named)
 
 
 @torch.no_grad()

@@ -25,7 +25,7 @@ from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import Learner, linear
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.rollout import ACTION_STREAM
-from clearway.learn.setup import check_seed
+from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.policy import Policy, sampled
 from clearway.reward import Reward

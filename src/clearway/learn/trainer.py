@@ -19,12 +19,13 @@ from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient,
 from clearway.learn.minibatches import Minibatch, dealt_epochs
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.on_policy import OnPolicy
-from clearway.learn.optimiser import clip_gradients
+from clearway.learn.optimiser import clip_gradients, optimisers
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.rotation import Rotation, check_division, divided_envs
-from clearway.learn.setup import check_seed, network_input, optimisers
+from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.feature_map import network_input
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
@@ -83,7 +84,7 @@ class Trainer:
             dtype,
             most_seen=self.env_count * (learner.history_length + learner.rollout_steps),
         )
-        self.siamese_optimiser, self.optimiser = optimisers(self.network, learner)
+        self.siamese_optimiser, self.optimiser = optimisers(self.network, learner.optimiser)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         self.navigation = Navigation(
             world,

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import torch
 from torch import Tensor
 
+from clearway.errors import RunError
 from clearway.world.feature_store import BLOCK_ROWS, FEW_STATES, empty_store
 from clearway.world.tables import World
 
+FITTED_STATES = 32_768  # states that a feature map is fitted to: evenly spaced ones, where there are more
 SPANNED = 1e-5  # a direction counts where its singular value is at least this share of the largest
 
 
@@ -84,6 +87,44 @@ class FeatureMap:
         return cls(mean, factor, basis)
 
 
+class FeatureSettings(Protocol):
+    """What an algorithm's settings say about features, see `learn.learner.OnFeatures`."""
+
+    @property
+    def centre_features(self) -> bool:
+        """See `FeatureMap.fitted`, as the others."""
+
+    @property
+    def whiten_features(self) -> bool:
+        """As there."""
+
+    @property
+    def feature_basis(self) -> int:
+        """Directions."""
+
+
+def network_input(world: World, settings: FeatureSettings) -> tuple[FeatureMap, Tensor]:
+    """What prepares the world's features for the network, and all of them prepared, see `prepared_features`.
+
+    Raises:
+        RunError: there are none, or some are not finite.
+    """
+    if world.features is None:
+        raise RunError("the scenes have no features. Encode them first, for example with clearway scenes import")
+    if not all_finite(world.features):
+        raise RunError("the scenes' features hold NaN or Inf. Encode the scenes again")
+    feature_map = fitted_features(world.features, settings)
+    return feature_map, prepared_features(world, feature_map)
+
+
+def fitted_features(features: Tensor, settings: FeatureSettings) -> FeatureMap:
+    """The network's input for the features (S, F), as the settings have it; fitted to `FITTED_STATES` at most."""
+    sample = evenly_spaced(features, FITTED_STATES)
+    return FeatureMap.fitted(
+        sample, centre=settings.centre_features, directions=settings.feature_basis, whiten=settings.whiten_features
+    )
+
+
 def prepared_features(world: World, feature_map: FeatureMap) -> Tensor:
     """The network's input for all states of a world with features, (S, F) or (S, R).
 
@@ -134,3 +175,15 @@ def principal_directions(features: Tensor, most: int) -> tuple[Tensor, Tensor]:
     if by_state:
         vectors = rows.T @ vectors / squares[:spanned].clamp_min(1e-30).sqrt()
     return vectors.contiguous(), squares[:spanned].clamp_min(0)
+
+
+def evenly_spaced(features: Tensor, most: int) -> Tensor:
+    """At most so many rows of features (S, F), evenly spaced, float32; all of them where there are no more."""
+    if len(features) <= most:
+        return features.float()
+    return features[torch.linspace(0, len(features) - 1, most, device=features.device).round().long()].float()
+
+
+def all_finite(features: Tensor) -> bool:
+    """No feature (S, F) is NaN or Inf."""
+    return all(bool(torch.isfinite(block).all()) for block in features.split(BLOCK_ROWS))

@@ -15,7 +15,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from clearway.errors import ClearwayError
 from clearway.evaluation.selection import ActionSelection
-from clearway.learn.setup import SEED_LIMIT
+from clearway.learn.seeds import SEED_LIMIT
 
 LETTERS = "FRLB"
 """Of the actions, in the order of `scenes.actions.Action`: forward, right, left, backward."""

@@ -60,15 +60,3 @@ def _mapped(states: int, features: int) -> Tensor:
 
 def _gib(states: int, features: int, store: FeatureStore) -> float:
     return states * features * (2 if store == "float16" else 4) / 1024**3
-
-
-def evenly_spaced(features: Tensor, most: int) -> Tensor:
-    """At most so many rows of features (S, F), evenly spaced, float32; all of them where there are no more."""
-    if len(features) <= most:
-        return features.float()
-    return features[torch.linspace(0, len(features) - 1, most, device=features.device).round().long()].float()
-
-
-def all_finite(features: Tensor) -> bool:
-    """No feature (S, F) is NaN or Inf."""
-    return all(bool(torch.isfinite(block).all()) for block in features.split(BLOCK_ROWS))

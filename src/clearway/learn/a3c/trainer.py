@@ -26,8 +26,9 @@ from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import EPSILON
-from clearway.learn.setup import check_seed, network_input
+from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.model.feature_map import network_input
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
 from clearway.world.tables import World
