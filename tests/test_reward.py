@@ -1,3 +1,4 @@
+import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from clearway.reward import (
     reward_from_json,
     reward_named,
 )
+from clearway.world.tables import make_world
+from helpers.made import corridor_scene
 
 NOT_REACHED, REACHED = 0, 1
 MOVED, BLOCKED = 0, 1  # actions of the poses below
@@ -104,7 +107,7 @@ def test_changes_leave_what_is_none_and_change_the_name() -> None:
 def test_a_parameter_of_a_term_that_a_reward_lacks_adds_the_term() -> None:
     changed = SHORTEST.with_changes(beta=-0.5, clearance=0.04)
     assert changed.terms == (Time(-0.01), Zones(beta=-0.5), Clearance(0.04, 0.5), Arrival(10.0))
-    assert changed.name == "shortest, beta -0.5, clearance 0.04"
+    assert changed.name == "shortest, beta -0.5, clearance 0.04, clearance_m 0.5"
 
 
 @pytest.mark.parametrize(
@@ -123,7 +126,7 @@ def test_changes_that_cannot_be(parameters: dict, message: str) -> None:
 @pytest.mark.parametrize(
     ("terms", "message"),
     [
-        ((Time(),), "nothing is earned at the target"),
+        ((Time(),), "expected one term Arrival"),
         ((Time(), Time(), Arrival()), "a term occurs twice"),
         ((abs, Arrival()), "is no term"),
     ],
@@ -134,16 +137,53 @@ def test_terms_that_make_no_reward(terms: tuple, message: str) -> None:
 
 
 def test_terms_that_earn_nonsense() -> None:
-    with pytest.raises(RewardError, match="NaN or Inf in its term Time"):
-        Reward("wrong", (Time(float("nan")), Arrival())).table(MOVES)
+    with pytest.raises(RewardError, match="alpha is nan, expected a finite number"):
+        Reward("wrong", (Time(float("nan")), Arrival()))
+    with pytest.raises(RewardError, match="NaN or Inf in its term Doubled"):
+        Reward("wrong", (Time(), Doubled(float("nan")), Arrival())).table(MOVES)
 
     @dataclass(frozen=True)
     class Flat(Term):
         def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
             return earned[0]
 
-    with pytest.raises(RewardError, match=r"Flat gives float64 \(2,\), expected \(S, A\)"):
+    with pytest.raises(RewardError, match=r"Flat gives float64 \(2,\), expected \(S, A\) float64, \(3, 2\)"):
         Reward("wrong", (Flat(), Arrival())).table(MOVES)
+
+
+def test_a_reward_changed_twice_says_how_it_differs_from_the_one_of_its_name() -> None:
+    twice = COLLISION_AWARE.with_changes(beta=-0.5).with_changes(beta=-0.6, alpha=-0.02)
+    assert twice.name == "collision-aware, alpha -0.02, beta -0.6"
+    assert twice.with_changes(beta=-0.02, alpha=-0.01) == COLLISION_AWARE
+    assert COLLISION_AWARE.with_changes(beta=-0.02000001).name == "collision-aware, beta -0.02000001"
+
+
+def test_terms_cannot_write_to_the_tables() -> None:
+    @dataclass(frozen=True)
+    class Opening(Term):
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            moves.blocked[:] = False
+            return earned
+
+    scene = corridor_scene()
+    world = make_world([scene], {scene.name: [0]})
+    with pytest.raises(RewardError, match=r"the term Opening failed .*read-only"):
+        Reward("wrong", (Opening(), Arrival())).table(world.moves())
+    assert world.blocked.any()
+
+
+def test_a_parameter_comes_back_from_a_file_as_it_was_written() -> None:
+    @dataclass(frozen=True)
+    class Listed(Term):
+        values: tuple[float, ...] = (1.0, 2.0)
+
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned
+
+    kept = Reward("listed", (Listed(), Arrival())).to_json()
+    assert json.loads(json.dumps(kept)) == kept
+    with pytest.raises(RewardError, match="no JSON value"):
+        Reward("odd", (Listed((1j,)), Arrival())).to_json()
 
 
 def test_a_term_of_one_s_own() -> None:
@@ -163,11 +203,13 @@ def test_a_term_of_one_s_own_is_told_in_json_and_not_loaded_from_it() -> None:
     read = reward_from_json(kept)
     assert (read.to_json(), read.is_known, MINE.is_known) == (kept, False, True)
     assert str(read) == str(MINE)
+    assert (read.as_known().name, MINE.as_known()) == ("mine without Doubled", MINE)
+    assert read.as_known().table(MOVES).max() == 5.0
     with pytest.raises(RewardError, match="Doubled, which is not loaded"):
         read.table(MOVES)
 
 
-def test_rewards_that_version_0_1_wrote() -> None:
+def test_rewards_as_runs_of_format_1_hold_them() -> None:
     old = {"alpha": -0.01, "beta": -0.01, "gamma": -0.01, "terminal": 10.0, "blocked": None, "clip": False}
     assert reward_from_json({"name": "shortest", **old}) == SHORTEST
     assert reward_from_json({"name": "bump", **old, "blocked": -0.1}) == BUMP
@@ -176,9 +218,15 @@ def test_rewards_that_version_0_1_wrote() -> None:
     changed = reward_from_json({"name": "collision-aware", **aware, "beta": -0.5})
     assert changed == COLLISION_AWARE.with_changes(beta=-0.5)
     assert steps(reward_from_json({"name": "other", **aware, "blocked": -0.3}), BLOCKED) == [-0.3] * 3
+    dearer = reward_from_json({"name": "shortest", **old, "alpha": -0.02})
+    assert (steps(dearer), dearer.name) == ([-0.02, -0.01, -0.01], "shortest, alpha -0.02, beta -0.01, gamma -0.01")
+    plain = reward_from_json({"name": "collision-aware", **old})
+    assert (steps(plain), plain.name) == ([-0.01] * 3, "collision-aware, beta -0.01, gamma -0.01")
+    other = reward_from_json({"name": "other", **aware})
+    assert (steps(other), other.name) == (steps(COLLISION_AWARE), "other")
 
 
-@pytest.mark.parametrize("wrong", [{"alpha": "low"}, {"delta": 1.0}, {"clip": 1}, {"name": 3}])
+@pytest.mark.parametrize("wrong", [{"alpha": "low"}, {"delta": 1.0}, {"clip": 1}, {"name": 3}, {"terminal": None}])
 def test_json_that_is_no_reward(wrong: dict) -> None:
     with pytest.raises((KeyError, TypeError)):
         reward_from_json({**SHORTEST.to_json(), **wrong})
@@ -190,7 +238,9 @@ def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         "slow = Reward('slow', (Time(-0.5), Arrival()))\n"
         "def made():\n    return slow\n"
         "nothing = 3\n"
+        "def broken():\n    raise KeyError('spoon')\n"
     )
+    (tmp_path / "their_fault.py").write_text("spoon\n")
     monkeypatch.syspath_prepend(tmp_path)
     assert reward_named("bump") is BUMP
     assert reward_named("their_rewards:slow").name == "slow"
@@ -199,6 +249,8 @@ def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         ("bumps", "'bumps' is unknown. Use one of 'collision-aware'"),
         ("their_rewards:fast", "cannot be loaded"),
         ("no_such_module:fast", "cannot be loaded"),
+        ("their_fault:slow", "cannot be loaded .NameError"),
+        ("their_rewards:broken", "cannot be made .KeyError: 'spoon'"),
         ("their_rewards:nothing", "gives 3, expected a clearway.Reward"),
     ):
         with pytest.raises(RewardError, match=message):

@@ -13,6 +13,7 @@ The module is light, so that the command line can read names and parameters from
 from __future__ import annotations
 
 import importlib
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -176,14 +177,21 @@ class Reward:
         Raises:
             RewardError: a term is none, a kind of term occurs twice, or there is no `Arrival`.
         """
+        if not isinstance(self.name, str) or not isinstance(self.clip, bool):
+            raise RewardError(f"reward: name={self.name!r:.40}, clip={self.clip!r:.40}: expected a text, True or False")
+        if not isinstance(self.terms, tuple):
+            raise RewardError(f"reward {self.name}: terms={self.terms!r:.60}: expected a tuple of terms. Give one")
         for term in self.terms:
             if not isinstance(term, Term) or not is_dataclass(term):
                 raise RewardError(f"reward {self.name}: {term!r:.60} is no term. Give dataclasses derived from Term")
         kinds = [type(term) for term in self.terms if not isinstance(term, _Unknown)]
         if len(set(kinds)) < len(kinds):
             raise RewardError(f"reward {self.name}: a term occurs twice. Give every kind of term once")
-        if Arrival not in kinds:
-            raise RewardError(f"reward {self.name}: nothing is earned at the target. Add the term Arrival")
+        if sum(isinstance(term, Arrival) for term in self.terms) != 1:
+            raise RewardError(f"reward {self.name}: expected one term Arrival, for the target. Give one")
+        for name, value in self.parameters.items():
+            if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < math.inf:
+                raise RewardError(f"reward {self.name}: {name} is {value!r:.40}, expected a finite number. Correct it")
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -197,6 +205,14 @@ class Reward:
         """All terms can be computed here."""
         return not any(isinstance(term, _Unknown) for term in self.terms)
 
+    def as_known(self) -> Reward:
+        """The same without the terms whose code is not loaded, under a name that says so."""
+        if self.is_known:
+            return self
+        left = ", ".join(term.path.rpartition(":")[2] for term in self.terms if isinstance(term, _Unknown))
+        known = tuple(term for term in self.terms if not isinstance(term, _Unknown))
+        return replace(self, name=f"{self.name} without {left}", terms=known)
+
     def table(self, moves: Moves) -> np.ndarray:
         """What every action earns, (2, S, A) float64: [the target is reached, state, action].
 
@@ -208,19 +224,31 @@ class Reward:
         step = np.zeros(moves.next_state.shape)
         for term in self.terms:
             if not isinstance(term, Arrival):
-                step = self._checked(term, term(step, moves))
+                step = self._earned(term, step, moves)
         (arrival,) = (term for term in self.terms if isinstance(term, Arrival))
-        table = np.stack([step, self._checked(arrival, arrival(step, moves))])
+        table = np.stack([step, self._earned(arrival, step, moves)])
         return np.clip(table, -CLIP, CLIP) if self.clip else table
 
-    def _checked(self, term: Term, earned: np.ndarray) -> np.ndarray:
+    def _earned(self, term: Term, before: np.ndarray, moves: Moves) -> np.ndarray:
+        """What a term gives, checked; one that is not ours may raise anything."""
+        if type(term) in TERMS.values() or isinstance(term, _Unknown):
+            return self._checked(term, term(before, moves), before.shape)
+        try:
+            earned = term(before, moves)
+        except Exception as fault:
+            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            kind = type(term).__name__
+            raise RewardError(f"reward {self.name}: the term {kind} failed ({reason}). Correct the term") from fault
+        return self._checked(term, earned, before.shape)
+
+    def _checked(self, term: Term, earned: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         import numpy as np
 
         found = np.asarray(earned)
         kind = type(term).__name__
-        if found.ndim != 2 or found.dtype.kind != "f":
+        if found.shape != shape or found.dtype.kind != "f":
             problem = f"the term {kind} gives {found.dtype} {found.shape}"
-            raise RewardError(f"reward {self.name}: {problem}, expected (S, A) float64. Correct the term")
+            raise RewardError(f"reward {self.name}: {problem}, expected (S, A) float64, {shape}. Correct the term")
         if not np.isfinite(found).all():
             raise RewardError(f"reward={self.name} holds NaN or Inf in its term {kind}. Give finite values")
         return found
@@ -238,15 +266,17 @@ class Reward:
         for name, value in changes.items():
             if name not in TERM_OF:
                 raise RewardError(f"reward: no parameter {name}. Choose among {', '.join(TERM_OF)}")
-            if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+            if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < math.inf:
                 raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
             if name.endswith("_m") and value <= 0:
                 raise RewardError(f"--{name.replace('_', '-')} is {value}, expected more than 0. Give a distance")
             kind = TERM_OF[name]
             terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
         changed = Reward(self.name, _in_order(terms), self.clip if clip is None else clip)
-        told = [f"{name} {value:g}" for name, value in changes.items() if self.parameters.get(name) != value]
-        return replace(changed, name=", ".join([self.name, *told]))
+        base = REWARDS.get(self.name.partition(",")[0], self)
+        known, now = base.parameters, changed.parameters
+        told = [f"{name} {value:.10g}" for name, value in now.items() if known.get(name) != value]
+        return replace(changed, name=", ".join([base.name, *told]))
 
     def to_json(self) -> dict[str, object]:
         """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands."""
@@ -257,7 +287,12 @@ class Reward:
             elif type(term) not in TERMS.values():
                 path = f"{type(term).__module__}:{type(term).__qualname__}"
                 others[path] = {own.name: getattr(term, own.name) for own in fields(term)}
-        return {"name": self.name, **self.parameters, self.CLIPPED: self.clip, **({"terms": others} if others else {})}
+        told = {"name": self.name, **self.parameters, self.CLIPPED: self.clip, **({"terms": others} if others else {})}
+        try:
+            return dict(json.loads(json.dumps(told)))  # as it comes back from a file
+        except TypeError as fault:
+            problem = f"reward {self.name}: a parameter is no JSON value ({fault})"
+            raise RewardError(f"{problem}. Use plain numbers") from fault
 
     def __str__(self) -> str:
         """Its parameters, as tables print them."""
@@ -282,23 +317,29 @@ def reward_from_json(content: Mapping[str, Any]) -> Reward:
             raise TypeError(f"{key} is {value!r:.40}")
     if not isinstance(name, str) or not isinstance(clip, bool):
         raise TypeError(f"name is {name!r:.40}, clip {clip!r:.40}")
-    if "blocked" in values and "beta" in values and name in REWARDS:
-        return _of_version_0_1(REWARDS[name], values, clip)
+    if set(values) == {"alpha", "beta", "gamma", "terminal", "blocked"} and values["blocked"] is None:
+        return _of_format_1(name, values, clip)
+    if name == "bump" and set(values) == {"alpha", "beta", "gamma", "terminal", "blocked"}:
+        return _of_format_1(name, values, clip)
     terms: dict[type[Term], Term] = {}
     for key, value in values.items():
         if value is not None:
             kind = TERM_OF[key]
             terms[kind] = replace(terms.get(kind, kind()), **{key: value})
     others = [_Unknown(path, tuple(sorted(own.items()))) for path, own in content.get("terms", {}).items()]
-    ordered = _in_order(terms)
-    return Reward(name, (*ordered[:-1], *others, ordered[-1]), clip)
+    arrival = terms.pop(Arrival, None)
+    if arrival is None:
+        raise KeyError("terminal")
+    return Reward(name, (*_in_order(terms), *others, arrival), clip)
 
 
-def _of_version_0_1(base: Reward, values: Mapping[str, float | None], clip: bool) -> Reward:
-    """A named reward, whose zones' values stood there even where they were those of an ordinary step."""
-    usual: dict[str, float | None] = {"beta": base.parameters["alpha"], "gamma": base.parameters["alpha"]}
-    usual |= base.parameters
-    return base.with_changes(clip=clip, **{key: value for key, value in values.items() if value != usual.get(key)})
+def _of_format_1(name: str, values: Mapping[str, float | None], clip: bool) -> Reward:
+    """A reward whose record held all five values, those of the zones even where they were an ordinary step's."""
+    base = REWARDS.get(name, Reward(name, (Time(), Arrival())))
+    told = {"alpha", "terminal", "blocked", *base.parameters}
+    kept = {key: value for key, value in values.items() if key in told or value != values["alpha"]}
+    changed = base.with_changes(clip=clip, **kept)
+    return changed if name in REWARDS else replace(changed, name=name)
 
 
 def _in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:
@@ -341,14 +382,19 @@ def reward_named(name: str | Reward) -> Reward:
         raise RewardError(f"reward={name!r:.80} is unknown. Use one of {choices}, a Reward, or package.module:name")
     try:
         found = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as fault:
-        raise RewardError(f"reward={name!r}: cannot be loaded ({fault}). Check the module and the name") from fault
+    except Exception as fault:  # another's code: anything can come of it
+        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        raise RewardError(f"reward={name!r}: cannot be loaded ({reason}). Check the module and the name") from fault
     return _made(f"reward={name!r}", found)
 
 
 def _made(source: str, found: object) -> Reward:
     """What was found under a name, or what it gives when it is called."""
-    made = found() if callable(found) else found
+    try:
+        made = found() if callable(found) else found
+    except Exception as fault:  # likewise
+        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        raise RewardError(f"{source}: cannot be made ({reason}). Correct it") from fault
     if not isinstance(made, Reward):
         raise RewardError(f"{source}: gives {made!r:.60}, expected a clearway.Reward. Correct it")
     return made

@@ -25,7 +25,7 @@ from clearway.scenes.scene import Scene
 
 
 class Zone(IntEnum):
-    """Zone of a pose; the value is its row in the reward table."""
+    """Zone of a pose."""
 
     FREE = 0
     PRECOLLISION = 1

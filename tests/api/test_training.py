@@ -137,3 +137,12 @@ def test_what_does_not_fit_is_told_in_one_line_that_is_also_a_value_error(corrid
 def test_targets_without_names_are_for_one_scene(corridor) -> None:
     with pytest.raises(ArgumentError, match="Name the scene of each"):
         clearway.train([corridor, grid_scene(1, feature_count=FEATURES)], [1, 2], **SMALL)
+
+
+def test_settings_of_a_class_that_no_run_could_be_read_with_are_refused_before_training(corridor, tmp_path) -> None:
+    class Mine(clearway.PPO):
+        algorithm = "mine"
+
+    with pytest.raises(clearway.ClearwayError, match="algorithm=Mine: its runs could not be read again"):
+        clearway.train(corridor, algorithm=Mine(), out=tmp_path / "run", **SMALL)
+    assert not (tmp_path / "run").exists()

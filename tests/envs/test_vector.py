@@ -359,7 +359,7 @@ BAD_ARGUMENTS: list[tuple[Callable[[], dict[str, Any]], type[Exception], str]] =
     (lambda: {"autoreset_mode": "never"}, EnvError, "autoreset_mode='never' is unknown. Use one of NextStep"),
     (lambda: {"scenes": 5}, EnvError, "scenes: 5 is neither a scene nor"),
     (lambda: {"scenes": [grid_scene(0), None]}, EnvError, "scenes: None is neither a scene nor"),
-    (lambda: {"reward": Reward("mine", (Time(float("nan")), Arrival()))}, RewardError, "holds NaN or Inf"),
+    (lambda: {"reward": Reward("mine", (Time(float("nan")), Arrival()))}, RewardError, "alpha is nan"),
     (lambda: {"targets": [5]}, EnvError, r"targets=\[5\]: expected state ids by scene name"),
     (lambda: {"targets": {"grid": 5}}, EnvError, r"targets\['grid'\]=5: expected state ids"),
     (lambda: {"targets": {"grid": [True]}}, SceneError, "target True is no state id"),

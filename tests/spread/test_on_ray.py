@@ -22,7 +22,13 @@ ray = pytest.importorskip("ray")
 @pytest.fixture(scope="module", autouse=True)
 def _one_cluster() -> Iterator[None]:
     path = os.pathsep.join([str(Path(parts.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": path}})
+    ray.init(
+        "local",
+        num_cpus=1,
+        include_dashboard=False,
+        log_to_driver=False,
+        runtime_env={"env_vars": {"PYTHONPATH": path}},
+    )
     yield
     ray.shutdown()
 

@@ -17,7 +17,7 @@ def as_path(name: str, value: object) -> Path:
     """A path from text or anything else that is one. Raises ArgumentError."""
     if isinstance(value, str | os.PathLike):
         path = os.fspath(value)
-        if isinstance(path, str):
+        if isinstance(path, str) and path:
             return Path(path)
     raise ArgumentError(f"{name}={value!r:.80}: expected a path, such as 'bathroom.h5'. Give a string or a Path")
 

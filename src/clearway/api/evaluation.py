@@ -92,7 +92,10 @@ class EvaluateResult:
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Leave evaluation.json and evaluation.md in a folder, as `clearway evaluate` does in the run's."""
         path = as_path("folder", folder)
-        path.mkdir(parents=True, exist_ok=True)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as fault:
+            raise ArgumentError(f"folder={path}: not a folder to write to ({fault.strerror}). Give another") from fault
         write_evaluations(path, self.to_json(), self.evaluations)
 
     def _repr_markdown_(self) -> str:

@@ -159,6 +159,9 @@ def chosen_learner(wanted: str | Learner, frames: int | None, settings: Mapping[
     """
     if isinstance(wanted, Learner):
         learner = wanted
+        if not _is_known(learner):
+            problem = f"algorithm={type(learner).__name__}: its runs could not be read again"
+            raise ArgumentError(f"{problem}. Offer the class by an entry point (clearway.plugins), or use one of ours")
     elif isinstance(wanted, str) and wanted in PRESETS:
         learner = PRESETS[wanted]
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
@@ -170,6 +173,12 @@ def chosen_learner(wanted: str | Learner, frames: int | None, settings: Mapping[
         )
     given = settings if frames is None else {**settings, "frames": frames}
     return replace(learner, **as_settings(type(learner), given))
+
+
+def _is_known(learner: Learner) -> bool:
+    """The class is the one that a run's record would be read with."""
+    name = learner.algorithm
+    return (name in ALGORITHMS or find_plugin("algorithms", name) is not None) and algorithm(name) is type(learner)
 
 
 def _chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict[str, tuple[int, ...]]:

@@ -23,7 +23,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.errors import RunError
+from clearway.errors import ClearwayError, RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.learner import Learner
@@ -207,7 +207,7 @@ class RunFolder:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
             return _record_from(content, found)
-        except (KeyError, TypeError, AttributeError, OverflowError, RunError) as error:
+        except (KeyError, TypeError, AttributeError, OverflowError, ClearwayError) as error:
             reason, remedy = str(error).rstrip(".")[:300], "Restore it or train again"
             by = _maker(content)
             if by != __version__:

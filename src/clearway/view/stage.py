@@ -62,7 +62,7 @@ class StageAgent:
     @property
     def reward(self) -> Reward:
         """What it learnt from: clipped, if its learner clipped rewards, so that values and rewards compare."""
-        return self.agent.record.paid
+        return self.agent.record.paid.as_known()
 
 
 @dataclass(frozen=True)

@@ -96,9 +96,11 @@ class World:
         return DistanceTable(self)
 
     def moves(self) -> Moves:
-        """What a reward's terms look at."""
-        tables = (self.next_state, self.blocked, self.zone, self.clearance_m)
-        return Moves(*(table.cpu().numpy() for table in tables))
+        """What a reward's terms look at, which they cannot write to."""
+        tables = [table.cpu().numpy().view() for table in (self.next_state, self.blocked, self.zone, self.clearance_m)]
+        for table in tables:
+            table.flags.writeable = False
+        return Moves(*tables)
 
     def graph(self, scene: int) -> np.ndarray:
         """Moves of one scene in its own numbering, (S of the scene, A) int64; -1 where one is blocked."""
