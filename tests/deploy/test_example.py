@@ -32,4 +32,5 @@ def test_the_example_does_what_a_navigator_does(deployed, tmp_path, capsys) -> N
 def test_the_example_imports_nothing_of_clearway() -> None:
     loaded = imported_by(f"import runpy; runpy.run_path({str(EXAMPLE)!r})")
     assert {"onnxruntime", "PIL.Image"} <= loaded
-    assert not [name for name in loaded if name.split(".")[0] in ("clearway", "torch", "onnx")]
+    brought = loaded - imported_by("pass")  # an installed clearway is there from Python's start, see gymnasium_hook
+    assert not [name for name in brought if name.split(".")[0] in ("clearway", "torch", "onnx")]
