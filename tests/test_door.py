@@ -119,3 +119,39 @@ def test_once_installed_gymnasium_makes_it_without_being_told(installed, tmp_pat
     as_site_packages = f"import site\nsite.addsitedir({str(installed)!r})\n"  # which reads the .pth files there
     said = python(as_site_packages + MAKE.format(scene=str(path)), installed)
     assert int(said) > 0
+
+
+def test_gymnasium_is_found_however_it_is_installed() -> None:
+    """An editable installation may bring a finder of its own."""
+    program = (
+        "import sys, clearway\nfrom importlib.machinery import PathFinder\n"
+        "class Own:\n    @staticmethod\n    def find_spec(name, path=None, target=None):\n"
+        "        return PathFinder.find_spec(name, path, target) if name.startswith('gymnasium') else None\n"
+        "sys.meta_path = [finder for finder in sys.meta_path if finder is not PathFinder] + [Own, PathFinder]\n"
+        "import gymnasium\nprint('Clearway/ImageGoal-v0' in gymnasium.registry)"
+    )
+    assert python(program, ROOT / "src") == "True\n"
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: clearway.Navigator(5), "source is 5, expected an ONNX file"),
+        (lambda: clearway.build_room("bathroom", sensors=None), "None is no list of names"),
+        (lambda: clearway.build_room("bathroom", sensors=[["a"]]), "there is no"),
+    ],
+)
+def test_wrong_types_at_the_door_are_one_clear_error(call, message) -> None:
+    with pytest.raises(clearway.ClearwayError, match=message):
+        call()
+
+
+def test_an_encoder_of_one_s_own_that_fails_is_named() -> None:
+    class Broken:
+        name, identity, feature_count = "broken", "broken-1", 3
+
+        def encode(self, pictures):
+            raise KeyError("spoon")
+
+    with pytest.raises(clearway.ClearwayError, match=r"encoder broken: failed .KeyError: 'spoon'"):
+        clearway.encode_scenes(corridor_scene(), Broken())

@@ -26,16 +26,16 @@ class _OnRegistry:
         """The module's spec where it is the registry's; None for all others."""
         if name != REGISTRY:
             return None
-        from importlib.machinery import PathFinder
-
-        sys.meta_path.remove(_OnRegistry)
-        spec = PathFinder.find_spec(name, path, target)
+        others = [finder for finder in sys.meta_path if finder is not _OnRegistry]
+        spec = next((found for finder in others if (found := finder.find_spec(name, path, target))), None)
         if spec is None or spec.loader is None:
             return spec
         load = spec.loader.exec_module
 
         def load_and_register(module: "ModuleType") -> None:
             load(module)
+            if _OnRegistry in sys.meta_path:
+                sys.meta_path.remove(_OnRegistry)
             _register()
 
         spec.loader.exec_module = load_and_register  # type: ignore[method-assign]

@@ -76,6 +76,9 @@ class Navigator:
     ) -> None:
         if selection not in get_args(Selection):
             raise DeployError(f"selection is {selection!r}. Choose one of {', '.join(get_args(Selection))}")
+        if not isinstance(source, str | Path) and not (hasattr(source, "card") and hasattr(source, "step")):
+            problem = f"source is {source!r:.60}, expected an ONNX file, a run folder or an opened agent"
+            raise DeployError(f"{problem}. Give one of these")
         self._model = open_model(source, scene) if isinstance(source, str | Path) else source
         self.card = self._model.card
         if scene not in (None, self.card.scene):

@@ -90,7 +90,8 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     if not isinstance(agent, Agent):
         name = agent.record.learner.algorithm
         raise RunError(
-            f"{folder}: an agent of {name} has no network. Use clearway evaluate, or train another algorithm"
+            f"{folder}: an agent of {name} has no network. Walk with it by clearway evaluate without --live, "
+            "or train another algorithm"
         )
     return agent
 

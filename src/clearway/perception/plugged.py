@@ -50,9 +50,13 @@ class CheckedEncoder:
         """Features (B, F) float32 of its sensor's pictures (B, ...), for example (B, height, width, 3) uint8.
 
         Raises:
-            EncoderError: what was returned is of another shape or type, or holds NaN or Inf.
+            EncoderError: it fails, or what it returned is of another shape or type, or holds NaN or Inf.
         """
-        features = np.asarray(self.made.encode(pictures))
+        try:
+            features = np.asarray(self.made.encode(pictures))
+        except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            raise EncoderError(f"encoder {self.record.name}: failed ({reason}). Mend it, or use another") from fault
         expected = (len(pictures), self.feature_count)
         if features.shape != expected or features.dtype.kind not in "fiu":
             found = f"{features.dtype} {features.shape}, expected floats {expected}"

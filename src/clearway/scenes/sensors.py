@@ -139,7 +139,9 @@ def check_names(names: Sequence[str]) -> None:
     """Check which sensors are asked for: known ones, each once, the colour camera among them. Raises SceneError."""
     if isinstance(names, str):
         raise SceneError("sensors", f"{names!r} is a text", f"Give names, such as ('{RGB}', '{DEPTH}')")
-    unknown = [name for name in names if name not in SENSORS]
+    if not isinstance(names, Sequence):
+        raise SceneError("sensors", f"{names!r:.60} is no list of names", f"Give names, such as ('{RGB}', '{DEPTH}')")
+    unknown = [name for name in names if not isinstance(name, str) or name not in SENSORS]
     if unknown:
         raise SceneError("sensors", f"there is no {unknown[0]!r}", f"Choose among {', '.join(SENSORS)}")
     if len(set(names)) < len(names) or RGB not in names:

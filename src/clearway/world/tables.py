@@ -85,12 +85,6 @@ class World:
         """Where the tables lie."""
         return self.next_state.device
 
-    def mean_shortest_path(self) -> Tensor:
-        """Mean distance from all starts to each target, (M,) float64 steps."""
-        target = torch.repeat_interleave(torch.arange(self.target_count), self.start_count.cpu())
-        total = torch.zeros(self.target_count, dtype=torch.float64)
-        return total.index_add_(0, target, self.start_steps.cpu().double()) / self.start_count.cpu()
-
     def distance_table(self) -> DistanceTable:
         """Steps from states to targets, to be looked up."""
         return DistanceTable(self)
