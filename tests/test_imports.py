@@ -33,6 +33,7 @@ ORDER = (
     {"world"},
     {"envs"},
     {"model"},
+    {"agents"},
     {"learn"},
     {"evaluation"},
     {"live"},

@@ -66,3 +66,7 @@ class DeployError(ClearwayError, ValueError):
 
 class PluginError(ClearwayError):
     """Something that another package offers and that cannot be used."""
+
+
+class AgentError(ClearwayError):
+    """An agent that cannot walk here, or does what no agent may."""

@@ -17,10 +17,10 @@ from clearway.evaluation.report import Evaluation
 from clearway.evaluation.run import evaluate_run
 from clearway.evaluation.tables import Level, Width, markdown_table
 from clearway.learn import load
-from clearway.learn.load import Acting
+from clearway.learn.load import TrainedAgent
 from clearway.scenes.scene import Scene
 
-Run: TypeAlias = Acting | TrainResult | str | os.PathLike[str]
+Run: TypeAlias = TrainedAgent | TrainResult | str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class EvaluateResult:
         scenes: where it walked.
     """
 
-    agent: Acting
+    agent: TrainedAgent
     evaluations: tuple[Evaluation, ...]
     scenes: tuple[Scene, ...]
 
@@ -105,7 +105,7 @@ class EvaluateResult:
 TEXT_WIDTH = 120  # columns
 
 
-def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] | None = None) -> Acting:
+def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] | None = None) -> TrainedAgent:
     """The trained agent of a run folder, from its newest checkpoint or the one given.
 
     Raises:
@@ -113,7 +113,7 @@ def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] |
         ClearwayError: there is no such run, the checkpoint is damaged or lies in another folder.
     """
     chosen = None if checkpoint is None else as_path("checkpoint", checkpoint)
-    return load.load_acting(as_path("run", run), chosen)
+    return load.load_agent(as_path("run", run), chosen)
 
 
 def evaluate(
@@ -151,8 +151,8 @@ def evaluate(
     return EvaluateResult(agent, tuple(evaluations), tuple(places))
 
 
-def _agent(run: Run) -> Acting:
-    if isinstance(run, Acting):
+def _agent(run: Run) -> TrainedAgent:
+    if isinstance(run, TrainedAgent):
         return run
     if isinstance(run, TrainResult):
         return run.agent

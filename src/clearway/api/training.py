@@ -16,7 +16,7 @@ from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.learner import Learner
-from clearway.learn.load import Acting, load_acting
+from clearway.learn.load import TrainedAgent, load_agent
 from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunRecord
 from clearway.learn.train import RunRequest
@@ -44,7 +44,7 @@ class TrainResult:
         folder: the run folder; None where none was asked for.
     """
 
-    agent: Acting
+    agent: TrainedAgent
     scenes: tuple[Scene, ...]
     metrics: tuple[Mapping[str, float], ...]
     folder: Path | None = None
@@ -143,7 +143,7 @@ def train(
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
         folder = train_run(request, path, resume=resume, show_progress=show_progress)
         return TrainResult(
-            agent=load_acting(path),
+            agent=load_agent(path),
             scenes=tuple(loaded),
             metrics=tuple(folder.metrics()),
             folder=None if out is None else path,

@@ -14,7 +14,7 @@ from clearway.errors import ClearwayError
 from clearway.live.settings import MOST, REFERENCE, Perturbations
 
 if TYPE_CHECKING:
-    from clearway.learn.load import Agent
+    from clearway.learn.load import TrainedNetwork
     from clearway.live.run import LiveOutcome, LiveScene
 
 EPISODES, STEP_CAP = 10, 100
@@ -77,14 +77,14 @@ def evaluate_live(
     json: bool,
 ) -> None:
     """Walk the episodes, print, leave live.json and live.md in the run folder, and draw what is asked for."""
-    from clearway.learn.load import load_agent, run_scenes
+    from clearway.learn.load import load_network, run_scenes
     from clearway.live.settings import Condition, label_of, sweep_settings
     from clearway.scenes.scene import encoder_names
 
     check_at_least(1, episodes=episodes, step_cap=step_cap)
     check_seeds(seed=seed)
     paths = [folder] if options.against is None else [folder, options.against]
-    agents = _named(paths, [load_agent(path, checkpoint if path == folder else None) for path in paths])
+    agents = _named(paths, [load_network(path, checkpoint if path == folder else None) for path in paths])
     scenes = run_scenes(next(iter(agents.values())).record, scene_files(scene_paths) if scene_paths else None)
     _check_rooms_can_be_built()
     from clearway.live.episodes import LiveProtocol
@@ -94,8 +94,7 @@ def evaluate_live(
     check_alike(agents)
     one = Condition(label_of(options.perturbations), options.perturbations)
     settings = sweep_settings(options.strengths) if options.sweep else [one]
-    history = next(iter(agents.values())).record.learner.history_length
-    protocol = LiveProtocol(episodes, step_cap, seed, options.selection, history)
+    protocol = LiveProtocol(episodes, step_cap, seed, options.selection)
     encoder = encoder_names(scenes)
     with stages(agents, scenes) as places:
         outcomes: list[LiveOutcome] = []
@@ -120,7 +119,7 @@ def _draw(folder: Path, places: list[LiveScene], outcomes: list[LiveOutcome]) ->
     say(f"pictures: {', '.join(str(path) for path in made)}")
 
 
-def _named(paths: list[Path], agents: list[Agent]) -> dict[str, Agent]:
+def _named(paths: list[Path], agents: list[TrainedNetwork]) -> dict[str, TrainedNetwork]:
     """The agents by the names of their rewards, or of their folders where those are alike."""
     rewards = [agent.record.reward.name for agent in agents]
     names = rewards if len(set(rewards)) == len(rewards) else [str(path) for path in paths]

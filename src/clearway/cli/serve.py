@@ -43,7 +43,7 @@ class Serve:
     def run(self) -> None:
         """Load the agent, then answer until interrupted."""
         from clearway.serve.limits import Limits
-        from clearway.serve.run import run_service, servable_model
+        from clearway.serve.run import run_service, servable_agent
         from clearway.web.guard import new_token
         from clearway.web.local import address_of, listening
 
@@ -58,9 +58,9 @@ class Serve:
         def say(line: str) -> None:
             console.print(line, highlight=False, soft_wrap=True)
 
-        model = servable_model(self.agent, self.scene, say)
+        agent = servable_agent(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener:
-            say(f"scene {model.card.scene}: {address_of(listener, self.host)}")
+            say(f"scene {agent.card.scene}: {address_of(listener, self.host)}")
             if not own:
                 say(f"token: {token}")
-            run_service(model, listener, token, limits)
+            run_service(agent, listener, token, limits)

@@ -51,6 +51,6 @@ class Video:
         world, trajectory = single_episode(
             agent, scenes, self.scene, self.target, selection=self.selection, step_cap=self.most_steps, seed=self.seed
         )
-        shown = walked(world, agent.policy(world), 0, trajectory, agent.record.learner.history_length)
+        shown = walked(world, agent.on_poses(world), 0, trajectory)
         write_video(self.out, frames(scenes, shown), self.frames_per_s)
         say(f"film: {self.out}, {len(trajectory.actions)} steps")

@@ -10,16 +10,16 @@ import clearway
 from clearway import files
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import SceneAgent
-from clearway.deploy.onnx_file import OnnxModel
+from clearway.deploy.onnx_file import OnnxAgent
 from clearway.errors import DeployError
 from clearway.version import __version__
 
 KEY_LETTERS = 16
 PACKAGES = Path(clearway.__file__).parent
-SHAPING = ("deploy", "model", "perception")  # packages whose code shapes the file
+SHAPING = ("agents", "deploy", "model", "perception")  # packages whose code shapes the file
 
 
-def cached_model(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxModel:
+def cached_agent(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxAgent:
     """A run's agent on onnxruntime, exported to the user's cache folder the first time; a damaged file is made again.
 
     Args:
@@ -32,16 +32,16 @@ def cached_model(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxModel
     path = files.cache_dir() / "agents" / f"{chosen.scene.name}-{_key(chosen)}.onnx"
     with files.locked(path):
         try:
-            return OnnxModel(path)
+            return OnnxAgent(path)
         except DeployError:
             tell(f"exporting the agent for scene {chosen.scene.name}, once ...")
             export_onnx(chosen, path)
-    return OnnxModel(path)
+    return OnnxAgent(path)
 
 
 def _key(chosen: SceneAgent) -> str:
     """Hash of all that shapes the file: parameters, scene, encoder, the code of all three and clearway's version."""
-    agent, digest = chosen.agent, hashlib.sha256()
+    agent, digest = chosen.trained, hashlib.sha256()
     for tensors in (agent.network.state_dict(), agent.feature_map.tensors()):
         for name, tensor in sorted(tensors.items()):
             digest.update(f"{name} {tuple(tensor.shape)}\n".encode())

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 
 from clearway.deploy.from_run import SceneAgent, exportable_encoder
-from clearway.deploy.graph import AgentGraph, PolicyGraph
+from clearway.deploy.graph import AgentGraph
 from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
 from clearway.errors import DeployError
 from clearway.files import written_whole
@@ -27,14 +27,14 @@ def export_onnx(chosen: SceneAgent, path: Path, *, with_encoder: bool = True) ->
 
     With the encoder, the graph's inputs are picture (B, height, width, 3) uint8, start (B,) bool, history (B, K, F)
     float32 and target (B, F) float32, its outputs probabilities (B, A), value (B, 1) and history_after (B, K, F); see
-    `AgentModel.step`. The policy alone has the inputs history and target and the outputs probabilities and value.
+    `OnnxAgent`. The policy alone has the inputs history and target and the outputs probabilities and value.
 
     Raises:
         DeployError: the packages of the extra `onnx` are not installed.
         EncoderError: the encoder that made the scene's features cannot be had.
     """
     encoder = exportable_encoder(chosen) if with_encoder else None
-    policy = PolicyGraph(chosen.agent, chosen.index)
+    policy = chosen.policy
     card = chosen.card(encoder)
     history = torch.zeros(2, card.history_length, card.feature_count)
     batch = torch.export.Dim("batch", min=1)

@@ -1,4 +1,4 @@
-"""An agent for one scene out of a run folder: its card, and `RunModel`, which computes it with PyTorch."""
+"""An agent for one scene out of a run folder: its card, and `RunAgent`, which computes it with PyTorch."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-import torch
-
+from clearway.agents.by_features import FeatureAgent
 from clearway.deploy.card import Card
-from clearway.deploy.graph import PolicyGraph
-from clearway.deploy.model import ModelOutput
-from clearway.deploy.onnx_file import shifted
 from clearway.errors import DeployError, EncoderError
 from clearway.learn.learner import OnFeatures
-from clearway.learn.load import Agent, load_agent, run_scenes
+from clearway.learn.load import TrainedNetwork, load_network, run_scenes
+from clearway.model.policy import ScenePolicy
 from clearway.perception import Encoder, encoder_from_record
 from clearway.perception.encoder import NetworkEncoder, sensor_of
 from clearway.scenes.actions import ACTION_NAMES
@@ -28,13 +24,13 @@ class SceneAgent:
     """A trained agent in one of its scenes.
 
     Attributes:
-        agent: the agent.
+        trained: what its run has learnt.
         scene: the scene.
         index: of the scene among the run's.
         scene_names: of all the run's scenes.
     """
 
-    agent: Agent
+    trained: TrainedNetwork
     scene: Scene
     index: int
     scene_names: tuple[str, ...]
@@ -45,16 +41,21 @@ class SceneAgent:
         assert self.scene.encoder is not None, "a run's scene has features and their record"
         return self.scene.encoder
 
+    @property
+    def policy(self) -> ScenePolicy:
+        """What decides in the scene, by features."""
+        return self.trained.in_scene(self.index)
+
     def card(self, encoder: Encoder | None) -> Card:
         """The agent's card; with or without its encoder inside."""
-        record, made_by, shape = self.agent.record, self.encoder_record, self.agent.network.shape
+        record, made_by, shape = self.trained.record, self.encoder_record, self.trained.network.shape
         pictures = self.scene.observations
         seen = next((one for one in self.scene.sensors if one.name == sensor_of(made_by)), None)
         return Card(
             scene=self.scene.name,
             actions=ACTION_NAMES,
             history_length=shape.history_length,
-            feature_count=self.agent.feature_map.feature_count,
+            feature_count=self.trained.feature_map.feature_count,
             takes_pictures=encoder is not None,
             encoder={"name": made_by.name, "identity": made_by.identity, "settings": dict(made_by.settings)},
             normalisation=self._normalisation(encoder),
@@ -65,7 +66,7 @@ class SceneAgent:
 
     def _normalisation(self, encoder: Encoder | None) -> dict[str, object]:
         """What the agent itself does to what it is given."""
-        learner = self.agent.record.learner
+        learner = self.trained.record.learner
         assert isinstance(learner, OnFeatures), "a network's agent has the settings of one"
         network = encoder if isinstance(encoder, NetworkEncoder) else None  # another package's says nothing of itself
         pixels = network and {"resize": "bilinear, antialiased, the whole picture", **network.preprocessing.to_json()}
@@ -75,7 +76,7 @@ class SceneAgent:
                 "standardised": network is not None and network.mean is not None,
                 "centred": learner.centre_features,
                 "whitened": learner.whiten_features,
-                "directions": self.agent.feature_map.input_count,
+                "directions": self.trained.feature_map.input_count,
             },
         }
 
@@ -95,12 +96,12 @@ def load_scene_agent(
         RunError: there is no such run or checkpoint, it is damaged, or a scene file is missing or another.
         DeployError: the run has no such scene.
     """
-    agent = load_agent(folder, checkpoint)
-    names = tuple(kept.name for kept in agent.record.scenes)
+    trained = load_network(folder, checkpoint)
+    names = tuple(kept.name for kept in trained.record.scenes)
     if scene is not None and scene not in names:
         raise DeployError(f"{folder}: was not trained on a scene {scene}. Name one of {', '.join(names)}")
     index = 0 if scene is None else names.index(scene)
-    return SceneAgent(agent, run_scenes(agent.record, files)[index], index, names)
+    return SceneAgent(trained, run_scenes(trained.record, files)[index], index, names)
 
 
 def picture_encoder(chosen: SceneAgent) -> Encoder:
@@ -129,8 +130,8 @@ def exportable_encoder(chosen: SceneAgent) -> NetworkEncoder:
     return encoder
 
 
-class RunModel:
-    """An agent of a run folder on PyTorch, see `AgentModel`. Features are those that the project's own encoder makes.
+class RunAgent(FeatureAgent):
+    """The agent of a run folder on PyTorch. Features are those that the project's own encoder makes.
 
     Args:
         chosen: the agent and its scene.
@@ -140,13 +141,6 @@ class RunModel:
     """
 
     def __init__(self, chosen: SceneAgent) -> None:
-        self._encoder = picture_encoder(chosen)
-        self._policy = PolicyGraph(chosen.agent, chosen.index)
-        self.card: Card = chosen.card(self._encoder)
-
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
-        """One step of B agents, see `AgentModel.step`."""
-        after = shifted(history, self._encoder.encode(seen), start)
-        with torch.inference_mode():
-            probabilities, value = self._policy(torch.from_numpy(after), torch.from_numpy(target))
-        return ModelOutput(probabilities.numpy(), value.numpy(), after)
+        encoder = picture_encoder(chosen)
+        super().__init__(chosen.policy, encoder)
+        self.card: Card = chosen.card(encoder)

@@ -8,32 +8,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from clearway.learn.load import Agent
+from clearway.model.policy import ScenePolicy
 from clearway.perception.encoder import NetworkEncoder
-from clearway.scenes.actions import ACTION_COUNT
-
-
-class PolicyGraph(nn.Module):
-    """Features to probabilities and value, by one scene's layers.
-
-    Args:
-        agent: the trained agent.
-        scene: index of the scene among the run's.
-    """
-
-    def __init__(self, agent: Agent, scene: int) -> None:
-        super().__init__()
-        self.network, self.feature_map, self.scene = agent.network, agent.feature_map, scene
-        self.reward_scale = agent.record.learner.reward_scale
-
-    def forward(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-        """Probabilities (B, A) and value (B, 1) for features of the last K pictures (B, K, F) and the target (B, F).
-
-        The value is in units of the reward, which the learner multiplied.
-        """
-        fused = self.network.fused(self.feature_map(history), self.feature_map(target))
-        output = self.network.head(fused, self.scene)
-        return torch.softmax(output[:, :ACTION_COUNT], 1), output[:, ACTION_COUNT:] / self.reward_scale
 
 
 class AgentGraph(nn.Module):
@@ -49,7 +25,7 @@ class AgentGraph(nn.Module):
     feature_mean: Tensor
     feature_std: Tensor
 
-    def __init__(self, policy: PolicyGraph, encoder: NetworkEncoder) -> None:
+    def __init__(self, policy: ScenePolicy, encoder: NetworkEncoder) -> None:
         super().__init__()
         self.policy, self.encoder_network, self.features_of = policy, encoder.network, encoder.features_of
         size = encoder.preprocessing
@@ -62,7 +38,7 @@ class AgentGraph(nn.Module):
         self.register_buffer("feature_std", torch.from_numpy(encoder.std) if standardised else torch.ones(count))
 
     def forward(self, picture: Tensor, start: Tensor, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Probabilities (B, A), value (B, 1), history (B, K, F) after a picture; see `AgentModel.step`."""
+        """Probabilities (B, A), value (B, 1), history (B, K, F) after a picture; as `OnnxAgent` asks for it."""
         features = self.features(picture)
         older = torch.where(start[:, None, None], features[:, None].expand_as(history), history)
         after = torch.cat([older[:, 1:], features[:, None]], 1)

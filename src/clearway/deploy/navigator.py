@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from threading import Lock
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from clearway.deploy.model import AgentModel, checked_seen, features_of
+from clearway.agents.agent import Agent, Decisions, State
+from clearway.agents.selection import Argmax
+from clearway.deploy.agent import DeployedAgent, as_observation
 from clearway.errors import DeployError
 from clearway.scenes.actions import Action
 
@@ -29,7 +32,7 @@ class Decision(NamedTuple):
     value: float
 
 
-def open_model(source: str | Path, scene: str | None = None) -> AgentModel:
+def open_agent(source: str | Path, scene: str | None = None) -> DeployedAgent:
     """A trained agent from an ONNX file or a run folder.
 
     Args:
@@ -41,34 +44,34 @@ def open_model(source: str | Path, scene: str | None = None) -> AgentModel:
     """
     path = Path(source)
     if path.is_dir():
-        from clearway.deploy.from_run import RunModel, load_scene_agent
+        from clearway.deploy.from_run import RunAgent, load_scene_agent
 
-        return RunModel(load_scene_agent(path, scene))
-    from clearway.deploy.onnx_file import OnnxModel
+        return RunAgent(load_scene_agent(path, scene))
+    from clearway.deploy.onnx_file import OnnxAgent
 
-    model = OnnxModel(path)
-    if scene not in (None, model.card.scene):
-        raise DeployError(f"{path}: is for scene {model.card.scene}, not {scene}. Export the run with --scene {scene}")
-    return model
+    agent = OnnxAgent(path)
+    if scene not in (None, agent.card.scene):
+        raise DeployError(f"{path}: is for scene {agent.card.scene}, not {scene}. Export the run with --scene {scene}")
+    return agent
 
 
 class Navigator:
     """Walks to where a picture was taken. Threads may share it; calls are answered one after the other.
 
     Args:
-        source: an ONNX file, a run folder, or an agent opened with `open_model`, which several navigators may share.
+        source: an ONNX file, a run folder, or an agent opened with `open_agent`, which several navigators may share.
         scene: which of a run's scenes; None for the first. A file and an opened agent hold one, which it must be.
         selection: "sampled" draws actions by their probabilities, as in training and in the published protocol;
             "argmax" takes the most probable one, and can walk in circles.
         seed: of the draws; None for one that differs every time.
 
     Raises:
-        ClearwayError: there is no such selection or seed, or the agent is for another scene; see `open_model`.
+        ClearwayError: there is no such selection or seed, or the agent is for another scene; see `open_agent`.
     """
 
     def __init__(
         self,
-        source: str | Path | AgentModel,
+        source: str | Path | DeployedAgent,
         *,
         scene: str | None = None,
         selection: Selection = "sampled",
@@ -76,16 +79,16 @@ class Navigator:
     ) -> None:
         if selection not in get_args(Selection):
             raise DeployError(f"selection is {selection!r}. Choose one of {', '.join(get_args(Selection))}")
-        if not isinstance(source, str | Path) and not (hasattr(source, "card") and hasattr(source, "step")):
+        if not isinstance(source, str | Path) and not (isinstance(source, Agent) and hasattr(source, "card")):
             problem = f"source is {source!r:.60}, expected an ONNX file, a run folder or an opened agent"
             raise DeployError(f"{problem}. Give one of these")
-        self._model = open_model(source, scene) if isinstance(source, str | Path) else source
-        self.card = self._model.card
+        agent = open_agent(source, scene) if isinstance(source, str | Path) else source
+        self.card = agent.card
         if scene not in (None, self.card.scene):
             raise DeployError(f"the agent is for scene {self.card.scene}, not {scene}. Open the agent for {scene}")
-        self._selection, self._rng, self._lock = selection, np.random.default_rng(checked_seed(seed)), Lock()
-        self._target: np.ndarray | None = None
-        self._history: np.ndarray | None = None
+        self._agent: Agent = Argmax(agent) if selection == "argmax" else agent
+        self._episode_seeds, self._lock = episode_seeds(seed), Lock()
+        self._state: State | None = None
 
     def set_target(self, picture: object) -> None:
         """Begin an episode: from the next picture on, walk to where this one was taken.
@@ -97,10 +100,9 @@ class Navigator:
         Raises:
             DeployError: it is no such picture, or too large.
         """
-        seen = checked_seen(picture, self.card)
+        target = as_observation(picture, self.card)
         with self._lock:
-            self._target = features_of(self._model, seen[None])
-            self._history = None
+            self._state = self._agent.reset(target, next(self._episode_seeds))
 
     def act(self, picture: object) -> Decision:
         """What to do, seeing a picture; the same kinds as in `set_target`.
@@ -108,17 +110,24 @@ class Navigator:
         Raises:
             DeployError: it is no such picture, too large, or there is no target yet.
         """
-        seen = checked_seen(picture, self.card)
+        seen = as_observation(picture, self.card)
         with self._lock:
-            if self._target is None:
+            if self._state is None:
                 raise DeployError("there is no target yet. Call set_target first")
-            start = self._history is None
-            before = np.zeros((1, self.card.history_length, self.card.feature_count), np.float32)
-            history = before if self._history is None else self._history
-            step = self._model.step(seen[None], np.array([start]), history, self._target)
-            self._history = step.history
-            action = choose(step.probabilities[0], None if self._selection == "argmax" else self._rng.random())
-        return Decision(action, step.probabilities[0], float(step.value[0, 0]))
+            decisions, self._state = self._agent.act(seen, self._state)
+        return decision_of(decisions)
+
+
+def decision_of(decisions: Decisions) -> Decision:
+    """The decision of a batch of one, by an agent that tells probabilities and value."""
+    assert decisions.probabilities is not None and decisions.value is not None
+    return Decision(Action(int(decisions.action[0])), decisions.probabilities[0], float(decisions.value[0]))
+
+
+def episode_seeds(seed: int | None) -> Iterator[np.ndarray]:
+    """Seeds (1,) int64 of one episode after the other, which differ every time without a seed. Raises DeployError."""
+    rng = np.random.default_rng(checked_seed(seed))
+    return iter(lambda: rng.integers(1 << 62, size=1), None)
 
 
 def checked_seed(seed: object) -> int | None:
@@ -128,11 +137,3 @@ def checked_seed(seed: object) -> int | None:
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
         raise DeployError(f"seed is {seed!r:.40}, expected a whole number from 0. Leave it out for a random one")
     return int(seed)
-
-
-def choose(probabilities: np.ndarray, uniform: float | None) -> Action:
-    """The action that a uniform number in [0, 1) draws by probabilities (A,); None: the most probable one."""
-    if uniform is None:
-        return Action(int(probabilities.argmax()))
-    bounds = probabilities.astype(np.float64).cumsum()
-    return Action(min(int((uniform * bounds[-1] >= bounds).sum()), len(bounds) - 1))

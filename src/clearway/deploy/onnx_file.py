@@ -12,8 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from clearway.agents import memory
+from clearway.agents.agent import FEATURES, Decisions, Observation, State
+from clearway.agents.chance import CHANCE, chance_of, drawn
+from clearway.deploy.agent import sight_of
 from clearway.deploy.card import EXPORT_AGAIN, Card, card_from_json
-from clearway.deploy.model import ModelOutput
 from clearway.errors import DeployError
 
 CARD_KEY, CHECKSUM_KEY = "clearway", "clearway.sha256"
@@ -42,8 +45,8 @@ def check_seal(content: bytes, source: str) -> None:
         raise DeployError(f"{source}: has changed since it was exported (its SHA-256 differs). {EXPORT_AGAIN}")
 
 
-class OnnxModel:
-    """An exported agent on onnxruntime, see `AgentModel`.
+class OnnxAgent:
+    """An exported agent on onnxruntime, see `DeployedAgent`.
 
     Args:
         path: the file.
@@ -59,21 +62,45 @@ class OnnxModel:
         self._session = _session(content, path, threads)
         metadata = self._session.get_modelmeta().custom_metadata_map
         self.card: Card = card_from_json(metadata.get(CARD_KEY, ""), str(path))
+        self.sees: tuple[str, ...] = (sight_of(self.card),)
 
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
-        """One step of B agents, see `AgentModel.step`."""
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
+        features = target[FEATURES] if FEATURES in target else self._features(target)
+        count, size = features.shape
+        return {
+            "target": features,
+            "begun": np.zeros(count, bool),
+            "history": np.zeros((count, self.card.history_length, size), np.float32),
+            CHANCE: chance_of(seed),
+        }
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        """Actions drawn by what the file computes; see `Agent.act`."""
+        seen = observation[self.sees[0]]
         if self.card.takes_pictures:
-            given = {"picture": seen, "start": start, "history": history, "target": target}
-            return ModelOutput(*self._session.run(["probabilities", "value", "history_after"], given))
-        after = shifted(history, seen, start)
-        probabilities, value = self._session.run(["probabilities", "value"], {"history": after, "target": target})
-        return ModelOutput(probabilities, value, after)
+            probabilities, value, after = self._from_pictures(seen, ~state["begun"], state["history"], state["target"])
+        else:
+            after = memory.history(state["history"][:, 1:], state["begun"], seen)
+            given = {"history": after, "target": state["target"]}
+            probabilities, value = self._session.run(["probabilities", "value"], given)
+        decisions, chance = drawn(probabilities, state[CHANCE], value[:, 0])
+        return decisions, {**state, "history": after, "begun": np.ones_like(state["begun"]), CHANCE: chance}
 
+    def _features(self, target: Observation) -> np.ndarray:
+        """Features (B, F) float32."""
+        seen = target[self.sees[0]]
+        if not self.card.takes_pictures:
+            return seen
+        history = np.zeros((len(seen), self.card.history_length, self.card.feature_count), np.float32)
+        return self._from_pictures(seen, np.ones(len(seen), bool), history, history[:, 0])[2][:, -1]
 
-def shifted(history: np.ndarray, features: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """The history (B, K, F) after features (B, F) were seen; those that fill it where start (B,) is true."""
-    older = np.where(start[:, None, None], features[:, None], history)
-    return np.concatenate([older[:, 1:], features[:, None]], axis=1)
+    def _from_pictures(
+        self, picture: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray
+    ) -> list[np.ndarray]:
+        """Probabilities (B, A), value (B, 1) and history (B, K, F) after pictures; where they start, they fill it."""
+        given = {"picture": picture, "start": start, "history": history, "target": target}
+        return self._session.run(["probabilities", "value", "history_after"], given)
 
 
 def _content(path: Path) -> bytes:

@@ -1,30 +1,35 @@
 """Episodes by the paper's protocol, walked side by side: random starts, a cap on the steps.
 
-Axis letters: N episodes, B of them still walking, K poses of history, A actions, M targets, Z zones, T steps.
+Axis letters: N episodes, B of them still walking, A actions, M targets, Z zones, T steps.
 """
 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from clearway.agents.agent import Agent, Decisions, rows
+from clearway.agents.chance import CHANCE
+from clearway.agents.selection import ActionSelection, selecting
+from clearway.errors import AgentError
 from clearway.evaluation.loops import LoopSkipper, Tally
-from clearway.evaluation.policies import argmax
-from clearway.evaluation.selection import ActionSelection, UntriedActions
-from clearway.model.policy import Policy, sampled
+from clearway.evaluation.sight import Sight
 from clearway.reward import COLLISION_AWARE
-from clearway.world.navigation import HISTORY_LENGTH, Navigation, Transition
-from clearway.world.streams import Streams, stream_keys
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.scene import Scene
+from clearway.world.navigation import Navigation, Transition
+from clearway.world.randomness import stream_keys
 from clearway.world.tables import World
 
 EPISODES_PER_TARGET = 100
 STEP_CAP = 10_000
 EPISODES_AT_ONCE = 4096
-TARGET_STREAM, ACTION_STREAM = 11, 12
+TARGET_STREAM = 11
 
 
 @dataclass(frozen=True)
@@ -68,44 +73,47 @@ class EpisodeTable:
 
 def run_episodes(
     world: World,
-    policy: Policy,
+    agent: Agent,
     *,
+    scenes: Sequence[Scene] = (),
     selection: ActionSelection = "sampled",
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
     seed: int = 0,
     record: bool = False,
-    history_length: int = HISTORY_LENGTH,
     episodes_at_once: int = EPISODES_AT_ONCE,
 ) -> EpisodeTable:
     """Walk episodes to every target of a world.
 
     Episode i of a target draws its start and its actions from its own random streams, named by the seed, the
-    scene, the target's state and i: it is the same whatever runs beside it, and all policies face the same
+    scene, the target's state and i: it is the same whatever runs beside it, and all agents face the same
     starts.
 
     Args:
         world: the tables; the walk happens on their device.
-        policy: a pure function of history and target. A walk in a circle of actions that it is certain of is
-            completed by arithmetic instead of walked to the cap; the counts are the same.
-        selection: how actions are chosen by the policy's probabilities.
+        agent: who walks. A walk in a circle of actions that it is certain of is completed by arithmetic instead of
+            walked to the cap; the counts are the same.
+        scenes: the world's, in its order, for an agent that sees pictures.
+        selection: how actions are chosen by the agent's probabilities.
         episodes_per_target: how many.
         step_cap: steps after which an episode has failed.
         seed: another seed gives other starts and other chances.
         record: keep the trajectories too (then circles are walked to the cap).
-        history_length: K.
         episodes_at_once: most episodes to walk side by side; changes memory and speed, not the result.
+
+    Raises:
+        AgentError: the agent sees what is not there, or does what no agent may.
     """
     assert episodes_per_target > 0 and step_cap > 0 and episodes_at_once > 0
     target = torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target)
     seeds = episode_seeds(world, episodes_per_target, seed)
-    policy = argmax(policy) if selection == "argmax" else policy
-    untried = selection == "argmax-untried"
+    agent = selecting(agent, selection, world)
+    sight = Sight(world, agent, scenes)
     parts = []
     with torch.no_grad():
         for chosen in torch.arange(len(target), device=world.device).split(episodes_at_once):
-            walk = _Walk(world, seeds[chosen], target[chosen], history_length, step_cap, record, untried)
-            parts.append(walk.to_the_end(policy))
+            walk = _Walk(world, agent, sight, seeds[chosen], target[chosen], step_cap, record)
+            parts.append(walk.to_the_end())
     return _joined(parts)
 
 
@@ -129,56 +137,45 @@ class _Walk:
     """A batch of episodes on the way. Episodes that end are written down and dropped from the batch."""
 
     def __init__(
-        self,
-        world: World,
-        seeds: Tensor,
-        target: Tensor,
-        history_length: int,
-        step_cap: int,
-        record: bool,
-        untried: bool,
+        self, world: World, agent: Agent, sight: Sight, seeds: Tensor, target: Tensor, step_cap: int, record: bool
     ) -> None:
         count = len(seeds)
-        self.world, self.step_cap = world, step_cap
-        self.chances = Streams(seeds, ACTION_STREAM)
+        self.world, self.agent, self.sight, self.step_cap = world, agent, sight, step_cap
         # No number here rests on the reward; the environment wants one.
-        self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=history_length)
+        self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
         self.env.reset(target=target)
+        self.memory = agent.reset(sight(world.target_state[target]), seeds.cpu().numpy())
         self.target, self.start = target, self.env.state.clone()
         self.walking = torch.arange(count, device=world.device)  # (B,) episode of each row of the batch
         self.tally = Tally.zero(count, world.device)
         self.final = Tally.zero(count, world.device)
         self.reached = torch.zeros(count, dtype=torch.bool, device=world.device)
         self.looped = torch.zeros_like(self.reached)
-        self.loops = LoopSkipper(self.env.history, self.tally)
-        self.untried = UntriedActions(count, int(world.scene_offset.diff().max()), world.device) if untried else None
+        self.loops = LoopSkipper(count, self.tally)
         self.diary: list[tuple[Tensor, Tensor, Tensor]] | None = [] if record else None
 
-    def to_the_end(self, policy: Policy) -> EpisodeTable:
+    def to_the_end(self) -> EpisodeTable:
         """Walk until every episode has ended."""
         while len(self.walking):
-            action, certain = self._choose(policy(self.env.history, self.env.target))
+            decisions, self.memory = self.agent.act(self.sight(self.env.state), self.memory)
+            _check(decisions, len(self.walking))
+            action = torch.from_numpy(decisions.action).to(self.world.device)
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
-            self._close_circles(certain)
+            self._close_circles(decisions.certain)
             if self.diary is not None:
                 self.diary.append((self.walking, happened.state, action))
             self._drop_ended(happened)
         return self._table()
 
-    def _choose(self, probabilities: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions (B,) int64 by (B, A) probabilities, and where the history left no choice, (B,) bool."""
-        _check(probabilities.to(torch.float64).sum(1))
-        if self.untried is not None:
-            scene_state = self.env.state - self.world.scene_offset[self.world.target_scene[self.env.target]]
-            action = self.untried.choose(self.walking, scene_state, probabilities)
-            return action, torch.zeros_like(action, dtype=torch.bool)
-        action = sampled(probabilities, self.chances.at(self.walking))
-        return action, (probabilities > 0).sum(1) == 1
-
-    def _close_circles(self, certain: Tensor) -> None:
+    def _close_circles(self, certain: np.ndarray | None) -> None:
         """Note who walks in a circle for ever, and add its rounds up to the cap, unless every step is recorded."""
-        tally, closed = self.loops.skip(self.env.history, self.tally, certain, self.step_cap)
+        if certain is None:
+            return
+        known = {name: values for name, values in self.memory.items() if name != CHANCE}
+        where = {**known, "standing in": self.env.state.cpu().numpy()}
+        sure = torch.from_numpy(certain).to(self.world.device)
+        tally, closed = self.loops.skip(where, self.tally, sure, self.step_cap)
         self.looped[self.walking[closed]] = True
         if self.diary is None:
             self.tally = tally
@@ -194,7 +191,9 @@ class _Walk:
         self.walking, self.tally = self.walking[still], self.tally.at(still)
         # There is no reset from here on, so the environment's start and target streams may keep their length.
         self.env.load_tensors({name: value[still] for name, value in self.env.tensors().items()})
-        self.loops.keep(still)
+        kept = still.cpu().numpy()
+        self.memory = rows(self.memory, kept)
+        self.loops.keep(kept)
 
     def _table(self) -> EpisodeTable:
         distance = self.world.distance_table()[self.target, self.start]
@@ -211,9 +210,19 @@ class _Walk:
         )
 
 
-def _check(total: Tensor) -> None:
-    valid = (total > 0) & torch.isfinite(total)
-    assert bool(valid.all()), "a policy gave probabilities that are not finite or all zero"
+def _check(decisions: Decisions, count: int) -> None:
+    """Raise AgentError where these are no decisions of so many episodes."""
+    action, told = decisions.action, decisions.probabilities
+    if action.shape != (count,) or action.dtype.kind != "i":
+        problem = f"the agent gave actions {action.dtype} {action.shape}, expected int64 ({count},)"
+        raise AgentError(f"{problem}. Give one for each episode")
+    if action.min() < 0 or action.max() >= ACTION_COUNT:
+        wrong = int(action[(action < 0) | (action >= ACTION_COUNT)][0])
+        raise AgentError(f"the agent gave action {wrong}, expected 0 to {ACTION_COUNT - 1}, see scenes.actions.Action")
+    if told is not None:
+        total = told.astype(np.float64).sum(1)
+        if not ((total > 0) & np.isfinite(total)).all():
+            raise AgentError("the agent gave probabilities that are not finite or all zero. Give finite ones")
 
 
 def _array(tensor: Tensor) -> np.ndarray:

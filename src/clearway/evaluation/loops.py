@@ -1,14 +1,16 @@
 """Counting an episode's steps, and completing walks in a circle without walking them.
 
-An agent that is certain of every action repeats itself for ever once its history repeats. `LoopSkipper` finds
-that by Brent's method (a snapshot, renewed at the powers of two, is compared with every later history) and
-adds as many whole rounds as fit below the cap; the rest is walked. The counts are exactly those of walking on.
+An agent that is certain of every action repeats itself for ever once it stands in the same pose with the same memory.
+`LoopSkipper` finds that by Brent's method (a snapshot, renewed at the powers of two, is compared with all that follows)
+and adds as many whole rounds as fit below the cap; the rest is walked. The counts are exactly those of walking on.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -55,44 +57,46 @@ class Tally:
 
 
 class LoopSkipper:
-    """Watches B episodes for histories that repeat.
+    """Watches B episodes for what comes back.
 
     Args:
-        history: (B, K) int64, the histories at the start.
+        count: B.
         tally: the counts at the start.
     """
 
-    def __init__(self, history: Tensor, tally: Tally) -> None:
+    def __init__(self, count: int, tally: Tally) -> None:
         self.walked, self.renew_at = 0, 1
-        self.snapshot, self.tally = history.clone(), tally
-        self.certain = torch.ones(len(history), dtype=torch.bool, device=history.device)
+        self.snapshot: Mapping[str, np.ndarray] = {}  # none yet: after the first step there is one
+        self.tally = tally
+        self.certain = torch.zeros(count, dtype=torch.bool, device=tally.steps.device)
 
-    def skip(self, history: Tensor, tally: Tally, certain: Tensor, step_cap: int) -> tuple[Tally, Tensor]:
+    def skip(
+        self, where: Mapping[str, np.ndarray], tally: Tally, certain: Tensor, step_cap: int
+    ) -> tuple[Tally, Tensor]:
         """The counts after one more step, with all whole rounds below the cap where a circle has closed; where, (B,).
 
         Args:
-            history: (B, K) int64, after the step.
+            where: all that the further walk follows from but for chance, each (B, ...), after the step.
             tally: the counts after the step.
-            certain: (B,) bool, the step's action was the only one that the history and target allow.
+            certain: (B,) bool, the step's action was the only one possible.
             step_cap: the episodes' last step.
         """
         self.walked += 1
         self.certain = self.certain & certain
-        closed = self.certain & (history == self.snapshot).all(1)
+        closed = self.certain
         if bool(closed.any()):
+            closed = closed & torch.from_numpy(_same(where, self.snapshot)).to(closed.device)
             tally = self._rounds_added(tally, closed, step_cap)
         if self.walked == self.renew_at:
-            self.snapshot, self.tally, self.renew_at = history.clone(), tally, 2 * self.renew_at
+            self.snapshot, self.tally, self.renew_at = where, tally, 2 * self.renew_at
             self.certain = torch.ones_like(self.certain)
         return tally, closed
 
-    def keep(self, still: Tensor) -> None:
+    def keep(self, still: np.ndarray) -> None:
         """Forget the episodes where still (B,) is False."""
-        self.snapshot, self.tally, self.certain = (
-            self.snapshot[still],
-            self.tally.at(still),
-            self.certain[still],
-        )
+        kept = torch.from_numpy(still).to(self.certain.device)
+        self.snapshot = {name: values[still] for name, values in self.snapshot.items()}
+        self.tally, self.certain = self.tally.at(kept), self.certain[kept]
 
     def _rounds_added(self, tally: Tally, closed: Tensor, step_cap: int) -> Tally:
         """Whole rounds added where closed; those episodes are not watched until the snapshot is renewed."""
@@ -100,3 +104,10 @@ class LoopSkipper:
         rounds = torch.where(closed, (step_cap - tally.steps) // length, 0)
         self.certain = self.certain & ~closed
         return tally.plus_rounds(rounds, self.tally)
+
+
+def _same(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(B,) bool: rows that are equal in all their arrays."""
+    count = len(next(iter(one.values())))
+    equal = [(one[name] == other[name]).reshape(count, -1).all(1) for name in one]
+    return np.logical_and.reduce(equal)

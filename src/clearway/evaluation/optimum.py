@@ -1,4 +1,4 @@
-"""The exact yardsticks of `oracle` for a world: as figures, and as policies that can be walked beside an agent."""
+"""The exact yardsticks of `oracle` for a world: as figures, and as agents."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
+from clearway.agents.agent import Agent
+from clearway.agents.by_pose import by_table
 from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, make_task, yardstick
-from clearway.model.policy import Policy
 from clearway.reward import Reward
 from clearway.world.tables import World
 
@@ -66,8 +66,8 @@ def world_yardsticks(
     return found
 
 
-def optimum_policies(world: World, yardsticks: list[TargetYardstick]) -> tuple[Policy, Policy]:
-    """The optimal and the soft policy of a world's yardsticks, to be walked like any agent."""
+def optimum_agents(world: World, yardsticks: list[TargetYardstick]) -> tuple[Agent, Agent]:
+    """Agents of the optimal and of the soft policy of a world's yardsticks."""
     rows = [
         (target, slice(*world.scene_offset[scene : scene + 2].tolist()))
         for target, scene in enumerate(world.target_scene.tolist())
@@ -77,14 +77,7 @@ def optimum_policies(world: World, yardsticks: list[TargetYardstick]) -> tuple[P
     for (target, states), found in zip(rows, yardsticks, strict=True):
         optimal[target, states] = torch.from_numpy(found.yardstick.optimal_policy).float()
         soft[target, states] = torch.from_numpy(found.yardstick.soft_policy).float()
-    return _table_policy(optimal.to(world.device)), _table_policy(soft.to(world.device))
-
-
-def _table_policy(table: Tensor) -> Policy:
-    def probabilities(history: Tensor, target: Tensor) -> Tensor:
-        return table[target, history[:, -1]]
-
-    return probabilities
+    return by_table(world, optimal.to(world.device)), by_table(world, soft.to(world.device))
 
 
 def _figures(expected: Expected) -> dict[str, float | None]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import get_args
 
+from clearway.agents.agent import Agent
+from clearway.agents.by_pose import RandomWalk, shortest_paths
+from clearway.agents.selection import ActionSelection
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP, run_episodes
-from clearway.evaluation.policies import random_policy, shortest_path_policy
 from clearway.evaluation.report import Evaluation, Protocol, summarise
-from clearway.evaluation.selection import ActionSelection
-from clearway.model.policy import Policy
-from clearway.world.navigation import HISTORY_LENGTH
+from clearway.scenes.scene import Scene
 from clearway.world.tables import World
 
 RANDOM, SHORTEST_PATH = "random", "shortest path"
@@ -18,14 +18,14 @@ RANDOM, SHORTEST_PATH = "random", "shortest path"
 
 def evaluate_agents(
     world: World,
-    agents: Mapping[str, Policy],
+    agents: Mapping[str, Agent],
     *,
-    references: Mapping[str, Policy] | None = None,
+    references: Mapping[str, Agent] | None = None,
+    scenes: Sequence[Scene] = (),
     encoder: str,
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
     seed: int = 0,
-    history_length: int = HISTORY_LENGTH,
 ) -> list[Evaluation]:
     """Every agent with each way of choosing actions, then the references, random and shortest-path agent.
 
@@ -34,28 +34,28 @@ def evaluate_agents(
 
     Args:
         world: scenes and targets.
-        agents: policies by the agent's name.
-        references: further policies to compare with, sampled only.
+        agents: by name.
+        references: further agents to compare with, sampled only.
+        scenes: the world's, in its order, for agents that see pictures.
         encoder: name of the encoder whose features the agents see.
         episodes_per_target: how many each.
         step_cap: steps after which an episode has failed.
         seed: of starts, chances and bootstrap.
-        history_length: K, as the policies expect it.
     """
     selections: tuple[ActionSelection, ...] = get_args(ActionSelection)
-    rows = [(name, selection, policy) for name, policy in agents.items() for selection in selections]
-    rows += [(name, "sampled", policy) for name, policy in (references or {}).items()]
-    rows += [(RANDOM, "sampled", random_policy()), (SHORTEST_PATH, "sampled", shortest_path_policy(world))]
+    rows = [(name, selection, agent) for name, agent in agents.items() for selection in selections]
+    rows += [(name, "sampled", agent) for name, agent in (references or {}).items()]
+    rows += [(RANDOM, "sampled", RandomWalk()), (SHORTEST_PATH, "sampled", shortest_paths(world))]
     evaluations = []
-    for name, selection, policy in rows:
+    for name, selection, agent in rows:
         table = run_episodes(
             world,
-            policy,
+            agent,
+            scenes=scenes,
             selection=selection,
             episodes_per_target=episodes_per_target,
             step_cap=step_cap,
             seed=seed,
-            history_length=history_length,
         )
         protocol = Protocol(episodes_per_target, step_cap, seed, selection)
         evaluations.append(summarise(world, table, name, encoder, protocol))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clearway.agents.selection import ActionSelection
 from clearway.choices import ZoneLevel
 from clearway.evaluation import bootstrap, metrics
 from clearway.evaluation.episodes import EpisodeTable
-from clearway.evaluation.selection import ActionSelection
 from clearway.reward import Reward
 from clearway.world.tables import World
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clearway.agents.agent import Agent
 from clearway.evaluation.episodes import Trajectory, run_episodes
-from clearway.model.policy import Policy
-from clearway.world.navigation import HISTORY_LENGTH
 from clearway.world.tables import World
 
 EPISODES = 20  # a target, to choose from
@@ -33,28 +32,24 @@ class Showcase:
     walks: Mapping[str, Trajectory]
 
 
-def showcases(
-    world: World, policies: Mapping[str, Policy], *, seed: int = 0, history_length: int = HISTORY_LENGTH
-) -> list[Showcase]:
+def showcases(world: World, agents: Mapping[str, Agent], *, seed: int = 0) -> list[Showcase]:
     """For each scene the episode with the longest way among those that most of the agents finish.
 
     Args:
         world: scenes and targets.
-        policies: by the agent's name; actions are sampled.
+        agents: by name; actions are sampled.
         seed: of starts and actions.
-        history_length: K, as the policies expect it.
     """
     tables = {
         name: run_episodes(
             world,
-            policy,
+            agent,
             episodes_per_target=EPISODES,
             step_cap=STEP_CAP,
             seed=seed,
             record=True,
-            history_length=history_length,
         )
-        for name, policy in policies.items()
+        for name, agent in agents.items()
     }
     any_table = next(iter(tables.values()))
     finished = np.sum([table.reached for table in tables.values()], 0)

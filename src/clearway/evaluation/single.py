@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from clearway.agents.selection import ActionSelection
 from clearway.errors import RunError
 from clearway.evaluation.episodes import Trajectory, run_episodes
-from clearway.evaluation.selection import ActionSelection
-from clearway.learn.load import Agent, run_tables
+from clearway.learn.load import TrainedAgent, run_tables
 from clearway.scenes.scene import Scene
 from clearway.world.tables import World
 
 
 def single_episode(
-    agent: Agent,
+    agent: TrainedAgent,
     scenes: Sequence[Scene],
     scene: str | None,
     target: int | None,
@@ -45,13 +45,12 @@ def single_episode(
     world = run_tables(agent.record, scenes).with_targets({wanted: (goal,)})
     table = run_episodes(
         world,
-        agent.policy(world),
+        agent.on_poses(world),
         selection=selection,
         episodes_per_target=1,
         step_cap=step_cap,
         seed=seed,
         record=True,
-        history_length=agent.record.learner.history_length,
     )
     assert table.trajectories is not None
     return world, table.trajectories[0]

@@ -12,7 +12,7 @@ from clearway.evaluation.files import write_evaluations
 from clearway.evaluation.report import Evaluation
 from clearway.evaluation.run import evaluate_runs
 from clearway.evaluation.showcase import Showcase, showcases
-from clearway.learn.load import Agent, load_agent, run_world
+from clearway.learn.load import TrainedAgent, load_agent, run_world
 from clearway.learn.presets import DEFAULT
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, train
@@ -107,11 +107,10 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     )
 
 
-def _showcase(agents: dict[str, Agent], scene: Scene, seed: int) -> Showcase:
+def _showcase(agents: dict[str, TrainedAgent], scene: Scene, seed: int) -> Showcase:
     record = next(iter(agents.values())).record
     world = run_world(record, [scene])
-    policies = {name: agent.policy(world) for name, agent in agents.items()}
-    return showcases(world, policies, seed=seed, history_length=record.learner.history_length)[0]
+    return showcases(world, {name: agent.on_poses(world) for name, agent in agents.items()}, seed=seed)[0]
 
 
 def _claim(folder: Path) -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from clearway.agents.by_pose import RandomWalk
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.metrics import METRIC_NAMES, by_target
-from clearway.evaluation.policies import random_policy
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
 from clearway.experiments.setting import Setting
@@ -84,7 +84,7 @@ def random_walk(world: World, trial: Trial) -> Scores:
     """The random walk's figures on the world's targets, under the trial's protocol."""
     table = run_episodes(
         world,
-        random_policy(),
+        RandomWalk(),
         episodes_per_target=trial.episodes_per_target,
         step_cap=trial.step_cap,
         seed=trial.seed,

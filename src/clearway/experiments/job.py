@@ -93,9 +93,8 @@ def _walk(folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Tr
     world = make_world(scenes, {scene.name: own for scene, own in zip(scenes, trial.targets, strict=True)})
     return run_episodes(
         world,
-        agent.policy(world),
+        agent.on_poses(world),
         episodes_per_target=trial.episodes_per_target,
         step_cap=trial.step_cap,
         seed=trial.seed,
-        history_length=run.learner.history_length,
     )

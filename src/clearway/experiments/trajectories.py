@@ -24,9 +24,7 @@ def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
             continue
         world = setting.world()
         agents = {group.agent: load_agent(run_folder(setting.out, group.runs[0]).path) for group in own}
-        policies = {name: agent.policy(world) for name, agent in agents.items()}
-        history_length = own[0].runs[0].learner.history_length
-        for show in showcases(world, policies, history_length=history_length):
+        for show in showcases(world, {name: agent.on_poses(world) for name, agent in agents.items()}):
             walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
             name = f"map_{learner.replace(', ', '_')}_{show.scene}"
             lost = [agent for agent, walk in walks.items() if walk[-1] != show.target]

@@ -16,7 +16,7 @@ from clearway.errors import RunError
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from clearway.learn.load import Acting
+    from clearway.learn.load import TrainedAgent
     from clearway.learn.run_folder import RunRecord
     from clearway.learn.train import Learning
     from clearway.reward import Reward
@@ -107,7 +107,7 @@ class Learner:
         """
         raise NotImplementedError
 
-    def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> Acting:
+    def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedAgent:
         """The agent of a run from the tensors of its checkpoint, after that many frames.
 
         Raises:

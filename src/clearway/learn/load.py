@@ -1,4 +1,4 @@
-"""A trained agent from its run folder: scenes, world, network and policy."""
+"""What a run has learnt, from its run folder, with the scenes and the world it walks in."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Protocol, runtime_checkable
 
 from torch import Tensor
 
+from clearway.agents.agent import Agent
+from clearway.agents.by_pose import PoseAgent, network_on_poses
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
 from clearway.learn.learner import OnFeatures
@@ -17,15 +19,15 @@ from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRec
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
-from clearway.model.policy import Critic, Policy, network_critic, network_policy
+from clearway.model.policy import ScenePolicy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
 from clearway.world.tables import World, make_world, scene_tables
 
 
 @runtime_checkable
-class Acting(Protocol):
-    """What is needed of a run's agent to walk with it, whatever it consists of."""
+class TrainedAgent(Protocol):
+    """What a run has learnt, whatever it consists of. In a world it is an `Agent`."""
 
     @property
     def record(self) -> RunRecord:
@@ -35,12 +37,12 @@ class Acting(Protocol):
     def frames(self) -> int:
         """It has learnt from."""
 
-    def policy(self, world: World) -> Policy:
-        """What it does in a world with the run's scenes."""
+    def on_poses(self, world: World) -> Agent:
+        """Its agent on the grid, in a world with the run's scenes."""
 
 
 @dataclass(frozen=True)
-class Agent:
+class TrainedNetwork:
     """A trained network with what it needs to act.
 
     Attributes:
@@ -55,13 +57,13 @@ class Agent:
     feature_map: FeatureMap
     frames: int
 
-    def policy(self, world: World) -> Policy:
-        """Action probabilities (B, A) for histories (B, K) and targets (B,) of a world with the run's scenes."""
-        return network_policy(self.lookup(world), world)
+    def on_poses(self, world: World) -> PoseAgent:
+        """Its agent on the grid, in a world with the run's scenes. Raises RunError as `lookup` does."""
+        return network_on_poses(self.lookup(world), world, self.record.learner.reward_scale)
 
-    def critic(self, world: World) -> Critic:
-        """As `policy`, with the values (B,) too."""
-        return network_critic(self.lookup(world), world)
+    def in_scene(self, index: int) -> ScenePolicy:
+        """Its policy in one of the run's scenes, by features."""
+        return ScenePolicy(self.network, self.feature_map, index, self.record.learner.reward_scale)
 
     def lookup(self, world: World) -> LookupNetwork:
         """The network on the states of a world with the run's scenes, for its targets.
@@ -80,14 +82,14 @@ class Agent:
         return LookupNetwork(self.network, prepared_features(world, self.feature_map), world.target_state)
 
 
-def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
+def load_network(folder: Path, checkpoint: Path | None = None) -> TrainedNetwork:
     """The agent of a run that consists of a network, from its newest checkpoint or the one given.
 
     Raises:
-        RunError: as for `load_acting`, or the agent has no network.
+        RunError: as for `load_agent`, or the agent has no network.
     """
-    agent = load_acting(folder, checkpoint)
-    if not isinstance(agent, Agent):
+    agent = load_agent(folder, checkpoint)
+    if not isinstance(agent, TrainedNetwork):
         name = agent.record.learner.algorithm
         raise RunError(
             f"{folder}: an agent of {name} has no network. Walk with it by clearway evaluate without --live, "
@@ -96,7 +98,7 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> Agent:
     return agent
 
 
-def load_acting(folder: Path, checkpoint: Path | None = None) -> Acting:
+def load_agent(folder: Path, checkpoint: Path | None = None) -> TrainedAgent:
     """The agent of a run, whatever it consists of, from its newest checkpoint or the one given.
 
     Raises:
@@ -118,14 +120,15 @@ def load_acting(folder: Path, checkpoint: Path | None = None) -> Acting:
         raise RunError(f"{path}: does not fit its run ({reason}). Use another checkpoint") from error
 
 
-def network_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> Agent:
+def network_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedNetwork:
     """The agent of a run that consists of a network.
 
     Raises:
         LookupError, RuntimeError, ValueError: the tensors do not fit the run.
     """
     feature_map = FeatureMap.from_tensors(part_of(tensors, "features"))
-    return Agent(record, _network(record, feature_map.input_count, part_of(tensors, "network")), feature_map, frames)
+    network = _network(record, feature_map.input_count, part_of(tensors, "network"))
+    return TrainedNetwork(record, network, feature_map, frames)
 
 
 def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tensor]) -> SiameseActorCritic:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, ClassVar
 import torch
 from torch import Tensor
 
+from clearway.agents.by_pose import PoseAgent
 from clearway.errors import RunError
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import Learner, linear
@@ -27,7 +28,7 @@ from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.rollout import ACTION_STREAM
 from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.policy import Policy, sampled
+from clearway.model.policy import sampled
 from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.navigation import Navigation
@@ -66,9 +67,9 @@ class QLearning(Learner):
         """A trainer at its first frame."""
         return TableTrainer(world, self, reward, seed)
 
-    def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TableAgent:
+    def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedTable:
         """The agent of a run from the tensors of its checkpoint, after that many frames."""
-        return TableAgent(record, tensors["table.values"], frames)
+        return TrainedTable(record, tensors["table.values"], frames)
 
 
 class TableTrainer:
@@ -178,7 +179,7 @@ class Walked:
 
 
 @dataclass(frozen=True)
-class TableAgent:
+class TrainedTable:
     """A table with what it needs to act.
 
     Attributes:
@@ -191,8 +192,8 @@ class TableAgent:
     values: Tensor
     frames: int
 
-    def policy(self, world: World) -> Policy:
-        """The best known actions alike, in a world with the run's scenes and targets among the run's.
+    def on_poses(self, world: World) -> PoseAgent:
+        """Its agent on the grid, which takes the best known actions alike, to targets of the run in the run's scenes.
 
         Raises:
             RunError: the scenes or targets are others.
@@ -214,7 +215,12 @@ class TableAgent:
             )
         first_row = first_row[torch.tensor([learnt.index(one) for one in wanted], device=world.device)]
         values = self.values.to(world.device)
-        return lambda history, target: best_actions(values[first_row[target] + history[:, -1]])
+
+        def rule(history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+            row = values[first_row[target] + history[:, -1]]
+            return best_actions(row), row.max(1).values
+
+        return PoseAgent(world, rule)
 
 
 def table_rows(scene_offset: Tensor, target_scene: Tensor) -> tuple[Tensor, int]:

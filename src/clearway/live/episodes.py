@@ -1,14 +1,14 @@
-"""Episodes in the live room, walked side by side: picture, encoder, policy, body, step by step.
+"""Episodes in the live room, walked side by side: picture, agent, body, step by step.
 
 Starts, targets and the chances of sampled actions are those of the evaluation on the grid (`evaluate.episodes`):
 without perturbations an episode is the same here and there up to its first contact.
 
-Axis letters: N episodes, B of them still walking, K pictures of history (newest last), F features, A actions.
+Axis letters: N episodes, B of them still walking.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,31 +16,28 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.evaluation.episodes import ACTION_STREAM, episode_seeds
+from clearway.agents.agent import FEATURES, Agent, Observation, rows
+from clearway.agents.selection import Argmax
+from clearway.errors import AgentError
+from clearway.evaluation.episodes import episode_seeds
 from clearway.live.body import SAMPLES, Body, Motion
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
 from clearway.live.layout import Arrangement, arranged, as_built, furniture_moved, with_obstacle_on_path
 from clearway.live.room import LiveRoom
 from clearway.live.settings import Perturbations
-from clearway.model.policy import sampled
-from clearway.perception.encoder import Encoder
 from clearway.reward import COLLISION_AWARE
 from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
 from clearway.rooms.render import Camera
 from clearway.scenes.actions import Action
+from clearway.scenes.sensors import RGB
 from clearway.world.navigation import Navigation
-from clearway.world.streams import Streams
 from clearway.world.tables import World
 
 LiveSelection = Literal["sampled", "argmax"]
-LivePolicy = Callable[[Tensor, Tensor], Tensor]
-"""Features of histories (B, K, F) and of targets (B, F) -> probabilities of actions (B, A)."""
-
 SUCCESS_M, SUCCESS_DEG = 0.25, 45.0
 """A target is reached within half a cell and half a turn of its pose."""
 NEAR_M, CLOSE_M = 0.3, 0.1
 STEP_S = 1.0  # a step takes so long, move or turn
-PICTURES_AT_ONCE = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,22 +88,19 @@ class LiveProtocol:
         episodes_per_target: how many.
         step_cap: steps after which an episode has failed.
         seed: of starts, actions and perturbations.
-        selection: how actions are chosen by the policy's probabilities.
-        history_length: K.
+        selection: how actions are chosen by the agent's probabilities.
     """
 
     episodes_per_target: int
     step_cap: int
     seed: int
     selection: LiveSelection
-    history_length: int
 
 
 def run_live_episodes(
     live: LiveRoom,
     world: World,
-    policy: LivePolicy,
-    encoder: Encoder,
+    agent: Agent,
     camera: Camera,
     perturbations: Perturbations,
     protocol: LiveProtocol,
@@ -116,41 +110,39 @@ def run_live_episodes(
 
     Args:
         live: the room.
-        world: of the room's scene alone, with its features.
-        policy: what the agent does by what it sees.
-        encoder: that of the scene's features.
+        world: of the room's scene alone.
+        agent: who walks, by colour pictures.
         camera: takes pictures of `live.model`.
         perturbations: what is different from the grid.
         protocol: how many episodes, how long, and so on.
         show_steps: called after every step with the number of episodes still walking.
+
+    Raises:
+        AgentError: the agent sees something else than colour pictures.
     """
+    _check_sight(agent)
     target = torch.arange(world.target_count).repeat_interleave(protocol.episodes_per_target)
     seeds = episode_seeds(world, protocol.episodes_per_target, protocol.seed)
-    env = Navigation(world, COLLISION_AWARE, seeds, history_length=protocol.history_length)
+    env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
     env.reset(target=target)
     walkers = [
         _Walker(live, int(start), int(world.target_state[goal]), Draws(int(seed), perturbations))
         for start, goal, seed in zip(env.state, target, seeds, strict=True)
     ]
-    assert world.features is not None
-    wanted = world.features[world.target_state[target]]
-    chances = Streams(seeds, ACTION_STREAM)
+    agent = Argmax(agent) if protocol.selection == "argmax" else agent
     walking = np.arange(len(walkers))
-    seen = _features(walkers, camera, encoder)
-    history = seen[:, None].repeat(1, protocol.history_length, 1)  # (B, K, F)
+    memory = agent.reset(_wanted(live, world, target), seeds.numpy())
     for _ in range(protocol.step_cap):
-        index = torch.from_numpy(walking)
-        actions = _chosen(policy(history, wanted[index]), chances.at(index), protocol.selection)
-        for episode, action in zip(walking, actions.tolist(), strict=True):
+        seen = {RGB: _seen([walkers[episode] for episode in walking], camera)} if RGB in agent.sees else {}
+        decisions, memory = agent.act(seen, memory)
+        for episode, action in zip(walking, decisions.action.tolist(), strict=True):
             walkers[episode].act(Action(action))
         still = np.array([not walkers[episode].reached for episode in walking])
-        walking = walking[still]
+        walking, memory = walking[still], rows(memory, still)
         if show_steps is not None:
             show_steps(len(walking))
         if not len(walking):
             break
-        seen = _features([walkers[episode] for episode in walking], camera, encoder)
-        history = torch.cat([history[torch.from_numpy(still), 1:], seen[:, None]], dim=1)
     distance = world.distance_table()[target, env.state].numpy()
     return _table(walkers, target.numpy(), distance)
 
@@ -211,22 +203,33 @@ def _layout(live: LiveRoom, start: int, target: int, draws: Draws) -> Arrangemen
     return layout
 
 
-def _features(walkers: list[_Walker], camera: Camera, encoder: Encoder) -> Tensor:
-    """Features (B, F) of what each sees."""
+def _check_sight(agent: Agent) -> None:
+    if others := set(agent.sees) - {RGB}:
+        problem = f"the agent sees {', '.join(sorted(others))}, and live walks take colour pictures"
+        raise AgentError(f"{problem}. Evaluate on the grid: clearway evaluate")
+
+
+def _wanted(live: LiveRoom, world: World, target: Tensor) -> Observation:
+    """What is seen at the targets (N,): the scene's pictures and features, as far as it has them."""
+    state = world.target_state[target]
+    found: dict[str, np.ndarray] = {}
+    if live.scene.observations is not None:
+        pictures, place = np.unique(state.numpy(), return_inverse=True)
+        found[RGB] = np.stack([live.scene.observations[pose] for pose in pictures.tolist()])[place]
+    if world.features is not None:
+        found[FEATURES] = world.features[state].numpy()
+    return found
+
+
+def _seen(walkers: Sequence[_Walker], camera: Camera) -> np.ndarray:
+    """Pictures (B, height, width, 3) uint8 of what each sees."""
     shots = []
     for walker in walkers:
         pose, height_m, pitch_deg = walker.shot_arguments()
         moved_m = walker.layout.bodies_m
         shots.append(first_person_shot(*pose, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m))
     pictures = camera(shots)
-    pictures = np.stack([walker.draws.seen(picture) for walker, picture in zip(walkers, pictures, strict=True)])
-    batches = range(0, len(pictures), PICTURES_AT_ONCE)
-    return torch.cat([torch.from_numpy(encoder.encode(pictures[b : b + PICTURES_AT_ONCE])) for b in batches])
-
-
-def _chosen(probabilities: Tensor, chance: Tensor, selection: LiveSelection) -> Tensor:
-    """Actions (B,) int64 by probabilities (B, A); chance: (B,) in [0, 1)."""
-    return probabilities.argmax(1) if selection == "argmax" else sampled(probabilities, chance)
+    return np.stack([walker.draws.seen(picture) for walker, picture in zip(walkers, pictures, strict=True)])
 
 
 def _table(walkers: list[_Walker], target: np.ndarray, distance: np.ndarray) -> LiveTable:

@@ -7,10 +7,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
 from clearway.files import json_text, written_whole
-from clearway.learn.load import Agent
-from clearway.live.agent import live_policy
+from clearway.learn.load import TrainedNetwork
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.report import LiveResult, summarise
 from clearway.live.room import LiveRoom, live_room
@@ -54,21 +54,21 @@ class LiveOutcome:
     tables: Mapping[str, tuple[LiveTable, ...]]
 
 
-def check_alike(agents: Mapping[str, Agent]) -> None:
+def check_alike(agents: Mapping[str, TrainedNetwork]) -> None:
     """Check that agents can be compared episode by episode.
 
     Raises:
-        RunError: they have other scenes, targets or a history of another length.
+        RunError: they have other scenes or targets.
     """
     first, *others = (agent.record for agent in agents.values())
+    digests = [scene.digest for scene in first.scenes]
     for record in others:
-        alike = record.targets == first.targets and record.learner.history_length == first.learner.history_length
-        if not alike or [scene.digest for scene in record.scenes] != [scene.digest for scene in first.scenes]:
-            raise RunError("the runs differ in their scenes, targets or history length. Evaluate them one by one")
+        if record.targets != first.targets or [scene.digest for scene in record.scenes] != digests:
+            raise RunError("the runs differ in their scenes or targets. Evaluate them one by one")
 
 
 @contextmanager
-def stages(agents: Mapping[str, Agent], scenes: Sequence[Scene]) -> Iterator[list[LiveScene]]:
+def stages(agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene]) -> Iterator[list[LiveScene]]:
     """Build the rooms of the agents' scenes and open a camera in each, for the block.
 
     Raises:
@@ -101,7 +101,7 @@ def _encoder_record(scene: Scene) -> EncoderRecord:
 
 def walk_setting(
     places: Sequence[LiveScene],
-    agents: Mapping[str, Agent],
+    agents: Mapping[str, TrainedNetwork],
     setting: Condition,
     protocol: LiveProtocol,
     show: Callable[[str], None] | None = None,
@@ -121,8 +121,7 @@ def walk_setting(
                 run_live_episodes(
                     stage.live,
                     stage.world,
-                    live_policy(agent, index),
-                    stage.encoder,
+                    FeatureAgent(agent.in_scene(index), stage.encoder),
                     stage.camera,
                     setting.perturbations,
                     protocol,

@@ -1,42 +1,36 @@
-"""`Policy`: what an agent does, given where it is and where it has to go; and the network as one.
+"""The network as a policy: from tables for all poses of a world, plainly for one scene; and what policies share.
 
-Axis letters: B batch, K poses of history (newest last), A actions.
+Axis letters: B batch, K history (newest last), F features, A actions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
+from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import LookupNetwork
+from clearway.model.network import SiameseActorCritic
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.world.randomness import drawn_by
 from clearway.world.tables import DistanceTable, World
 
-Policy = Callable[[Tensor, Tensor], Tensor]
-"""history (B, K) int64 states in the world's numbering, target (B,) int64 -> probabilities of actions (B, A).
-
-A pure function: the same history and target give the same probabilities. They need not sum to one exactly.
-"""
+Critic: TypeAlias = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
+"""history (B, K) int64 states in the world's numbering, target (B,) int64 -> probabilities (B, A), values (B,)."""
 
 
 def sampled(probabilities: Tensor, uniform: Tensor) -> Tensor:
-    """Actions (B,) int64 drawn by probabilities (B, A), which need not sum to one, from uniform (B,) in [0, 1).
-
-    In float64: in float32 a number near 1 would round to 1, and the last action be drawn where it is impossible.
-    """
-    bounds = probabilities.to(torch.float64).cumsum(1)
-    return ((uniform * bounds[:, -1])[:, None] >= bounds[:, :-1]).sum(1)
+    """Actions (B,) int64 drawn by probabilities (B, A) from uniform (B,) in [0, 1), see `drawn_by`."""
+    return drawn_by(probabilities.to(torch.float64), uniform)
 
 
 def shortest_path_actions(world: World, steps_to_go: DistanceTable, state: Tensor, target: Tensor) -> Tensor:
     """(B, A) bool: actions that begin a shortest path from states (B,) int64 to targets (B,); none without a path."""
     after = steps_to_go[target[:, None], world.next_state[state]]  # (B, A)
     return (after == steps_to_go[target, state][:, None] - 1) & (after >= 0)
-
-
-Critic = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
-"""As a `Policy`, with the value of the history too: probabilities (B, A) and values (B,)."""
 
 
 def network_critic(network: LookupNetwork, world: World) -> Critic:
@@ -56,7 +50,30 @@ def network_critic(network: LookupNetwork, world: World) -> Critic:
     return probabilities_and_values
 
 
-def network_policy(network: LookupNetwork, world: World) -> Policy:
-    """The network's policy in the world whose states and targets it was made for; rows may come in any order."""
-    critic = network_critic(network, world)
-    return lambda history, target: critic(history, target)[0]
+class ScenePolicy(nn.Module):
+    """Features to probabilities and value, by one scene's layers: what walks off the grid, and what is exported.
+
+    Args:
+        network: the parameters.
+        feature_map: prepares features for it.
+        scene: index of the scene among the run's.
+        reward_scale: what the learner multiplied rewards with.
+    """
+
+    def __init__(self, network: SiameseActorCritic, feature_map: FeatureMap, scene: int, reward_scale: float) -> None:
+        super().__init__()
+        self.network, self.feature_map, self.scene, self.reward_scale = network, feature_map, scene, reward_scale
+
+    @property
+    def history_length(self) -> int:
+        """K."""
+        return self.network.shape.history_length
+
+    def forward(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+        """Probabilities (B, A) and value (B, 1) for features of the last K pictures (B, K, F) and the target (B, F).
+
+        The value is in units of the reward.
+        """
+        fused = self.network.fused(self.feature_map(history), self.feature_map(target))
+        output = self.network.head(fused, self.scene)
+        return torch.softmax(output[:, :ACTION_COUNT], 1), output[:, ACTION_COUNT:] / self.reward_scale

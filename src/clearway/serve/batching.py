@@ -1,6 +1,6 @@
-"""Concurrent requests through the model together: while one batch is computed, the next one gathers.
+"""Concurrent requests through the agent together: while one batch is computed, the next one gathers.
 
-Axis letters: B batch, K history, F features, A actions.
+Axis letters: B batch.
 """
 
 from __future__ import annotations
@@ -14,41 +14,47 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.deploy.model import AgentModel, ModelOutput
+from clearway.agents.agent import Agent, Decisions, State, joined, rows
+from clearway.scenes.sensors import RGB
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
+
+Answer = tuple[Decisions | None, State]  # of one row; without decisions where an episode has begun
 
 
 @dataclass(frozen=True, eq=False)
 class Waiting:
-    """A picture that waits for the model.
+    """A picture that waits for the agent.
 
     Attributes:
-        seen: (height, width, 3) uint8.
-        history: (K, F) float32, or None where the picture begins an episode.
-        target: (F,) float32, or None where the picture is one.
+        seen: (height, width, 3) uint8, of a target where an episode is to begin.
+        state: of one row: what the agent remembers; or (1,) int64, the seed of the episode that is to begin.
         answer: of one row.
     """
 
     seen: np.ndarray
-    history: np.ndarray | None
-    target: np.ndarray | None
-    answer: asyncio.Future[ModelOutput]
+    state: State | np.ndarray
+    answer: asyncio.Future[Answer]
+
+    @property
+    def kind(self) -> tuple[bool, tuple[int, ...]]:
+        """What has to be equal in a batch."""
+        return isinstance(self.state, np.ndarray), self.seen.shape
 
 
 class Batcher:
     """Gathers what waits into batches; one is computed at a time, in a thread, and nobody waits for a fuller one.
 
     Args:
-        model: the agent.
+        agent: sees colour pictures.
         limits: how many pictures wait and go together.
-        watch: told of every batch: pictures, and the seconds that the model took.
+        watch: told of every batch: pictures, and the seconds that the agent took.
     """
 
-    def __init__(self, model: AgentModel, limits: Limits, watch: Callable[[int, float], None]) -> None:
-        self._model, self._limits, self._watch = model, limits, watch
+    def __init__(self, agent: Agent, limits: Limits, watch: Callable[[int, float], None]) -> None:
+        self._agent, self._limits, self._watch = agent, limits, watch
         self._waiting: deque[Waiting] = deque()
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="model")
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="agent")
         self._worker: asyncio.Task[None] | None = None
 
     @property
@@ -56,15 +62,24 @@ class Batcher:
         """Pictures that wait."""
         return len(self._waiting)
 
-    async def step(self, seen: np.ndarray, history: np.ndarray | None, target: np.ndarray | None) -> ModelOutput:
-        """What the model makes of one picture, its row alone; see `Waiting`. Forgotten when cancelled.
+    async def reset(self, target: np.ndarray, seed: np.ndarray) -> State:
+        """The state of an episode's begin, of one row, from the target's picture and a seed (1,); as `act`."""
+        return (await self._answered(target, seed))[1]
+
+    async def act(self, seen: np.ndarray, state: State) -> tuple[Decisions, State]:
+        """What the agent does, seeing one picture, its row alone. Forgotten when cancelled.
 
         Raises:
             Fault: too many wait.
         """
+        decisions, after = await self._answered(seen, state)
+        assert decisions is not None, "an agent that acts decides"
+        return decisions, after
+
+    async def _answered(self, seen: np.ndarray, state: State | np.ndarray) -> Answer:
         if len(self._waiting) >= self._limits.waiting:
             raise Fault("overloaded", "too many pictures wait for the agent. Try again")
-        asked = Waiting(seen, history, target, asyncio.get_running_loop().create_future())
+        asked = Waiting(seen, state, asyncio.get_running_loop().create_future())
         self._waiting.append(asked)
         if self._worker is None or self._worker.done():
             self._worker = asyncio.create_task(self._work())
@@ -75,33 +90,35 @@ class Batcher:
         loop = asyncio.get_running_loop()
         while batch := self._next_batch():
             try:
-                steps, seconds = await loop.run_in_executor(self._thread, self._compute, batch)
-            except Exception as fault:  # the model's fault is its askers', not the next batch's
+                answers, seconds = await loop.run_in_executor(self._thread, self._compute, batch)
+            except Exception as fault:  # the agent's fault is its askers', not the next batch's
                 for asked in batch:
                     if not asked.answer.done():
                         asked.answer.set_exception(fault)
                 continue
             self._watch(len(batch), seconds)
-            for asked, step in zip(batch, steps, strict=True):
+            for asked, answer in zip(batch, answers, strict=True):
                 if not asked.answer.done():
-                    asked.answer.set_result(step)
+                    asked.answer.set_result(answer)
 
     def _next_batch(self) -> list[Waiting]:
-        """Those that have waited longest, of one picture size; empty where nobody waits."""
+        """Those that have waited longest, of one kind; empty where nobody waits."""
         live = [asked for asked in self._waiting if not asked.answer.done()]
-        batch = [asked for asked in live if asked.seen.shape == live[0].seen.shape][: self._limits.batch]
+        batch = [asked for asked in live if asked.kind == live[0].kind][: self._limits.batch]
         chosen = set(map(id, batch))
         self._waiting = deque(asked for asked in live if id(asked) not in chosen)
         return batch
 
-    def _compute(self, batch: list[Waiting]) -> tuple[list[ModelOutput], float]:
-        card, begun = self._model.card, time.perf_counter()
-        blank = np.zeros((card.history_length, card.feature_count), np.float32)
-        step = self._model.step(
-            np.stack([asked.seen for asked in batch]),
-            np.array([asked.history is None for asked in batch]),
-            np.stack([blank if asked.history is None else asked.history for asked in batch]),
-            np.stack([blank[0] if asked.target is None else asked.target for asked in batch]),
-        )
-        rows = [ModelOutput(*(part[row].copy() for part in step)) for row in range(len(batch))]
-        return rows, time.perf_counter() - begun
+    def _compute(self, batch: list[Waiting]) -> tuple[list[Answer], float]:
+        begun = time.perf_counter()
+        seen = {RGB: np.stack([asked.seen for asked in batch])}
+        seeds = [asked.state for asked in batch if isinstance(asked.state, np.ndarray)]
+        states = [asked.state for asked in batch if not isinstance(asked.state, np.ndarray)]
+        decisions: Decisions | None = None
+        if seeds:
+            after = self._agent.reset(seen, np.concatenate(seeds))
+        else:
+            decisions, after = self._agent.act(seen, joined(states))
+        own = [np.array([row]) for row in range(len(batch))]  # by index, which copies: no answer keeps its batch alive
+        answers: list[Answer] = [(decisions and decisions.rows(row), rows(after, row)) for row in own]
+        return answers, time.perf_counter() - begun

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from clearway.deploy.model import AgentModel
-from clearway.deploy.navigator import open_model
+from clearway.deploy.agent import DeployedAgent
+from clearway.deploy.navigator import open_agent
 from clearway.serve.app import make_app
 from clearway.serve.guard import protected
 from clearway.serve.limits import Limits
@@ -23,23 +23,23 @@ OTHER_FILES = 200  # beside connections that a service may open
 SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
 
 
-def servable_model(source: Path, scene: str | None, tell: Callable[[str], object]) -> AgentModel:
+def servable_agent(source: Path, scene: str | None, tell: Callable[[str], object]) -> DeployedAgent:
     """The agent of an exported file, or of a run folder, which is exported to the cache first.
 
     Args:
         source: the file or the folder.
-        scene: see `open_model`.
-        tell: see `cached_model`.
+        scene: see `open_agent`.
+        tell: see `cached_agent`.
 
     Raises:
-        ClearwayError: see `open_model` and `cached_model`.
+        ClearwayError: see `open_agent` and `cached_agent`.
     """
     if not source.is_dir():
-        return open_model(source, scene)
-    from clearway.deploy.cached import cached_model
+        return open_agent(source, scene)
+    from clearway.deploy.cached import cached_agent
     from clearway.deploy.from_run import load_scene_agent
 
-    return cached_model(load_scene_agent(source, scene), tell)
+    return cached_agent(load_scene_agent(source, scene), tell)
 
 
 def allowed_connections(wanted: int) -> int:
@@ -64,11 +64,11 @@ def allowed_connections(wanted: int) -> int:
     return allowed
 
 
-def run_service(model: AgentModel, listener: socket.socket, token: str, limits: Limits) -> None:
+def run_service(agent: DeployedAgent, listener: socket.socket, token: str, limits: Limits) -> None:
     """Answer until told to end (SIGINT, SIGTERM); requests under way are answered, streams are closed.
 
     Args:
-        model: the agent.
+        agent: is asked.
         listener: from `web.local.listening`; closed at the end.
         token: that every request must hold.
         limits: what is allowed.
@@ -76,7 +76,7 @@ def run_service(model: AgentModel, listener: socket.socket, token: str, limits: 
     Raises:
         DeployError: the agent takes no pictures.
     """
-    service = Service(model, limits)
+    service = Service(agent, limits)
     warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `pictures` refuses by a limit of our own
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     http, sockets = impatient(limits.patience_s)

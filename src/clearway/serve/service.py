@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.deploy.model import AgentModel
-from clearway.deploy.navigator import Decision, choose
+from clearway.agents.selection import most_probable
+from clearway.deploy.agent import DeployedAgent
+from clearway.deploy.navigator import Decision, decision_of
 from clearway.errors import DeployError
 from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
@@ -32,20 +33,20 @@ class Service:
     """An agent for many clients.
 
     Args:
-        model: the agent, which must take pictures.
+        agent: is asked, which must take pictures.
         limits: what is allowed.
 
     Raises:
         DeployError: the agent takes features.
     """
 
-    def __init__(self, model: AgentModel, limits: Limits) -> None:
-        if not model.card.takes_pictures:
-            problem = f"the agent for scene {model.card.scene} was exported without its encoder"
+    def __init__(self, agent: DeployedAgent, limits: Limits) -> None:
+        if not agent.card.takes_pictures:
+            problem = f"the agent for scene {agent.card.scene} was exported without its encoder"
             raise DeployError(f"{problem}, so that it takes no pictures. Export it with its encoder")
-        self.card, self.limits, self.sessions = model.card, limits, Sessions(limits)
+        self.card, self.limits, self.sessions = agent.card, limits, Sessions(limits)
         self.metrics = Metrics(lambda: len(self.sessions), lambda: self.batcher.waiting)
-        self.batcher = Batcher(model, limits, self.metrics.computed)
+        self.batcher = Batcher(agent, limits, self.metrics.computed)
         self.streams = asyncio.Semaphore(limits.sessions)  # WebSockets that may be open
         self._decoders = ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="decoder")
 
@@ -57,19 +58,19 @@ class Service:
     async def set_target(self, session: Session, content: bytes) -> None:
         """Begin an episode with the picture file of a target; on a Fault the session stays as it was."""
         async with session.turn:
-            step = await self.batcher.step(await self._decoded(content), None, None)
-            session.target, session.history, session.steps = step.history[-1], None, 0
+            picture = await self._decoded(content)
+            session.state, session.steps = await self.batcher.reset(picture, next(session.seeds)), 0
 
     async def step(self, session: Session, content: bytes) -> Answer:
         """What to do, seeing a picture file; on a Fault, or cancelled, the session stays as it was."""
         async with session.turn:
-            if session.target is None:
+            if session.state is None:
                 raise Fault("no_target", "the session has no target yet. Send its picture first")
-            step = await self.batcher.step(await self._decoded(content), session.history, session.target)
-            session.history, session.steps = step.history, session.steps + 1
-            uniform = None if session.selection == "argmax" else session.rng.random()
-            action = choose(step.probabilities, uniform)
-            return Answer(Decision(action, step.probabilities, float(step.value[0])), session.steps)
+            decisions, session.state = await self.batcher.act(await self._decoded(content), session.state)
+            session.steps += 1
+            if session.selection == "argmax":
+                decisions = most_probable(decisions)
+            return Answer(decision_of(decisions), session.steps)
 
     async def _decoded(self, content: bytes) -> np.ndarray:
         loop = asyncio.get_running_loop()

@@ -1,4 +1,4 @@
-"""Sessions: each with a target, a history and draws of its own; expired ones go."""
+"""Sessions: each with an episode and draws of its own; expired ones go."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import asyncio
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from clearway.deploy.navigator import Selection
+from clearway.agents.agent import State
+from clearway.deploy.navigator import Selection, episode_seeds
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 
@@ -25,9 +26,8 @@ class Session:
     Attributes:
         id: what clients call it by; nobody can guess another's.
         selection: how its actions are chosen.
-        rng: of its draws.
-        target: (F,) float32, or None until it is set.
-        history: (K, F) float32, or None where the next picture begins an episode.
+        seeds: of its episodes, one after the other.
+        state: what the agent remembers, of one row; None until there is a target.
         steps: answered since the target was set.
         used_s: when it was last asked for, on the clock of its `Sessions`.
         turn: held while a request of the session is answered, so that they are answered one after the other.
@@ -35,10 +35,9 @@ class Session:
 
     id: str
     selection: Selection
-    rng: np.random.Generator
+    seeds: Iterator[np.ndarray]
     used_s: float
-    target: np.ndarray | None = None
-    history: np.ndarray | None = None
+    state: State | None = None
     steps: int = 0
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
@@ -70,7 +69,7 @@ class Sessions:
             raise Fault(
                 "too_many_sessions", f"{self._limits.sessions} sessions are open. Close one, or try again later"
             )
-        made = Session(secrets.token_urlsafe(ID_BYTES), selection, np.random.default_rng(seed), self._clock())
+        made = Session(secrets.token_urlsafe(ID_BYTES), selection, episode_seeds(seed), self._clock())
         self._open[made.id] = made
         return made
 

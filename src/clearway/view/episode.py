@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import get_args
 from urllib.parse import parse_qsl, urlencode
 
+from clearway.agents.selection import ActionSelection
 from clearway.errors import ClearwayError
-from clearway.evaluation.selection import ActionSelection
 from clearway.learn.seeds import SEED_LIMIT
 
 LETTERS = "FRLB"

@@ -50,7 +50,7 @@ def _frames(stage: Stage, session: Session, index: int) -> Iterator[np.ndarray]:
 def _walked(walker: Walker) -> Walked:
     states = np.array([step.state for step in walker.steps]) + walker.offset
     trajectory = Trajectory(states, np.array(walker.actions, np.int64))
-    if walker.mind is None:
+    if walker.agent is None:
         return Walked(walker.world, walker.target, trajectory, None)
     nothing = (0.0,) * walker.world.next_state.shape[1]
     probabilities = np.array([step.probabilities or nothing for step in walker.steps])

@@ -18,11 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from clearway.agents.selection import selecting
 from clearway.errors import ClearwayError
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
 from clearway.view.stage import Stage
-from clearway.view.walker import Mind, Walker
+from clearway.view.walker import Walker
 from clearway.world.tables import World
 
 Message = dict[str, Any]
@@ -84,12 +85,11 @@ class Session:
         recorded = [actions_of(walk) for walk in episode.walks] + [[]] * MOST_WALKERS
         walkers = []
         for shown, placed, actions in zip(self.stage.agents, worlds, recorded, strict=False):
-            learner = shown.agent.record.learner
-            mind = Mind(shown.critic(placed), learner.reward_scale, episode.selection, learner.history_length)
-            walkers.append(Walker(placed, 0, start, shown.reward, seed=episode.seed, mind=mind, recorded=actions))
+            agent = selecting(shown.on_poses(placed), episode.selection, placed)
+            walkers.append(Walker(placed, 0, start, shown.reward, seed=episode.seed, agent=agent, recorded=actions))
         if episode.drive:
             walk = Walker(
-                worlds[-1], 0, start, self.stage.reward, seed=episode.seed, mind=None, recorded=recorded[len(walkers)]
+                worlds[-1], 0, start, self.stage.reward, seed=episode.seed, agent=None, recorded=recorded[len(walkers)]
             )
             walkers.append(walk)
         self.episode, self.walkers = episode, walkers
@@ -136,7 +136,7 @@ class Session:
             "walkers": [
                 {
                     "name": name,
-                    "agent": walker.mind is not None,
+                    "agent": walker.agent is not None,
                     "reward": reward,
                     "steps": list(map(asdict, walker.steps)),
                 }
@@ -147,12 +147,13 @@ class Session:
         }
 
     def _map(self, index: int) -> Message:
-        probabilities, values = self.walkers[index].map_of_mind()
+        held = self.walkers[index].map_of_mind()
+        assert held.probabilities is not None and held.value is not None, "a network tells both"
         return {
             "kind": "map",
             "walker": index,
-            "values": np.round(values.double().numpy(), DIGITS).tolist(),
-            "probabilities": np.round(probabilities.double().numpy(), DIGITS).tolist(),
+            "values": np.round(held.value.astype(np.float64), DIGITS).tolist(),
+            "probabilities": np.round(held.probabilities.astype(np.float64), DIGITS).tolist(),
         }
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from clearway.agents.agent import Agent
+from clearway.agents.by_pose import network_on_poses
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
-from clearway.learn.load import Agent, load_agent, run_scenes, run_tables
+from clearway.learn.load import TrainedNetwork, load_network, run_scenes, run_tables
 from clearway.model.lookup import LookupNetwork
-from clearway.model.policy import Critic, network_critic
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
@@ -26,22 +27,22 @@ class StageAgent:
 
     Attributes:
         name: of its run folder.
-        agent: the network and its record.
+        trained: the network and its record.
         scenes: all that the run was trained on.
     """
 
     name: str
-    agent: Agent
+    trained: TrainedNetwork
     scenes: tuple[Scene, ...]
 
     @cached_property
     def world(self) -> World:
         """The tables of its scenes, without targets."""
-        return run_tables(self.agent.record, self.scenes)
+        return run_tables(self.trained.record, self.scenes)
 
     @cached_property
     def _lookup(self) -> LookupNetwork:
-        return self.agent.lookup(self.world)
+        return self.trained.lookup(self.world)
 
     def make_ready(self) -> None:
         """Compute what all episodes share, so that one begins at once."""
@@ -55,14 +56,15 @@ class StageAgent:
         """
         return self.world.with_targets({scene: (target,)})
 
-    def critic(self, placed: World) -> Critic:
-        """Its probabilities and values for a world from `place`."""
-        return network_critic(self._lookup.for_targets(placed.target_state), placed)
+    def on_poses(self, placed: World) -> Agent:
+        """Itself in a world from `place`."""
+        scale = self.trained.record.learner.reward_scale
+        return network_on_poses(self._lookup.for_targets(placed.target_state), placed, scale)
 
     @property
     def reward(self) -> Reward:
         """What it learnt from: clipped, if its learner clipped rewards, so that values and rewards compare."""
-        return self.agent.record.paid.as_known()
+        return self.trained.record.paid.as_known()
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,7 @@ class Stage:
     @property
     def zone_level(self) -> ZoneLevel:
         """Whose zones the map shows: those of poses or of cells."""
-        return self.agents[0].agent.record.zone_level if self.agents else "pose"
+        return self.agents[0].trained.record.zone_level if self.agents else "pose"
 
     @property
     def reward(self) -> Reward:
@@ -127,8 +129,8 @@ def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None
     """
     agents = []
     for folder, name in zip(folders, _names(folders), strict=True):
-        agent = load_agent(folder)
-        agents.append(StageAgent(name, agent, tuple(run_scenes(agent.record, scene_files))))
+        trained = load_network(folder)
+        agents.append(StageAgent(name, trained, tuple(run_scenes(trained.record, scene_files))))
         agents[-1].make_ready()
     first, *others = agents
     scenes = tuple(scene for scene in first.scenes if all(_has(other, scene) for other in others))
@@ -137,8 +139,8 @@ def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None
         raise RunError(
             f"{folders[1]}: trained on other rooms than {folders[0]} ({known}). Give runs that share a scene"
         )
-    trained = first.agent.record.targets
-    return Stage(scenes, {scene.name: trained[scene.name] for scene in scenes}, tuple(agents))
+    targets = first.trained.record.targets
+    return Stage(scenes, {scene.name: targets[scene.name] for scene in scenes}, tuple(agents))
 
 
 def _names(folders: Sequence[Path]) -> list[str]:

@@ -5,34 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
-from torch import Tensor
 
-from clearway.evaluation.episodes import ACTION_STREAM
-from clearway.evaluation.selection import ActionSelection, UntriedActions
-from clearway.model.policy import Critic, sampled
+from clearway.agents.agent import POSE, Agent, Decisions
 from clearway.reward import Reward
 from clearway.view.episode import MOST_STEPS
 from clearway.world.navigation import Navigation
-from clearway.world.streams import Streams
 from clearway.world.tables import World
-
-
-@dataclass(frozen=True)
-class Mind:
-    """How an agent decides.
-
-    Attributes:
-        critic: its probabilities and values.
-        reward_scale: what its learner multiplied rewards with; values are shown without it.
-        selection: how it chooses by them.
-        history_length: K, poses that it remembers.
-    """
-
-    critic: Critic
-    reward_scale: float
-    selection: ActionSelection
-    history_length: int
 
 
 @dataclass(frozen=True)
@@ -77,7 +57,7 @@ class Walker:
         start: state in the scene's own numbering.
         reward: what it earns.
         seed: of sampled actions.
-        mind: of an agent; None for the user.
+        agent: who chooses, by the pose; None for the user.
         recorded: actions that it takes before it chooses by itself.
     """
 
@@ -89,19 +69,18 @@ class Walker:
         reward: Reward,
         *,
         seed: int,
-        mind: Mind | None,
+        agent: Agent | None,
         recorded: Sequence[int] = (),
     ) -> None:
+        assert agent is None or set(agent.sees) <= {POSE}, "what walks in the viewer knows its pose"
         seeds = torch.tensor([seed])
-        self.world, self.target, self.mind = world, target, mind
+        self.world, self.target, self.agent = world, target, agent
         self.offset = int(world.scene_offset[world.target_scene[target]])
         self.states_here = int(world.scene_offset[world.target_scene[target] + 1]) - self.offset
         self.to_go = world.distance_table()
-        history_length = mind.history_length if mind else 1
-        self.env = Navigation(world, reward, seeds, history_length=history_length, reward_dtype=torch.float64)
+        self.env = Navigation(world, reward, seeds, history_length=1, reward_dtype=torch.float64)
         self.env.reset(target=torch.tensor([target]), start=torch.tensor([start + self.offset]))
-        self.chances = Streams(seeds, ACTION_STREAM)
-        self.untried = UntriedActions(1, self.states_here, world.device)
+        self.memory = agent.reset({POSE: world.target_state[[target]].numpy()}, seeds.numpy()) if agent else {}
         self.recorded = list(recorded)
         reached = int(self.env.state) == int(world.target_state[target])
         zone = int(world.zone[self.env.state])
@@ -142,25 +121,24 @@ class Walker:
         )
         return self.steps[-1]
 
-    @torch.no_grad()
-    def map_of_mind(self) -> tuple[Tensor, Tensor]:
-        """Probabilities (S, A) and values (S,) of all poses of the scene, each as at the start of an episode."""
-        assert self.mind is not None
-        states = torch.arange(self.states_here) + self.offset
-        history = states[:, None].expand(-1, self.mind.history_length)
-        probabilities, values = self.mind.critic(history, torch.full((len(states),), self.target))
-        return probabilities, values / self.mind.reward_scale
+    def map_of_mind(self) -> Decisions:
+        """What the agent holds in all poses of the scene (S), each as at the start of an episode."""
+        assert self.agent is not None
+        poses = np.arange(self.states_here) + self.offset
+        target = np.full_like(poses, int(self.world.target_state[self.target]))
+        decisions, _ = self.agent.act({POSE: poses}, self.agent.reset({POSE: target}, np.zeros_like(poses)))
+        return decisions
 
-    @torch.no_grad()
     def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Step:
         before = self.steps[-1] if action is not None else None
         probabilities = value = following = None
-        if self.mind is not None:
-            scores, values = self.mind.critic(self.env.history, self.env.target)
-            value = float(values) / self.mind.reward_scale
+        if self.agent is not None:
+            decisions, self.memory = self.agent.act({POSE: self.env.state.numpy()}, self.memory)
+            value = None if decisions.value is None else float(decisions.value[0])
             if not reached:
-                probabilities = tuple(scores[0].tolist())
-                following = self._choose(self.mind.selection, scores)
+                told = decisions.probabilities
+                probabilities = None if told is None else tuple(told[0].tolist())
+                following = self.recorded[0] if self.recorded else int(decisions.action[0])
         return Step(
             state=int(self.env.state) - self.offset,
             action=action,
@@ -175,13 +153,3 @@ class Walker:
             value=value,
             next=following,
         )
-
-    def _choose(self, selection: ActionSelection, probabilities: Tensor) -> int:
-        """The action to take: a recorded one, else the agent's own choice, which uses up its chance either way."""
-        if selection == "sampled":
-            own = sampled(probabilities, self.chances.uniform())
-        elif selection == "argmax":
-            own = probabilities.argmax(1)
-        else:
-            own = self.untried.choose(torch.tensor([0]), self.env.state - self.offset, probabilities)
-        return self.recorded[0] if self.recorded else int(own)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from clearway.evaluation.showcase import showcases
-from clearway.learn.load import Acting, run_world
+from clearway.learn.load import TrainedAgent, run_world
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.scene import Scene
 from clearway.viz.contact_sheet import draw_contact_sheet
@@ -15,12 +15,14 @@ from clearway.viz.maps import Walk, draw_map
 from clearway.zones import scene_zones
 
 
-def draw_run_pictures(run: Path, agent: Acting, scenes: Sequence[Scene], folder: Path, seed: int = 0) -> list[Path]:
+def draw_run_pictures(
+    run: Path, agent: TrainedAgent, scenes: Sequence[Scene], folder: Path, seed: int = 0
+) -> list[Path]:
     """Draw them into `folder` and return their paths; scenes without pictures get no contact sheet."""
     folder.mkdir(parents=True, exist_ok=True)
     world, level = run_world(agent.record, scenes), agent.record.zone_level
     name = agent.record.reward.name
-    shown = showcases(world, {name: agent.policy(world)}, seed=seed, history_length=agent.record.learner.history_length)
+    shown = showcases(world, {name: agent.on_poses(world)}, seed=seed)
     made = [folder / "curves.png"]
     draw_curves({name: RunFolder(run).metrics()}, made[0])
     for scene, show in zip(scenes, shown, strict=True):

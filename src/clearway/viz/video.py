@@ -12,12 +12,13 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from clearway import colours
+from clearway.agents.agent import Agent
 from clearway.envs.record import EpisodeSoFar
 from clearway.envs.render import Renderer
 from clearway.errors import ClearwayError
 from clearway.evaluation.episodes import Trajectory
+from clearway.evaluation.sight import Sight
 from clearway.files import written_whole
-from clearway.model.policy import Policy
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
 from clearway.world.tables import World
@@ -38,7 +39,7 @@ class Walked:
         world: where it was walked.
         target: index of the world's target.
         trajectory: states and actions.
-        probabilities: (T + 1, A) of the actions, before each step and after the last; None where no agent chose them.
+        probabilities: (T + 1, A) of the actions, before each step and after the last; None where no agent told them.
     """
 
     world: World
@@ -47,14 +48,15 @@ class Walked:
     probabilities: np.ndarray | None
 
 
-def walked(world: World, policy: Policy, target: int, trajectory: Trajectory, history_length: int) -> Walked:
-    """The episode with what the policy thought at each pose."""
-    states = torch.from_numpy(trajectory.states)
-    behind = torch.arange(history_length).flip(0)
-    at = (torch.arange(len(states))[:, None] - behind).clamp_min(0)  # (T + 1, K), newest last
-    with torch.no_grad():
-        probabilities = policy(states[at], torch.full((len(states),), target)).numpy()
-    return Walked(world, target, trajectory, probabilities)
+def walked(world: World, agent: Agent, target: int, trajectory: Trajectory) -> Walked:
+    """The episode with what the agent holds of its actions at each pose; it sees poses or features."""
+    sight, thoughts = Sight(world, agent), []
+    memory = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
+    for pose in torch.from_numpy(trajectory.states):
+        decisions, memory = agent.act(sight(pose[None]), memory)
+        thoughts.append(decisions.probabilities)
+    told = [thought for thought in thoughts if thought is not None]
+    return Walked(world, target, trajectory, np.concatenate(told) if len(told) == len(thoughts) else None)
 
 
 def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:

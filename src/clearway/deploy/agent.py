@@ -1,57 +1,42 @@
-"""`AgentModel`, what every deployed agent offers, however it is computed; and checks of what it is given.
+"""`DeployedAgent`, an agent with its card; and checks of what it is given.
 
-Axis letters: B batch, K history (newest last), F features, A actions.
+Axis letters: F features.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from clearway.agents.agent import FEATURES, Agent, Observation
 from clearway.deploy.card import Card
 from clearway.errors import DeployError
+from clearway.scenes.sensors import RGB
 
 MAX_PICTURE_SIDE = 4_096  # pixels
 
 
-class ModelOutput(NamedTuple):
-    """What agents make of what they see.
-
-    Attributes:
-        probabilities: (B, A) float32.
-        value: (B, 1) float32, the discounted return that the agent expects, in units of the reward.
-        history: (B, K, F) float32, to be given to the next step; its last row holds the features of what was seen.
-    """
-
-    probabilities: np.ndarray
-    value: np.ndarray
-    history: np.ndarray
-
-
-class AgentModel(Protocol):
-    """A trained agent for one scene. It keeps nothing between calls, and threads may share it."""
+class DeployedAgent(Agent, Protocol):
+    """A trained agent for one scene, however it is computed, that says what it is."""
 
     @property
     def card(self) -> Card:
         """What the agent is."""
 
-    def step(self, seen: np.ndarray, start: np.ndarray, history: np.ndarray, target: np.ndarray) -> ModelOutput:
-        """One step of B agents, each with its own target.
 
-        Args:
-            seen: (B, height, width, 3) uint8 RGB pictures; or (B, F) float32 features, where the card says so.
-            start: (B,) bool, an episode begins: what is seen fills the whole history, and `history` is not looked at.
-            history: (B, K, F) float32, as the step before left it.
-            target: (B, F) float32, features of the target.
-        """
+def sight_of(card: Card) -> str:
+    """Name of the sensor that an agent sees by: colour pictures, or features of them."""
+    return RGB if card.takes_pictures else FEATURES
 
 
-def features_of(model: AgentModel, seen: np.ndarray) -> np.ndarray:
-    """Features (B, F) float32 of pictures (or of features, where the agent takes those)."""
-    card, count = model.card, len(seen)
-    history = np.zeros((count, card.history_length, card.feature_count), np.float32)
-    return model.step(seen, np.ones(count, bool), history, history[:, 0]).history[:, -1]
+def as_observation(seen: object, card: Card) -> Observation:
+    """What one agent sees, as a batch of one.
+
+    Raises:
+        DeployError: it is something else, too large, or not finite.
+    """
+    return {sight_of(card): checked_seen(seen, card)[None]}
 
 
 def checked_seen(seen: object, card: Card) -> np.ndarray:
