@@ -9,6 +9,7 @@ from clearway.version import __version__
 
 TYPE_CHECKING = False  # typing itself would be half of what this module costs
 if TYPE_CHECKING:
+    from clearway.agents.agent import Agent, Decisions
     from clearway.api.environments import make_env
     from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
     from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
@@ -43,6 +44,8 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "PAPER_A3C": "clearway.learn.presets",
     "train": "clearway.api.training",
     "TrainResult": "clearway.api.training",
+    "Agent": "clearway.agents.agent",
+    "Decisions": "clearway.agents.agent",
     "evaluate": "clearway.api.evaluation",
     "EvaluateResult": "clearway.api.evaluation",
     "load_agent": "clearway.api.evaluation",
@@ -57,7 +60,9 @@ __all__ = [
     "PAPER_A2C",
     "PAPER_A3C",
     "PPO",
+    "Agent",
     "ClearwayError",
+    "Decisions",
     "EvaluateResult",
     "Learner",
     "Navigator",

@@ -120,3 +120,21 @@ def plugin_of(kind: Kind, name: str) -> Plugin:
         fault = f"{kind.removesuffix('s')} {name}: no installed package offers one of this name"
         raise PluginError(f"{fault}. Install one that does, or use one of these: {offered}")
     return plugin
+
+
+def imported(path: str) -> object:
+    """What a user names as `package.module:name`.
+
+    Raises:
+        PluginError: it is no such path, or cannot be imported, whatever the module raises.
+    """
+    from importlib import import_module
+
+    module, colon, name = path.partition(":")
+    if not colon or not module or not name:
+        raise PluginError(f"{path!r:.80}: expected package.module:name. Name one so")
+    try:
+        return getattr(import_module(module), name)
+    except Exception as fault:  # another's code: anything can come of it
+        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        raise PluginError(f"{path}: cannot be loaded ({reason}). Check the module and the name") from fault

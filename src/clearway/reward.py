@@ -12,15 +12,14 @@ The module is light, so that the command line can read names and parameters from
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from clearway.errors import ClearwayError
-from clearway.plugins import find_plugin, load_plugin
+from clearway.errors import ClearwayError, PluginError
+from clearway.plugins import find_plugin, imported, load_plugin
 
 if TYPE_CHECKING:
     import numpy as np
@@ -376,15 +375,13 @@ def reward_named(name: str | Reward) -> Reward:
         return REWARDS[name]
     if isinstance(name, str) and (plugin := find_plugin("rewards", name)):
         return _made(str(plugin), load_plugin(plugin))
-    module, colon, attribute = name.partition(":") if isinstance(name, str) else ("", "", "")
-    if not colon or not module or not attribute:
+    if not isinstance(name, str) or ":" not in name:
         choices = ", ".join(map(repr, REWARDS))
         raise RewardError(f"reward={name!r:.80} is unknown. Use one of {choices}, a Reward, or package.module:name")
     try:
-        found = getattr(importlib.import_module(module), attribute)
-    except Exception as fault:  # another's code: anything can come of it
-        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
-        raise RewardError(f"reward={name!r}: cannot be loaded ({reason}). Check the module and the name") from fault
+        found = imported(name)
+    except PluginError as fault:
+        raise RewardError(f"reward={fault}") from fault
     return _made(f"reward={name!r}", found)
 
 

@@ -17,16 +17,19 @@ Axis letters: B episodes, S states of the largest scene, A actions.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from clearway.agents.agent import POSE, Agent, Decisions, Observation, State
 from clearway.errors import AgentError
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.world.tables import World
+
+if TYPE_CHECKING:
+    from clearway.world.tables import World
 
 ActionSelection = Literal["sampled", "argmax", "argmax-untried"]
+_FIRST, _TRIED = "argmax-untried first", "argmax-untried tried"  # in a state, beside the names of the other agent
 _BIT = np.arange(ACTION_COUNT)
 _ALL_TRIED = (1 << ACTION_COUNT) - 1
 
@@ -72,19 +75,20 @@ class ArgmaxUntried:
         """See `Agent.reset`."""
         scene = np.searchsorted(self._first, target[POSE], side="right") - 1
         tried = np.zeros((len(seed), np.diff(self._first).max()), np.uint8)  # a bit an action
-        return {**self._agent.reset(target, seed), "first": self._first[scene], "tried": tried}
+        return {**self._agent.reset(target, seed), _FIRST: self._first[scene], _TRIED: tried}
 
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """See `Agent.act`."""
-        decisions, after = self._agent.act(observation, state)
-        place = np.arange(len(state["tried"])), observation[POSE] - state["first"]
-        before = state["tried"][place]
+        others = {name: values for name, values in state.items() if name not in (_FIRST, _TRIED)}
+        decisions, after = self._agent.act(observation, others)
+        place = np.arange(len(state[_TRIED])), observation[POSE] - state[_FIRST]
+        before = state[_TRIED][place]
         was_tried = (before[:, None] >> _BIT & 1).astype(bool)
         action = np.where(was_tried, -1.0, _probabilities(decisions)).argmax(1)
         now = before | (1 << action).astype(np.uint8)
-        tried = state["tried"].copy()
+        tried = state[_TRIED].copy()
         tried[place] = np.where(now == _ALL_TRIED, 0, now)
-        return replace(decisions, action=action, certain=None), {**after, "tried": tried}
+        return replace(decisions, action=action, certain=None), {**after, _FIRST: state[_FIRST], _TRIED: tried}
 
 
 def most_probable(decisions: Decisions) -> Decisions:

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias, get_args
 
+from clearway.agents.agent import Agent
+from clearway.agents.named import AgentMaker, agent_maker, checked_agent, named_maker
+from clearway.agents.selection import ActionSelection
 from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
+from clearway.api.targets import Targets, chosen_targets
 from clearway.api.training import TrainResult
+from clearway.deploy.card import Card
+from clearway.deploy.navigator import open_agent
 from clearway.errors import ArgumentError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
 from clearway.evaluation.files import write_evaluations
+from clearway.evaluation.protocol import evaluate_agents
 from clearway.evaluation.report import Evaluation
 from clearway.evaluation.run import evaluate_run
 from clearway.evaluation.tables import Level, Width, markdown_table
 from clearway.learn import load
 from clearway.learn.load import TrainedAgent
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Scene, encoder_names
+from clearway.torch_threads import torch_threads
+from clearway.world.tables import make_world
 
+AGENT = "agent"  # the argument's name
 Run: TypeAlias = TrainedAgent | TrainResult | str | os.PathLike[str]
 
 
@@ -34,7 +44,7 @@ class EvaluateResult:
         scenes: where it walked.
     """
 
-    agent: TrainedAgent
+    agent: TrainedAgent | Agent
     evaluations: tuple[Evaluation, ...]
     scenes: tuple[Scene, ...]
 
@@ -117,46 +127,112 @@ def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] |
 
 
 def evaluate(
-    run: Run,
+    agent: Run | Agent | AgentMaker,
     scenes: Scenes | None = None,
     *,
+    targets: Targets = None,
+    beside: Mapping[str, str | AgentMaker] | Iterable[str] = (),
     episodes: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
     seed: int = 0,
 ) -> EvaluateResult:
-    """Evaluate a trained agent by the paper's protocol, beside exact optima, a random walk and shortest paths.
+    """Evaluate an agent by the paper's protocol, beside exact optima, a random walk and shortest paths.
 
     Args:
-        run: a run folder, what `train` returned, or an agent.
-        scenes: those of the training, as files, folders of them, or scenes; None: those that were trained on in memory,
-            else the files that the run names.
+        agent: a run folder, what `train` returned, what `load_agent` gave, an exported .onnx file; or an agent of your
+            own: an `Agent`, or what makes one for a `World`, a class or a function.
+        scenes: files, folders of them, or scenes. For a run those of its training; None: those that were trained on in
+            memory, else the files that the run names. An agent without a run needs them.
+        targets: state ids by scene name, of an agent without a run; None: those that an exported agent was trained on,
+            else five seeded ones. A run has its own.
+        beside: further agents to compare with: names of plugins or package.module:name, or such names, or what makes an
+            agent for a `World`, by what tables are to call them.
         episodes: episodes a target.
         step_cap: steps after which an episode has failed.
         seed: of starts, sampled actions and the bootstrap.
 
     Raises:
         ArgumentError: an argument is of the wrong kind or out of range.
-        ClearwayError: the run cannot be read, or a scene is missing or not the one that the agent was trained on.
+        ClearwayError: the run cannot be read, a scene is missing or not the one that the agent was trained on, or an
+            agent cannot walk there.
     """
-    count, most = as_whole("episodes", episodes, 1), as_whole("step_cap", step_cap, 1)
-    number = as_seed("seed", seed)
-    agent = _agent(run)
-    found: list[Scene] | None = None
-    if scenes is not None:
-        found = load_scenes(scenes)
-    elif isinstance(run, TrainResult):
-        found = list(run.scenes)
-    places = load.run_scenes(agent.record, found)
-    evaluations = evaluate_run(agent, places, episodes_per_target=count, step_cap=most, seed=number)
-    return EvaluateResult(agent, tuple(evaluations), tuple(places))
+    settings = {
+        "episodes_per_target": as_whole("episodes", episodes, 1),
+        "step_cap": as_whole("step_cap", step_cap, 1),
+        "seed": as_seed("seed", seed),
+    }
+    others = _makers(beside)
+    found = None if scenes is None else load_scenes(scenes)
+    if isinstance(agent, str | os.PathLike) and os.fspath(agent).endswith(".onnx"):
+        agent = open_agent(as_path("agent", agent))
+    if not isinstance(agent, TrainedAgent | TrainResult | str | os.PathLike):
+        return _own(agent, found, targets, others, settings)
+    if targets is not None:
+        raise ArgumentError("targets: a run has its own. Leave them out, or give an agent without a run")
+    trained = _trained(agent)
+    if found is None and isinstance(agent, TrainResult):
+        found = list(agent.scenes)
+    places = load.run_scenes(trained.record, found)
+    evaluations = evaluate_run(trained, places, beside=others, **settings)
+    return EvaluateResult(trained, tuple(evaluations), tuple(places))
 
 
-def _agent(run: Run) -> TrainedAgent:
+def _own(
+    agent: object,
+    scenes: list[Scene] | None,
+    targets: Targets,
+    beside: Mapping[str, AgentMaker],
+    settings: Mapping[str, int],
+) -> EvaluateResult:
+    """The evaluation of an agent that has no run."""
+    if not isinstance(agent, Agent) and not callable(agent):
+        problem = f"agent={agent!r:.80}: expected a run folder, an .onnx file, what train returned, or an agent"
+        raise ArgumentError(f"{problem}. Give one of these")
+    if scenes is None:
+        raise ArgumentError("scenes: none given, and the agent has no run that names them. Give scenes")
+    card = getattr(agent, "card", None)
+    if isinstance(card, Card):
+        targets = _targets_of(card, scenes) if targets is None else targets
+    world = make_world(scenes, chosen_targets(scenes, targets, settings["seed"]))
+    own = agent if isinstance(agent, Agent) else named_maker(AGENT, agent)(world)
+    name = card.scene if isinstance(card, Card) else getattr(agent, "__name__", type(agent).__name__)
+    with torch_threads(1):
+        evaluations = evaluate_agents(
+            world,
+            {name: checked_agent(AGENT, own)},
+            references={name: make(world) for name, make in beside.items()},
+            scenes=scenes,
+            selections=get_args(ActionSelection) if isinstance(card, Card) else ("sampled",),
+            encoder=encoder_names(scenes),
+            **settings,
+        )
+    return EvaluateResult(own, tuple(evaluations), tuple(scenes))
+
+
+def _targets_of(card: Card, scenes: Sequence[Scene]) -> Targets:
+    """The targets that an exported agent was trained on; None where its file does not say."""
+    if [scene.name for scene in scenes] != [card.scene]:
+        given = ", ".join(scene.name for scene in scenes)
+        raise ArgumentError(f"scenes: the agent is for scene {card.scene}, given {given}. Give that scene alone")
+    kept = card.training.get("targets")
+    return {card.scene: kept} if isinstance(kept, list) else None
+
+
+def _makers(beside: Mapping[str, str | AgentMaker] | Iterable[str]) -> dict[str, AgentMaker]:
+    """What makes the agents to compare with, by the name they have in tables."""
+    if isinstance(beside, str) or not isinstance(beside, Iterable):
+        raise ArgumentError(f"beside={beside!r:.80}: expected names of agents. Give a list of them")
+    named = beside if isinstance(beside, Mapping) else {name: name for name in beside}
+    return {str(name): _maker(str(name), one) for name, one in named.items()}
+
+
+def _maker(name: str, one: object) -> AgentMaker:
+    return agent_maker(one) if isinstance(one, str) else named_maker(f"beside[{name!r}]", one)
+
+
+def _trained(run: Run) -> TrainedAgent:
     if isinstance(run, TrainedAgent):
         return run
     if isinstance(run, TrainResult):
         return run.agent
-    if isinstance(run, str | os.PathLike):
-        return load_agent(run)
-    problem = f"run={run!r:.80}: expected a run folder, what train returned, or an agent"
-    raise ArgumentError(f"{problem}. Give one of these")
+    return load_agent(run)

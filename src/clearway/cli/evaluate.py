@@ -26,7 +26,7 @@ class Evaluate:
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """The run folder."""
+    """The run folder; or the .onnx file of an exported agent."""
     episodes: int | None = None
     """Episodes a target; by default 100, live 10."""
     step_cap: int | None = None
@@ -34,7 +34,9 @@ class Evaluate:
     seed: int = 0
     """Of starts and sampled actions."""
     scenes: tuple[Path, ...] = ()
-    """Scene files or folders, where they are no longer where they were at training."""
+    """Scene files or folders, where they are no longer where they were at training; of an .onnx file its scene's."""
+    beside: tuple[str, ...] = ()
+    """Further agents to compare with: names of plugins, or package.module:name."""
     checkpoint: Path | None = None
     """A checkpoint folder of the run; by default the newest."""
     targets: bool = False
@@ -51,6 +53,8 @@ class Evaluate:
         if not self.room.live:
             self._on_grid(_or(self.episodes, EPISODES), _or(self.step_cap, STEP_CAP))
             return
+        if self.beside:
+            raise ClearwayError("--beside walks on the grid. Leave it out with --live, or use --against")
         if self.targets:
             raise ClearwayError("--targets prints rows of the evaluation on the grid. Leave it out with --live")
         evaluate_live(
@@ -70,14 +74,20 @@ class Evaluate:
 
         check_at_least(1, episodes=episodes, step_cap=step_cap)
         check_seeds(seed=self.seed)
-        agent = load_agent(self.folder, self.checkpoint)
         files = scene_files(self.scenes) if self.scenes else None
-        result = evaluate(agent, files, episodes=episodes, step_cap=step_cap, seed=self.seed)
-        result.save(self.folder)
+        exported = self.folder.suffix == ".onnx"
+        if exported and (self.checkpoint or self.pictures):
+            wrong = "--checkpoint" if self.checkpoint else "--pictures"
+            raise ClearwayError(f"{wrong}: needs a run folder, and {self.folder} is a file. Leave it out")
+        agent = self.folder if exported else load_agent(self.folder, self.checkpoint)
+        result = evaluate(agent, files, beside=self.beside, episodes=episodes, step_cap=step_cap, seed=self.seed)
+        if not exported:
+            result.save(self.folder)
         if self.pictures:
             from clearway.viz.run_pictures import draw_run_pictures
 
-            draw_run_pictures(self.folder, agent, result.scenes, self.pictures, seed=self.seed)
+            trained = load_agent(self.folder, self.checkpoint)
+            draw_run_pictures(self.folder, trained, result.scenes, self.pictures, seed=self.seed)
             say(f"pictures: {self.pictures}")
         if self.json:
             print_json(result.to_json())

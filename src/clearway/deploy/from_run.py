@@ -60,7 +60,12 @@ class SceneAgent:
             encoder={"name": made_by.name, "identity": made_by.identity, "settings": dict(made_by.settings)},
             normalisation=self._normalisation(encoder),
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
-            training={"seed": record.seed, "reward": record.reward.to_json(), "versions": dict(record.versions)},
+            training={
+                "seed": record.seed,
+                "reward": record.reward.to_json(),
+                "targets": list(record.targets[self.scene.name]),
+                "versions": dict(record.versions),
+            },
             observation=None if seen is None else seen.to_json(),
         )
 

@@ -8,6 +8,7 @@ from typing import get_args
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.agents.selection import ActionSelection
+from clearway.errors import AgentError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP, run_episodes
 from clearway.evaluation.report import Evaluation, Protocol, summarise
 from clearway.scenes.scene import Scene
@@ -22,6 +23,7 @@ def evaluate_agents(
     *,
     references: Mapping[str, Agent] | None = None,
     scenes: Sequence[Scene] = (),
+    selections: Sequence[ActionSelection] = get_args(ActionSelection),
     encoder: str,
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
@@ -37,26 +39,32 @@ def evaluate_agents(
         agents: by name.
         references: further agents to compare with, sampled only.
         scenes: the world's, in its order, for agents that see pictures.
+        selections: ways of choosing actions that the agents are tried with.
         encoder: name of the encoder whose features the agents see.
         episodes_per_target: how many each.
         step_cap: steps after which an episode has failed.
         seed: of starts, chances and bootstrap.
+
+    Raises:
+        AgentError: an agent cannot walk here; it is named.
     """
-    selections: tuple[ActionSelection, ...] = get_args(ActionSelection)
     rows = [(name, selection, agent) for name, agent in agents.items() for selection in selections]
     rows += [(name, "sampled", agent) for name, agent in (references or {}).items()]
     rows += [(RANDOM, "sampled", RandomWalk()), (SHORTEST_PATH, "sampled", shortest_paths(world))]
     evaluations = []
     for name, selection, agent in rows:
-        table = run_episodes(
-            world,
-            agent,
-            scenes=scenes,
-            selection=selection,
-            episodes_per_target=episodes_per_target,
-            step_cap=step_cap,
-            seed=seed,
-        )
+        try:
+            table = run_episodes(
+                world,
+                agent,
+                scenes=scenes,
+                selection=selection,
+                episodes_per_target=episodes_per_target,
+                step_cap=step_cap,
+                seed=seed,
+            )
+        except AgentError as fault:
+            raise AgentError(f"{name}: {fault}") from fault
         protocol = Protocol(episodes_per_target, step_cap, seed, selection)
         evaluations.append(summarise(world, table, name, encoder, protocol))
     return evaluations

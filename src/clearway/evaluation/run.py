@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
 
 from clearway.agents.agent import Agent
+from clearway.agents.named import AgentMaker
 from clearway.errors import RunError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_agents, world_yardsticks
@@ -18,41 +21,28 @@ from clearway.torch_threads import torch_threads
 from clearway.world.tables import World
 
 
-def evaluate_run(
-    agent: TrainedAgent,
-    scenes: Sequence[Scene],
-    *,
-    episodes_per_target: int = EPISODES_PER_TARGET,
-    step_cap: int = STEP_CAP,
-    seed: int = 0,
-) -> list[Evaluation]:
-    """The agent of a run by each way of choosing actions, beside exact optima, random and shortest-path agent.
-
-    The first evaluation is the paper's: sampled actions.
-    """
-    return evaluate_runs(
-        {agent.record.reward.name: agent},
-        scenes,
-        episodes_per_target=episodes_per_target,
-        step_cap=step_cap,
-        seed=seed,
-    )
+def evaluate_run(agent: TrainedAgent, scenes: Sequence[Scene], **how: Any) -> list[Evaluation]:
+    """The agent of one run, as `evaluate_runs` has it. The first evaluation is the paper's: sampled actions."""
+    return evaluate_runs({agent.record.reward.name: agent}, scenes, **how)
 
 
 def evaluate_runs(
     agents: Mapping[str, TrainedAgent],
     scenes: Sequence[Scene],
     *,
+    beside: Mapping[str, AgentMaker] = MappingProxyType({}),
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_cap: int = STEP_CAP,
     seed: int = 0,
 ) -> list[Evaluation]:
-    """Agents of several runs on the same scenes and targets, beside exact optima, random and shortest-path agent.
+    """Agents of several runs on the same scenes and targets, by each way of choosing actions.
 
-    Torch uses one thread meanwhile: steps are too small for more, which only wait for each other beside a training.
+    Beside them walk the exact optima, the agents of `beside`, a random and a shortest-path agent. Torch uses one thread
+    meanwhile: steps are too small for more, which only wait for each other beside a training.
 
     Raises:
         RunError: the runs have other targets.
+        AgentError: one of `beside` cannot walk here.
     """
     records = [agent.record for agent in agents.values()]
     first = records[0]
@@ -64,7 +54,11 @@ def evaluate_runs(
         evaluations = evaluate_agents(
             world,
             {name: agent.on_poses(world) for name, agent in agents.items()},
-            references=_optima(world, [record.paid for record in records]),
+            references={
+                **_optima(world, [record.paid for record in records]),
+                **{name: make(world) for name, make in beside.items()},
+            },
+            scenes=scenes,
             encoder=encoder_names(scenes),
             episodes_per_target=episodes_per_target,
             step_cap=step_cap,
