@@ -15,7 +15,7 @@ from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_scene_agent
 from clearway.errors import EncoderError, PluginError
 from clearway.importers.plugged import plugged_scenes
-from clearway.learn.algorithms import ALGORITHMS
+from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
@@ -62,7 +62,7 @@ def test_one_of_each_kind_is_listed_after_our_own(package, tmp_path) -> None:
         ("rewards", "dear"),
         ("agents", "still"),
         ("importers", "pair"),
-        ("algorithms", "nothing"),
+        ("algorithms", "hasty"),
     }
     assert {row["version"] for row in rows if row["package"] == "tiny-plugins"} == {"1.2"}
     assert not any(row["problem"] for row in rows)
@@ -110,11 +110,26 @@ def test_another_version_of_the_encoder_is_refused(tmp_path, here, monkeypatch) 
 def test_rewards_agents_and_algorithms_are_found_by_name(here) -> None:
     assert load_plugin(plugin_of("rewards", "dear")) == Reward("dear", (Time(-0.5), Arrival())) == reward_named("dear")
     assert load_plugin(plugin_of("agents", "still")).__name__ == "Still"
-    assert load_plugin(plugin_of("algorithms", "nothing"))() is None
+    assert algorithm("hasty")().explore_end == 0.5
     assert find_plugin("rewards", "shortest") is None
     assert find_plugin("rewards", "cheap") is None
     with pytest.raises(PluginError, match=r"reward cheap: no installed package offers one .* use one of these: dear"):
         plugin_of("rewards", "cheap")
+
+
+def test_its_algorithm_trains_for_its_reward_and_its_agent_walks_beside(package, tmp_path) -> None:
+    write_scene(grid_scene(1), tmp_path / "grid.h5")
+    chosen = ("--algorithm", "hasty", "--reward", "dear", "--frames", "4000", "--targets", "5")
+    words = ("train", tmp_path / "grid.h5", "--out", tmp_path / "run", *chosen)
+    trained = clearway_with(package, words=words, cache=tmp_path / "cache")
+    assert trained.returncode == 0, trained.stderr
+    words = ("evaluate", tmp_path / "run", "--beside", "still", "--episodes", "3", "--step-cap", "20", "--json")
+    evaluated = clearway_with(package, words=words, cache=tmp_path / "cache")
+    assert evaluated.returncode == 0, evaluated.stderr
+    first, *others = [json.loads(evaluated.stdout), *json.loads(evaluated.stdout)["others"]]
+    assert first["agent"] == "dear" and first["trained"]["reward"]["name"] == "dear"
+    (still,) = [other for other in others if other["agent"] == "still"]
+    assert still["average"]["collisions"] == 0 and still["average"]["steps"] > first["average"]["steps"]
 
 
 def test_looking_up_imports_none_of_them(tmp_path, monkeypatch) -> None:

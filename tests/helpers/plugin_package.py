@@ -10,10 +10,14 @@ from pathlib import Path
 from helpers.documents import ROOT
 
 MODULE = '''
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
+from clearway.agents.agent import Decisions
+from clearway.learn.q_learning import QLearning
 from clearway.reward import Arrival, Reward, Time
 from clearway.scenes.thor_v1 import read_scene
 
@@ -46,11 +50,26 @@ DEAR = Reward("dear", (Time(-0.5), Arrival()))
 
 
 class Still:
-    pass
+    """Turns on the spot."""
+
+    sees = ()
+
+    def __init__(self, world):
+        pass
+
+    def reset(self, target, seed):
+        return {"row": seed}
+
+    def act(self, observation, state):
+        return Decisions(np.full(len(state["row"]), 1)), state
 
 
-def train_nothing():
-    pass
+@dataclass(frozen=True)
+class Hasty(QLearning):
+    """Q-learning that explores for ever."""
+
+    algorithm: ClassVar[str] = "hasty"
+    explore_end: float = 0.5
 '''
 
 ENTRY_POINTS = """
@@ -67,7 +86,7 @@ still = tiny_plugins:Still
 pair = tiny_plugins:read_pair
 
 [clearway.algorithms]
-nothing = tiny_plugins:train_nothing
+hasty = tiny_plugins:Hasty
 """
 
 

@@ -57,7 +57,7 @@ def named_maker(source: str, found: object) -> AgentMaker:
 
 def checked_agent(source: str, agent: object) -> Agent:
     """The agent. Raises AgentError where it is none."""
-    if not isinstance(agent, Agent):
+    if not isinstance(agent, Agent) or isinstance(agent, type):
         problem = f"{source}: gives {agent!r:.60}, expected an object with sees, reset and act"
         raise AgentError(f"{problem} (clearway.Agent). Correct it")
     sees = agent.sees

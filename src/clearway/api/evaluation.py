@@ -185,7 +185,8 @@ def _own(
     settings: Mapping[str, int],
 ) -> EvaluateResult:
     """The evaluation of an agent that has no run."""
-    if not isinstance(agent, Agent) and not callable(agent):
+    made = isinstance(agent, Agent) and not isinstance(agent, type)
+    if not made and not callable(agent):
         problem = f"agent={agent!r:.80}: expected a run folder, an .onnx file, what train returned, or an agent"
         raise ArgumentError(f"{problem}. Give one of these")
     if scenes is None:
@@ -194,12 +195,12 @@ def _own(
     if isinstance(card, Card):
         targets = _targets_of(card, scenes) if targets is None else targets
     world = make_world(scenes, chosen_targets(scenes, targets, settings["seed"]))
-    own = agent if isinstance(agent, Agent) else named_maker(AGENT, agent)(world)
+    own = checked_agent(AGENT, agent) if made else named_maker(AGENT, agent)(world)
     name = card.scene if isinstance(card, Card) else getattr(agent, "__name__", type(agent).__name__)
     with torch_threads(1):
         evaluations = evaluate_agents(
             world,
-            {name: checked_agent(AGENT, own)},
+            {name: own},
             references={name: make(world) for name, make in beside.items()},
             scenes=scenes,
             selections=get_args(ActionSelection) if isinstance(card, Card) else ("sampled",),

@@ -44,8 +44,12 @@ class Sight:
             assert self._world.features is not None
             return self._world.features[state].float().cpu().numpy()
         scene = np.searchsorted(self._first, pose, side="right") - 1
-        own = self._pictures[name]
-        return np.stack([own[of][place] for of, place in zip(scene, pose - self._first[scene], strict=True)])
+        kept = self._pictures[name]
+        seen = np.empty((len(pose), *kept[0].shape[1:]), kept[0][0].dtype)
+        for own in np.unique(scene):
+            here = scene == own
+            seen[here] = kept[own][pose[here] - self._first[own]]
+        return seen
 
 
 def _pictures(name: str, scenes: Sequence[Scene]) -> list[Observations]:
