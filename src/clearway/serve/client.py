@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from clearway.deploy.model import checked_picture
+from clearway.deploy.agent import checked_picture
 from clearway.deploy.navigator import Decision, Selection, checked_seed
 from clearway.errors import ClearwayError, DeployError
 from clearway.scenes.actions import Action

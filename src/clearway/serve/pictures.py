@@ -7,7 +7,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from clearway.deploy.model import MAX_PICTURE_SIDE
+from clearway.deploy.agent import MAX_PICTURE_SIDE
 from clearway.serve.faults import Fault
 
 FORMATS = ("JPEG", "PNG", "WEBP")
