@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 
+from clearway.agents.by_pose import PoseAgent, network_on_poses
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import SC_STEPS
 from clearway.evaluation.quality import Criteria, Quality, quality
@@ -14,7 +15,6 @@ from clearway.evaluation.report import Evaluation, Protocol, summarise
 from clearway.learn.train import Learning, RunRequest
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
-from clearway.model.policy import Policy, network_policy
 
 CHECK_SEED, FINAL_SEED = 1, 0  # of starts and chances; other episodes at the end than during training
 CRITERIA = Criteria()
@@ -106,11 +106,10 @@ def learning_curve(
                 due += every_frames * ((trainer.frames - due) // every_frames + 1)
         table = run_episodes(
             trainer.world,
-            policy_of(trainer),
+            agent_of(trainer),
             episodes_per_target=final.episodes_per_target,
             step_cap=final.step_cap,
             seed=final.seed,
-            history_length=trainer.learner.history_length,
         )
         evaluation = summarise(trainer.world, table, request.reward.name, encoder, final)
         return Curve(request.seed, tuple(checks), evaluation, quality(trainer.world, table), seconds, trainer.frames)
@@ -119,16 +118,15 @@ def learning_curve(
 def _checked(trainer: Learning, episodes: int) -> Quality:
     table = run_episodes(
         trainer.world,
-        policy_of(trainer),
+        agent_of(trainer),
         episodes_per_target=episodes,
         step_cap=SC_STEPS,
         seed=CHECK_SEED,
-        history_length=trainer.learner.history_length,
     )
     return quality(trainer.world, table)
 
 
-def policy_of(trainer: Learning) -> Policy:
+def agent_of(trainer: Learning) -> PoseAgent:
     """The agent as it stands, whichever algorithm trains it; training is none the wiser."""
     world, learner, prefix = trainer.world, trainer.learner, "network."
     assert world.features is not None
@@ -138,4 +136,5 @@ def policy_of(trainer: Learning) -> Policy:
     network = SiameseActorCritic(shape).to(world.device)
     tensors = trainer.tensors().items()
     network.load_state_dict({name[len(prefix) :]: t for name, t in tensors if name.startswith(prefix)})
-    return network_policy(LookupNetwork(network, trainer.feature_map(world.features), world.target_state), world)
+    lookup = LookupNetwork(network, trainer.feature_map(world.features), world.target_state)
+    return network_on_poses(lookup, world, learner.reward_scale)

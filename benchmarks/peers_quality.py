@@ -14,11 +14,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from throughput import ENDLESS
 
+from clearway.agents.agent import Agent
+from clearway.agents.by_pose import network_on_poses
 from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import SiameseActorCritic
-from clearway.model.policy import Policy, network_policy
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
 from clearway.world.tables import World
@@ -56,11 +57,11 @@ def our_outcome(world: World, seed: int, cap_s: float) -> Outcome:
     """Our default learner."""
     trainer = Trainer(world, ON_PREPARED, COLLISION_AWARE, seed)
 
-    def policy() -> Policy:
+    def current() -> Agent:
         trainer.lookup.refresh()
-        return network_policy(trainer.lookup, world)
+        return network_on_poses(trainer.lookup, world)
 
-    clock = SolvingClock(world, policy, cap_s)
+    clock = SolvingClock(world, current, cap_s)
     clock.start()
     over = False
     while not over and not trainer.finished:
@@ -95,17 +96,17 @@ class Watch(BaseCallback):
             self.over = self.clock.over()
 
 
-def sb3_policy(model: OnPolicyAlgorithm, world: World) -> Callable[[], Policy]:
-    """Gives the policy as it stands, computed by the package's network, so that looking at it is quick."""
+def sb3_agent(model: OnPolicyAlgorithm, world: World) -> Callable[[], Agent]:
+    """Gives the agent as it stands, computed by the package's network, so that looking at it is quick."""
     policy = policy_of(model)
     network = SiameseActorCritic(policy.shape)
     assert world.features is not None
     lookup = LookupNetwork(network, world.features, world.target_state)
 
-    def current() -> Policy:
+    def current() -> Agent:
         policy.copy_to(network)
         lookup.refresh()
-        return network_policy(lookup, world)
+        return network_on_poses(lookup, world)
 
     return current
 
@@ -115,7 +116,7 @@ def default_ppo_outcome(world: World, scenes: Sequence[Scene], seed: int, cap_s:
     with closing(vec_env("batched", scenes, envs)) as made:
         settings = network_settings(world, eps=1e-5, fused=True)
         model = PPO(SiamesePolicy, made, policy_kwargs=settings, device="cpu", seed=seed)
-        clock = SolvingClock(world, sb3_policy(model, world), cap_s)
+        clock = SolvingClock(world, sb3_agent(model, world), cap_s)
         model.learn(ENDLESS, callback=Watch(clock))
         return outcome(f"SB3 PPO, defaults, {envs} environments", seed, model.num_timesteps, clock)
 
@@ -144,7 +145,7 @@ def tuned_ppo_outcome(world: World, scenes: Sequence[Scene], seed: int, cap_s: f
             device="cpu",
             seed=seed,
         )
-        clock = SolvingClock(world, sb3_policy(model, world), cap_s)
+        clock = SolvingClock(world, sb3_agent(model, world), cap_s)
         model.learn(recipe.frames, callback=Watch(clock, falling_entropy=True))
         return outcome("SB3 PPO, our recipe's values", seed, model.num_timesteps, clock)
 

@@ -32,9 +32,10 @@ import httpx
 import numpy as np
 from PIL import Image
 
-from clearway.deploy.model import AgentModel
-from clearway.deploy.navigator import open_model
-from clearway.deploy.onnx_file import OnnxModel
+from clearway.agents.agent import Agent
+from clearway.deploy.navigator import open_agent
+from clearway.deploy.onnx_file import OnnxAgent
+from clearway.scenes.sensors import RGB
 
 SIZE = (300, 400)
 TOKEN = "a-token-for-the-benchmark"
@@ -61,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rounds", type=int, default=3, help="through all numbers of clients; their median is printed")
     options = parser.parse_args(arguments)
     if options.run:
-        backends = {"PyTorch": open_model(options.run), "onnxruntime": OnnxModel(options.agent, threads=1)}
+        backends = {"PyTorch": open_agent(options.run), "onnxruntime": OnnxAgent(options.agent, threads=1)}
         print_backends(backends)
     with served(options.agent) as url:
         print("| clients | requests/s | p50 ms | p99 ms | pictures a batch | model's share |")
@@ -76,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"| {clients} | {figures} |")
 
 
-def print_backends(backends: dict[str, AgentModel], batches: Sequence[int] = (1, 4, 16), repeats: int = 7) -> None:
+def print_backends(backends: dict[str, Agent], batches: Sequence[int] = (1, 4, 16), repeats: int = 7) -> None:
     """Processor time of the whole agent, milliseconds a picture."""
     import torch
 
@@ -86,10 +87,11 @@ def print_backends(backends: dict[str, AgentModel], batches: Sequence[int] = (1,
     for count in batches:
         best = dict.fromkeys(backends, float("inf"))
         for _ in range(repeats):
-            for name, model in backends.items():
-                history = np.zeros((count, model.card.history_length, model.card.feature_count), np.float32)
+            for name, agent in backends.items():
+                seen = {RGB: pictures(count)}
+                memory = agent.reset(seen, np.arange(count))
                 begun = time.process_time()
-                model.step(pictures(count), np.ones(count, bool), history, history[:, 0])
+                agent.act(seen, memory)
                 best[name] = min(best[name], (time.process_time() - begun) / count)
         print(f"| {count} | {' | '.join(f'{1000 * seconds:.1f}' for seconds in best.values())} |")
     print()

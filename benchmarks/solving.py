@@ -8,10 +8,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from clearway.agents.agent import Agent
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, run_episodes
 from clearway.evaluation.metrics import SC_STEPS
 from clearway.evaluation.quality import quality
-from clearway.model.policy import Policy
 from clearway.world.tables import World
 
 CHECK_SEED = 1
@@ -20,9 +20,9 @@ SHORTEST_PAUSE_S = 5.0
 PAUSE_SHARE = 0.05  # of the training time so far: the precision of the answer
 
 
-def solved_count(world: World, policy: Policy, episodes: int = EPISODES_PER_TARGET) -> int:
+def solved_count(world: World, agent: Agent, episodes: int = EPISODES_PER_TARGET) -> int:
     """How many targets are solved."""
-    table = run_episodes(world, policy, episodes_per_target=episodes, step_cap=SC_STEPS, seed=CHECK_SEED)
+    table = run_episodes(world, agent, episodes_per_target=episodes, step_cap=SC_STEPS, seed=CHECK_SEED)
     return quality(world, table).solved_targets
 
 
@@ -31,7 +31,7 @@ class SolvingClock:
 
     Args:
         world: scenes and targets.
-        policy: of the agent as it stands.
+        agent: gives it as it stands.
         cap_s: seconds of training after which the agent has failed.
 
     Attributes:
@@ -40,8 +40,8 @@ class SolvingClock:
         out_of_time: the seconds are used up.
     """
 
-    def __init__(self, world: World, policy: Callable[[], Policy], cap_s: float) -> None:
-        self.world, self.policy, self.cap_s = world, policy, cap_s
+    def __init__(self, world: World, agent: Callable[[], Agent], cap_s: float) -> None:
+        self.world, self.agent, self.cap_s = world, agent, cap_s
         self.seconds, self.solved, self.out_of_time = 0.0, False, False
         self._check_at = SHORTEST_PAUSE_S
         self._since = time.perf_counter()
@@ -62,8 +62,8 @@ class SolvingClock:
 
     def solved_count(self) -> int:
         """Targets that the agent solves as it stands."""
-        return solved_count(self.world, self.policy())
+        return solved_count(self.world, self.agent())
 
     def _all_solved(self) -> bool:
-        policy, targets = self.policy(), self.world.target_count
-        return all(solved_count(self.world, policy, n) == targets for n in (SCREENING_EPISODES, EPISODES_PER_TARGET))
+        agent, targets = self.agent(), self.world.target_count
+        return all(solved_count(self.world, agent, n) == targets for n in (SCREENING_EPISODES, EPISODES_PER_TARGET))
