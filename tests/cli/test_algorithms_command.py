@@ -24,12 +24,20 @@ def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, na
     assert clearway("evaluate", tmp_path, "--episodes", 1, "--step-cap", 20, "--pictures", tmp_path / "p").code == 0
 
 
-@pytest.mark.parametrize("command", ["export", "view", "serve", "video"])
+@pytest.mark.parametrize("command", ["export", "view", "serve"])
 def test_what_needs_a_network_says_that_a_table_has_none(clearway, trained, tmp_path, command):
     run = tmp_path / "run"
     assert clearway("train", trained.scene, "--out", run, "--algorithm", "q-learning", *SETTINGS).code == 0
     out = () if command in ("view", "serve") else ("--out", tmp_path / "out.onnx")
     assert clearway(command, run, *out).refusal("an agent of q-learning has no network")
+
+
+def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):
+    run, film = tmp_path / "run", tmp_path / "out.gif"
+    assert clearway("train", trained.scene, "--out", run, "--algorithm", "q-learning", *SETTINGS).code == 0
+    answer = clearway("video", run, "--out", film, "--most-steps", 3)
+    assert answer.code == 0, answer
+    assert film.read_bytes().startswith(b"GIF")
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,7 @@ def test_tokens_that_are_too_weak_or_cannot_be_sent(clearway, monkeypatch, token
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
 def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
-    monkeypatch.setattr("clearway.serve.run.open_model", lambda source, scene: Sums())
+    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Sums())
     assert clearway("serve", "x.onnx", *words).refusal(part)
 
 
@@ -54,8 +54,8 @@ def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
 def served(monkeypatch) -> list[str]:
     """Tokens of the services that would have run."""
     tokens: list[str] = []
-    monkeypatch.setattr("clearway.serve.run.open_model", lambda source, scene: Sums())
-    monkeypatch.setattr("clearway.serve.run.run_service", lambda model, listener, token, limits: tokens.append(token))
+    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Sums())
+    monkeypatch.setattr("clearway.serve.run.run_service", lambda agent, listener, token, limits: tokens.append(token))
     return tokens
 
 
@@ -82,7 +82,7 @@ import clearway.serve.run
 from clearway.cli.main import main
 from helpers.sums import Sums
 
-clearway.serve.run.open_model = lambda source, scene: Sums()
+clearway.serve.run.open_agent = lambda source, scene: Sums()
 main(["serve", "x.onnx"])
 """
 

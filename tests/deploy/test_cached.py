@@ -19,18 +19,18 @@ def test_a_run_is_exported_once_and_again_when_the_file_is_damaged(deployed, tmp
     monkeypatch.setattr(cached, "export_onnx", export)
     told: list[str] = []
     for _ in range(2):
-        assert cached.cached_model(deployed.chosen, told.append).card.scene == "cellar"
+        assert cached.cached_agent(deployed.chosen, told.append).card.scene == "cellar"
     assert told == ["exporting the agent for scene cellar, once ..."]
     (path,) = exported
     assert path.parent == tmp_path / "agents" and path.name.startswith("cellar-")
     path.write_bytes(path.read_bytes()[:-1])
-    assert cached.cached_model(deployed.chosen, told.append).card.scene == "cellar"
+    assert cached.cached_agent(deployed.chosen, told.append).card.scene == "cellar"
     assert exported == [path, path]
 
 
 def test_another_agent_has_another_file(deployed) -> None:
     key = cached._key(deployed.chosen)
-    weight = deployed.chosen.agent.network.output_bias.data
+    weight = deployed.chosen.trained.network.output_bias.data
     before = float(weight[0, 0])
     weight[0, 0] = before + 1e-6
     changed = cached._key(deployed.chosen)
@@ -39,7 +39,7 @@ def test_another_agent_has_another_file(deployed) -> None:
     assert cached._key(deployed.chosen) == key
 
 
-@pytest.mark.parametrize("package", ["deploy", "model", "perception"])
+@pytest.mark.parametrize("package", ["agents", "deploy", "model", "perception"])
 def test_other_code_of_what_is_exported_makes_another_file(deployed, monkeypatch, package) -> None:
     key = cached._key(deployed.chosen)
     read = Path.read_bytes

@@ -14,10 +14,12 @@ from torch.nn.functional import interpolate
 from clearway.deploy.card import card_from_json
 from clearway.deploy.from_run import load_scene_agent, picture_encoder
 from clearway.deploy.graph import resize_weights
-from clearway.deploy.onnx_file import OnnxModel
+from clearway.deploy.onnx_file import OnnxAgent
 from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
 from clearway.perception import depth_grid, encoder_from_record
+from clearway.scenes.sensors import RGB
+from helpers.agents import after_poses
 from helpers.made import with_depth
 
 CLOSE = {"rtol": 0, "atol": 1e-5}
@@ -35,7 +37,7 @@ def test_the_policy_alone_equals_the_network_in_pytorch(deployed, policy_file, r
     """The whole network with its scene switch is the reference, not the module that was exported."""
     features = deployed.scenes[1].features
     history, target = histories(rows, len(features))
-    agent = deployed.chosen.agent
+    agent = deployed.chosen.trained
     prepared = agent.feature_map(torch.from_numpy(features))
     with torch.inference_mode():
         scores, value = agent.network(prepared[history], prepared[target], torch.ones(rows, dtype=torch.int64))
@@ -48,40 +50,41 @@ def test_the_policy_alone_equals_the_network_in_pytorch(deployed, policy_file, r
 
 
 @pytest.mark.parametrize("rows", [1, 3, 32])
-def test_policy_with_encoder_equals_the_evaluated_policy(deployed, rows) -> None:
+def test_policy_with_encoder_equals_the_evaluated_agent(deployed, rows) -> None:
     """Walked from pictures, step by step, against the policy from tables that `clearway evaluate` judges.
 
     Values are in units of the reward, as the viewer shows them, not of what the learner made of it.
     """
     chosen, scenes = deployed.chosen, deployed.scenes
-    scale = chosen.agent.record.learner.reward_scale
+    scale = chosen.trained.record.learner.reward_scale
     assert scale != 1
-    world = run_world(chosen.agent.record, scenes)
+    world = run_world(chosen.trained.record, scenes)
     rng = np.random.default_rng(rows)
     states = rng.integers(0, len(deployed.pictures), (6, rows))
     targets = rng.integers(0, 2, rows)
-    features = scenes[1].features[np.array([3, 9])[targets]]
-    model = OnnxModel(deployed.agent)
-    history = np.full((rows, 4, model.card.feature_count), np.nan, np.float32)  # a start must not look at it
+    agent, known_goal = OnnxAgent(deployed.agent), np.array([3, 9])[targets]
+    memory = agent.reset({RGB: deployed.pictures[known_goal]}, np.arange(rows))
+    (empty,) = [name for name, values in memory.items() if values.shape == (rows, 4, agent.card.feature_count)]
+    memory = {**memory, empty: np.full_like(memory[empty], np.nan)}  # a start must not look at it
     first = int(world.scene_offset[1])
+    evaluated = chosen.trained.on_poses(world)
     for step in range(6):
-        start = np.full(rows, step == 0)
-        found = model.step(deployed.pictures[states[step]], start, history, features)
+        found, memory = agent.act({RGB: deployed.pictures[states[step]]}, memory)
         known = states[np.clip(np.arange(step - 3, step + 1), 0, None)].T  # (B, 4), the first repeated
-        expected, value = chosen.agent.critic(world)(torch.from_numpy(known) + first, torch.from_numpy(targets) + 2)
-        np.testing.assert_allclose(found.probabilities, expected.numpy(), **CLOSE)
-        np.testing.assert_allclose(found.value[:, 0] * scale, value.numpy(), **CLOSE)
-        history = found.history
+        expected = after_poses(evaluated, world, torch.from_numpy(known) + first, torch.from_numpy(targets) + 2)
+        np.testing.assert_allclose(found.probabilities, expected.probabilities, **CLOSE)
+        np.testing.assert_allclose(found.value * scale, expected.value * scale, **CLOSE)
 
 
 @pytest.mark.parametrize("size", [(12, 16), (16, 20), (37, 21), (240, 320), (1, 1)])
 def test_pictures_of_any_size_are_prepared_as_the_encoder_does(deployed, size) -> None:
     pictures = np.random.default_rng(0).integers(0, 256, (3, *size, 3), np.uint8)
-    model = OnnxModel(deployed.agent)
-    history = np.zeros((3, 4, model.card.feature_count), np.float32)
-    found = model.step(pictures, np.ones(3, bool), history, history[:, 0]).history
+    agent = OnnxAgent(deployed.agent)
+    begin = agent.reset({RGB: pictures}, np.arange(3))
+    _, after = agent.act({RGB: pictures}, begin)
     expected = encoder_from_record(deployed.scenes[1].encoder).encode(pictures)
-    np.testing.assert_allclose(found, np.repeat(expected[:, None], 4, axis=1), rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(begin["target"], expected, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(after["history"], np.repeat(expected[:, None], 4, axis=1), rtol=1e-4, atol=1e-4)
 
 
 @pytest.mark.parametrize(("given", "wanted"), [(300, 128), (400, 128), (5, 5), (3, 8), (1, 4), (9, 1)])
@@ -92,16 +95,18 @@ def test_resizing_is_pytorch_s(given, wanted) -> None:
 
 
 def test_only_where_an_episode_starts_is_the_history_filled(deployed) -> None:
-    model = OnnxModel(deployed.agent)
+    agent = OnnxAgent(deployed.agent)
     history = np.arange(2 * 4 * 16, dtype=np.float32).reshape(2, 4, 16)
-    after = model.step(deployed.pictures[:2], np.array([True, False]), history, history[:, 0]).history
+    begin = agent.reset({RGB: deployed.pictures[:2]}, np.arange(2))
+    memory = {**begin, "begun": np.array([False, True]), "history": history}
+    after = agent.act({RGB: deployed.pictures[:2]}, memory)[1]["history"]
     np.testing.assert_allclose(after[0], np.repeat(after[0, -1:], 4, axis=0))
     np.testing.assert_array_equal(after[1, :3], history[1, 1:])
     assert not np.isin(after[:, -1], history).any()
 
 
 def test_the_card_says_what_the_agent_is(deployed) -> None:
-    card = OnnxModel(deployed.agent).card
+    card = OnnxAgent(deployed.agent).card
     assert (card.scene, card.takes_pictures, card.history_length, card.feature_count) == ("cellar", True, 4, 16)
     assert card.actions == ("move forward", "turn right", "turn left", "move backward")
     assert card.picture_size == (12, 16)
@@ -115,7 +120,7 @@ def test_the_card_says_what_the_agent_is(deployed) -> None:
 
 @pytest.mark.slow
 def test_the_card_of_a_policy_alone(deployed, policy_file) -> None:
-    alone = OnnxModel(policy_file).card
+    alone = OnnxAgent(policy_file).card
     assert alone.encoder["identity"] == deployed.scenes[1].encoder.identity
     assert (alone.takes_pictures, alone.normalisation["pixels"]) == (False, None)
 
@@ -150,6 +155,6 @@ def test_the_card_of_an_agent_that_sees_depth_says_so(deployed) -> None:
 
 
 def test_a_card_of_before_observations_were_described_is_read(deployed) -> None:
-    kept = json.loads(OnnxModel(deployed.agent).card.to_json()) | {"format_version": 1}
+    kept = json.loads(OnnxAgent(deployed.agent).card.to_json()) | {"format_version": 1}
     del kept["observation"]
     assert card_from_json(json.dumps(kept), "here").observation is None

@@ -1,6 +1,7 @@
 """A robot's ten lines: pictures in, actions out."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,11 +9,12 @@ import pytest
 from PIL import Image
 
 import clearway
-from clearway.deploy.navigator import choose, open_model
+from clearway.deploy.navigator import open_agent
 from clearway.errors import DeployError
 from clearway.learn.load import run_world
 from clearway.reward import COLLISION_AWARE
 from clearway.world.navigation import Navigation
+from helpers.agents import after_poses, equal
 from helpers.imported import imported_by
 from helpers.sums import Sums, plain
 
@@ -34,16 +36,17 @@ def test_decisions_are_the_evaluated_agent_s_along_an_episode(deployed, source) 
     """Through the environment that trained it: the histories are the environment's own."""
     import torch
 
-    world = run_world(deployed.chosen.agent.record, deployed.scenes)
-    policy, first = deployed.chosen.agent.policy(world), int(world.scene_offset[1])
+    world = run_world(deployed.chosen.trained.record, deployed.scenes)
+    agent, first = deployed.chosen.trained.on_poses(world), int(world.scene_offset[1])
     navigation = Navigation(world, COLLISION_AWARE, torch.zeros(1, dtype=torch.int64))
     navigation.reset(target=torch.tensor([2]), start=torch.tensor([first + 30]))
     navigator = clearway.Navigator(getattr(deployed, source), scene="cellar", seed=1)
     navigator.set_target(deployed.pictures[3])
     for _ in range(12):
         action, probabilities, value = navigator.act(deployed.pictures[int(navigation.state) - first])
-        expected = policy(navigation.history, navigation.target)[0].numpy()
-        np.testing.assert_allclose(probabilities, expected, atol=1e-5)
+        expected = after_poses(agent, world, navigation.history, navigation.target)
+        np.testing.assert_allclose(probabilities, expected.probabilities[0], atol=1e-5)
+        np.testing.assert_allclose(value, expected.value[0], atol=1e-4)
         assert isinstance(value, float)
         navigation.step(torch.tensor([int(action)]))
 
@@ -78,11 +81,30 @@ def test_actions_are_drawn_by_their_probabilities_and_a_seed_repeats() -> None:
     assert {certain.act(plain(0)).action.name for _ in range(9)} == {"MOVE_BACKWARD"}
 
 
-def test_choosing_an_action() -> None:
-    probabilities = np.array([0.25, 0.25, 0.0, 0.5], np.float32)
-    numbers = (0.0, 0.2499, 0.25, 0.4999, 0.5, 0.9999999999)
-    assert [int(choose(probabilities, number)) for number in numbers] == [0, 0, 1, 1, 3, 3]
-    assert int(choose(probabilities, None)) == 3
+def test_the_most_probable_action_is_the_first_among_equals() -> None:
+    class Undecided(Sums):
+        def act(self, observation, state):
+            decisions, after = super().act(observation, state)
+            return replace(decisions, probabilities=np.array([[0.1, 0.4, 0.4, 0.1]], np.float32)), after
+
+    navigator = clearway.Navigator(Undecided(), selection="argmax")
+    navigator.set_target(plain(0))
+    assert {navigator.act(plain(0)).action.name for _ in range(9)} == {"TURN_RIGHT"}
+
+
+def test_episodes_of_one_navigator_draw_for_themselves_and_repeat_in_their_order() -> None:
+    def drawn(navigator: clearway.Navigator) -> list[list[int]]:
+        found = []
+        for _ in range(3):
+            navigator.set_target(plain(0))
+            found.append([int(navigator.act(plain(0)).action) for _ in range(20)])
+        return found
+
+    first = drawn(clearway.Navigator(Sums(), seed=4))
+    assert first == drawn(clearway.Navigator(Sums(), seed=4))
+    assert first[0] != first[1] != first[2]
+    unseeded = [drawn(clearway.Navigator(Sums())) for _ in range(2)]
+    assert unseeded[0] != unseeded[1]
 
 
 def test_threads_may_share_a_navigator() -> None:
@@ -94,22 +116,20 @@ def test_threads_may_share_a_navigator() -> None:
         found = list(pool.map(lambda level: navigator.act(plain(level)).value, [1] * 400))
     assert found == [4.0] * 400
 
-    history = []
-    step = Sums.step
+    states = []
 
     class Watched(Sums):
-        def step(self, seen, start, before, target):
-            result = step(self, seen, start, before, target)
-            history.append((before.copy(), result.history.copy()))
-            return result
+        def act(self, observation, state):
+            decisions, after = super().act(observation, state)
+            states.append((state, after))
+            return decisions, after
 
     watched = clearway.Navigator(Watched())
     watched.set_target(plain(0))
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda level: watched.act(plain(level)), range(1, 101)))
-    steps = history[1:]  # the first is the target's
-    assert len(steps) == 100
-    assert all(np.array_equal(later[0], earlier[1]) for earlier, later in pairwise(steps))
+    assert len(states) == 100
+    assert all(equal(later[0], earlier[1]) for earlier, later in pairwise(states))
 
 
 PICTURE = np.zeros((4, 4, 3), np.uint8)
@@ -157,7 +177,7 @@ def test_sources_that_cannot_be_used(deployed, tmp_path) -> None:
     assert clearway.Navigator(Sums(), scene="attic").card.scene == "attic"
     with pytest.raises(DeployError, match=r"selection is 'best'\. Choose one of sampled, argmax"):
         clearway.Navigator(Sums(), selection="best")
-    assert open_model(str(deployed.agent), "cellar").card.scene == "cellar"
+    assert open_agent(str(deployed.agent), "cellar").card.scene == "cellar"
 
 
 @pytest.mark.parametrize("seed", [-1, "x", 1.5, True, np.array([1])])

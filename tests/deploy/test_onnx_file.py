@@ -7,13 +7,13 @@ import onnx
 import pytest
 
 from clearway.deploy.card import Card, card_from_json
-from clearway.deploy.onnx_file import MAX_BYTES, OnnxModel
+from clearway.deploy.onnx_file import MAX_BYTES, OnnxAgent
 from clearway.errors import DeployError
 
 
 def refusal(path: Path) -> str:
     with pytest.raises(DeployError) as caught:
-        OnnxModel(path)
+        OnnxAgent(path)
     assert str(caught.value).startswith(str(path))
     return str(caught.value)
 

@@ -4,15 +4,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.agents.by_pose import RandomWalk
 from clearway.errors import RunError
 from clearway.evaluation.episode_files import read_episodes, write_episodes
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
-from clearway.evaluation.policies import random_policy
 from helpers.small_runs import small_world
 
 
 def walked() -> EpisodeTable:
-    return run_episodes(small_world(), random_policy(), episodes_per_target=4, step_cap=30, seed=1)
+    return run_episodes(small_world(), RandomWalk(), episodes_per_target=4, step_cap=30, seed=1)
 
 
 def test_a_table_comes_back_as_it_was(tmp_path: Path) -> None:

@@ -9,12 +9,13 @@ import torch
 
 from clearway.errors import SceneError
 from clearway.evaluation.episodes import episode_starts, run_episodes
-from clearway.evaluation.optimum import optimum_policies, world_yardsticks
+from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.evaluation.oracle import action_values, make_task, optimal_policy, soft_policy, yardstick
 from clearway.evaluation.run import _optima
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
 from clearway.world.tables import make_world
 from clearway.zones import Zone, pose_zones
+from helpers.agents import told_after
 from helpers.made import corridor_scene, grid_scene
 
 ONE_CELL = np.array([[-1, 1, 3, -1], [-1, 2, 0, -1], [-1, 3, 1, -1], [-1, 0, 2, -1]], np.int32)
@@ -63,7 +64,7 @@ def test_where_walking_on_earns_more_than_arriving_no_episode_ends(alpha: float)
     (found,) = world_yardsticks(world, reward)
     assert found.yardstick.optimal.steps == found.yardstick.soft.steps == np.inf
     assert found.to_json()["optimal"] == {"steps": None, "collision_visits": None, "precollision_visits": None}
-    walked = run_episodes(world, optimum_policies(world, [found])[0], episodes_per_target=20, step_cap=300, seed=0)
+    walked = run_episodes(world, optimum_agents(world, [found])[0], episodes_per_target=20, step_cap=300, seed=0)
     assert not walked.reached.all()
 
 
@@ -133,8 +134,8 @@ def test_the_world_s_starts_are_those_of_the_episodes() -> None:
     world = make_world(scenes, {scene.name: (2, 9) for scene in scenes})
     starts = episode_starts(world, 7, seed=5)
     soft = world_yardsticks(world, COLLISION_AWARE)
-    policy = optimum_policies(world, soft)[1]
-    table = run_episodes(world, policy, episodes_per_target=7, seed=5)
+    agent = optimum_agents(world, soft)[1]
+    table = run_episodes(world, agent, episodes_per_target=7, seed=5)
     assert starts.reshape(-1).tolist() == table.start.tolist()
     found = world_yardsticks(world, COLLISION_AWARE, starts=starts)
     walked = [table.shortest_path_steps[table.target == target].mean() for target in range(4)]
@@ -146,8 +147,8 @@ def test_expected_figures_agree_with_walked_episodes():
     world = make_world(scenes, {scene.name: (2, 9) for scene in scenes})
     found = world_yardsticks(world, COLLISION_AWARE.with_changes(clip=True), entropy_weight=0.02)
     episodes = 4000
-    for policy, kind in zip(optimum_policies(world, found), ("optimal", "soft"), strict=True):
-        table = run_episodes(world, policy, episodes_per_target=episodes, seed=1)
+    for agent, kind in zip(optimum_agents(world, found), ("optimal", "soft"), strict=True):
+        table = run_episodes(world, agent, episodes_per_target=episodes, seed=1)
         for index, one in enumerate(found):
             exact, rows = getattr(one.yardstick, kind), table.target == index
             figures = {
@@ -171,25 +172,26 @@ def test_json_has_the_promised_keys():
     assert content["target"] == 3
 
 
-def test_policies_stand_on_the_worlds_numbering():
+def test_optimum_agents_stand_on_the_worlds_numbering():
     scenes = [corridor_scene(3, feature_count=32), grid_scene(2, name="two")]
     world = make_world(scenes, {scene.name: (1,) for scene in scenes})
-    best, _ = optimum_policies(world, world_yardsticks(world, SHORTEST))
+    best, _ = optimum_agents(world, world_yardsticks(world, SHORTEST))
     first = int(world.scene_offset[1])
     history = torch.full((1, 4), first + 2)
-    np.testing.assert_allclose(best(history, torch.tensor([1])).sum(1), 1.0, atol=1e-6)
-    assert float(best(history, torch.tensor([0])).sum()) == 0
+    np.testing.assert_allclose(told_after(best, world, history, torch.tensor([1])).sum(1), 1.0, atol=1e-6)
+    assert float(told_after(best, world, history, torch.tensor([0])).sum()) == 0
 
 
 def test_the_tables_soft_fixed_point_is_that_of_clipped_rewards() -> None:
     """Published rewards are clipped; a run's own reward need not be."""
     scene = grid_scene(2, width=4, depth=4)
     world = make_world([scene], {scene.name: [5]})
-    policies = _optima(world, [COLLISION_AWARE])
+    agents = _optima(world, [COLLISION_AWARE])
     for name, clip, kind in (("optimum", False, 0), ("soft fixed point", True, 1)):
-        expected = optimum_policies(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=clip)))[kind]
-        other = optimum_policies(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=not clip)))[kind]
+        expected = optimum_agents(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=clip)))[kind]
+        other = optimum_agents(world, world_yardsticks(world, replace(COLLISION_AWARE, clip=not clip)))[kind]
         history, target = torch.arange(scene.state_count)[:, None], torch.zeros(scene.state_count, dtype=torch.int64)
-        own = policies[f"{name} (collision-aware{'' if clip else ', unclipped'})"](history, target)
-        assert torch.equal(own, expected(history, target))
-        assert kind == 0 or not torch.allclose(own, other(history, target), atol=1e-3)
+        agent = agents[f"{name} (collision-aware{'' if clip else ', unclipped'})"]
+        own, wanted, else_told = (told_after(one, world, history, target) for one in (agent, expected, other))
+        assert torch.equal(own, wanted)
+        assert kind == 0 or not torch.allclose(own, else_told, atol=1e-3)

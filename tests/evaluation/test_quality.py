@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from clearway.agents.by_pose import shortest_paths
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
-from clearway.evaluation.policies import shortest_path_policy
 from clearway.evaluation.quality import Criteria, Quality, quality
 from clearway.world.tables import make_world
 from helpers.made import corridor_scene
@@ -47,7 +47,7 @@ def test_an_episode_that_fails_leaves_its_target_unsolved() -> None:
 
 def test_the_shortest_path_meets_every_criterion() -> None:
     world = make_world([corridor_scene(5)], {"corridor": [0, 8]})
-    found = quality(world, run_episodes(world, shortest_path_policy(world), episodes_per_target=20))
+    found = quality(world, run_episodes(world, shortest_paths(world), episodes_per_target=20))
     assert found.path_ratio == found.worst_path_ratio == 1
     assert all(found.met(Criteria()).values())
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from clearway.agents.by_pose import RandomWalk
+from clearway.agents.selection import Argmax
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import METRIC_NAMES
-from clearway.evaluation.policies import argmax, random_policy
 from clearway.evaluation.protocol import evaluate_agents
 from clearway.evaluation.report import Evaluation, Protocol, summarise
 from clearway.evaluation.tables import MARK, markdown_table, rich_tables, table_text
@@ -25,7 +26,7 @@ TARGETS = {"grid": [3, 17, 40], "corridor": [0, 19]}
 def evaluations() -> list[Evaluation]:
     scenes = [grid_scene(2), corridor_scene(5, feature_count=32)]
     world = make_world(scenes, TARGETS)
-    agents = {"first": random_policy(), "second": argmax(random_policy())}
+    agents = {"first": RandomWalk(), "second": Argmax(RandomWalk())}
     return evaluate_agents(world, agents, encoder="made-up", episodes_per_target=40, step_cap=400)
 
 
@@ -169,7 +170,7 @@ def test_every_column_shows_its_own_figure(evaluations):
 def test_the_seed_is_that_of_the_bootstrap_too():
     scene = grid_scene(2)
     world = make_world([scene], {scene.name: [3, 17]})
-    table = run_episodes(world, random_policy(), episodes_per_target=30, step_cap=400)
+    table = run_episodes(world, RandomWalk(), episodes_per_target=30, step_cap=400)
     first, again, other = (summarise(world, table, "a", "e", Protocol(30, 400, seed, "sampled")) for seed in (0, 0, 1))
     assert first.average.values == other.average.values
     assert first.average.intervals == again.average.intervals != other.average.intervals

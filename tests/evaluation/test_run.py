@@ -10,6 +10,7 @@ from clearway.evaluation.tables import markdown_table
 from clearway.learn.load import load_agent
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE
+from helpers.agents import told_after
 from helpers.made import grid_scene
 from helpers.small_runs import small_learner, small_request
 
@@ -46,6 +47,6 @@ def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:
     assert not torch.allclose(*policies)
     best = _optima(world, [record.paid])["optimum (collision-aware)"]
     walking = state != world.target_state[0]
-    found = best(state[:, None].expand(-1, 4), target)[walking]
+    found = told_after(best, world, state[:, None], target)[walking]
     torch.testing.assert_close(found.double(), policies[1][walking], rtol=1e-5, atol=1e-6)
     assert "optimum (collision-aware, unclipped)" in _optima(world, [record.reward])

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
-from torch import Tensor
 
+from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.evaluation.episodes import run_episodes
-from clearway.evaluation.policies import random_policy, shortest_path_policy
 from clearway.evaluation.showcase import EPISODES, STEP_CAP, showcases
 from clearway.scenes.actions import Action
 from clearway.scenes.graph import next_states
 from clearway.world.tables import make_world
+from helpers.agents import by_rule, only
 from helpers.made import corridor_scene, grid_scene
 
 SCENES = [grid_scene(2), corridor_scene(5, feature_count=32)]
@@ -20,18 +19,9 @@ TARGETS = {"grid": [3, 17, 40], "corridor": [0, 16]}
 WORLD = make_world(SCENES, TARGETS)
 
 
-def always(action: Action):
-    """A policy that knows one action."""
-
-    def probabilities(history: Tensor, target: Tensor) -> Tensor:
-        return torch.nn.functional.one_hot(torch.full((len(target),), int(action)), len(Action)).double()
-
-    return probabilities
-
-
 @pytest.fixture(scope="module")
 def shown():
-    agents = {"shortest path": shortest_path_policy(WORLD), "random": random_policy()}
+    agents = {"shortest path": shortest_paths(WORLD), "random": RandomWalk()}
     return showcases(WORLD, agents, seed=4)
 
 
@@ -62,16 +52,16 @@ def test_all_agents_start_alike_and_the_best_takes_the_shortest_path(shown):
 
 
 def test_it_is_the_longest_of_the_episodes_that_every_agent_finishes():
-    policy = shortest_path_policy(WORLD)
-    table = run_episodes(WORLD, policy, episodes_per_target=EPISODES, step_cap=STEP_CAP, seed=1)
+    agent = shortest_paths(WORLD)
+    table = run_episodes(WORLD, agent, episodes_per_target=EPISODES, step_cap=STEP_CAP, seed=1)
     scene_of_episode = WORLD.target_scene.numpy()[table.target]
     longest = [table.shortest_path_steps[scene_of_episode == scene].max() for scene in range(2)]
-    found = showcases(WORLD, {"ideal": policy}, seed=1)
+    found = showcases(WORLD, {"ideal": agent}, seed=1)
     assert [show.shortest_path_steps for show in found] == longest
 
 
 def test_an_episode_that_more_agents_finish_comes_before_a_longer_one():
-    agents = {"ideal": shortest_path_policy(WORLD), "straight on": always(Action.MOVE_FORWARD)}
+    agents = {"ideal": shortest_paths(WORLD), "straight on": by_rule(WORLD, only(Action.MOVE_FORWARD))}
     corridor = showcases(WORLD, agents, seed=1)[1]
     straight = corridor.walks["straight on"]
     assert (corridor.target, straight.states[-1]) == (16, 16)  # the far end, looking along the corridor
@@ -80,14 +70,15 @@ def test_an_episode_that_more_agents_finish_comes_before_a_longer_one():
 
 
 def test_a_walk_that_does_not_arrive_ends_at_the_cap():
-    (show,) = showcases(make_world(SCENES[:1], {"grid": [3]}), {"stuck": always(Action.TURN_RIGHT)})
+    world = make_world(SCENES[:1], {"grid": [3]})
+    (show,) = showcases(world, {"stuck": by_rule(world, only(Action.TURN_RIGHT))})
     assert len(show.walks["stuck"].actions) == STEP_CAP
     assert set(show.walks["stuck"].actions.tolist()) == {Action.TURN_RIGHT}
 
 
 def test_a_seed_repeats_and_another_one_differs():
     def starts(seed: int) -> list[tuple[int, int]]:
-        found = showcases(WORLD, {"random": random_policy()}, seed=seed)
+        found = showcases(WORLD, {"random": RandomWalk()}, seed=seed)
         return [(show.target, *show.walks["random"].states.tolist()) for show in found]
 
     assert starts(0) == starts(0)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.evaluation.episodes import run_episodes
-from clearway.evaluation.policies import random_policy, shortest_path_policy
 from clearway.experiments import fig5, fig6, hard_tables
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.scenes.scene import Scene
@@ -21,8 +21,8 @@ def test_hardness_by_other_means() -> None:
     """Random-walk steps by walking, and the share of collision poses on shortest paths by counting."""
     scene, target = corridor_scene(3), 4  # the middle cell, looking along the corridor
     world = make_world([scene], {scene.name: (target,)})
-    walked = run_episodes(world, random_policy(), episodes_per_target=4000, seed=1)
-    direct = run_episodes(world, shortest_path_policy(world), episodes_per_target=4000, seed=1)
+    walked = run_episodes(world, RandomWalk(), episodes_per_target=4000, seed=1)
+    direct = run_episodes(world, shortest_paths(world), episodes_per_target=4000, seed=1)
     share = direct.zone_steps[:, Zone.COLLISION].mean() / direct.steps.mean()
     assert hardness(scene)[target] == pytest.approx(walked.steps.mean() * share, rel=0.08)
 

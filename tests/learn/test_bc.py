@@ -8,14 +8,15 @@ from pathlib import Path
 import pytest
 import torch
 
+from clearway.agents.by_pose import shortest_paths
 from clearway.errors import RunError
-from clearway.evaluation.policies import shortest_path_policy
 from clearway.learn import bc
 from clearway.learn.bc import BC, Cloning, cloning_loss
 from clearway.learn.checkpoint import newest_checkpoint, read_network
-from clearway.learn.load import load_agent, run_world
+from clearway.learn.load import load_network, run_world
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE
+from helpers.agents import told_after
 from helpers.small_runs import (
     corridor_world,
     equal_bits,
@@ -57,7 +58,7 @@ def test_an_update_equals_the_naive_one() -> None:
     history, target = rollout.history.flatten(0, 1), rollout.target.flatten()
     states = twin.feature_map(world.features)
     scores, _ = naive(states[history], states[world.target_state][target], world.target_scene[target])
-    right = shortest_path_policy(world)(history, target) > 0
+    right = told_after(shortest_paths(world), world, history, target) > 0
     assert right.any(1).all()
     loss = -(torch.softmax(scores, 1) * right).sum(1).log().mean()
     naive.zero_grad()
@@ -118,9 +119,9 @@ def test_a_run_is_loaded_as_any_network_and_a_seed_and_tensors_repeat_it(tmp_pat
     assert equal_bits(
         saved, {name: tensor for name, tensor in second.tensors().items() if name in saved} | second.fixed_tensors()
     )
-    agent = load_agent(whole.path)
+    agent = load_network(whole.path)
     world = run_world(agent.record, small_scenes())
-    found = agent.policy(world)(world.start_state[:5, None].repeat(1, 4), torch.zeros(5, dtype=torch.int64))
+    found = told_after(agent.on_poses(world), world, world.start_state[:5, None], torch.zeros(5, dtype=torch.int64))
     torch.testing.assert_close(found.sum(1), torch.ones(5))
 
 

@@ -10,12 +10,13 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint
-from clearway.learn.load import load_agent, run_scenes, run_world
+from clearway.learn.load import load_network, run_scenes, run_world
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, save, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.tables import make_world
+from helpers.agents import after_poses
 from helpers.small_runs import small_learner, small_request, small_scenes
 
 
@@ -39,19 +40,22 @@ def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path, directions: int
     folder.write_record(request.record())
     save(trainer, folder, seconds=1.0)
 
-    agent = load_agent(folder.path)
+    agent = load_network(folder.path)
     world = run_world(agent.record, run_scenes(agent.record))
     assert world.scene_names == ("corridor", "grid")
     assert torch.equal(world.target_state, trainer.world.target_state)
     target = torch.tensor([4, 0, 3, 1, 1, 2, 0, 4, 4])  # scenes in any order
     first = world.scene_offset[world.target_scene[target]]
     history = first[:, None] + torch.randint(20, (9, 4), generator=torch.Generator().manual_seed(0))
-    found = agent.policy(world)(history, target)
+    decisions = after_poses(agent.on_poses(world), world, history, target)
+    found = torch.from_numpy(decisions.probabilities)
     states = trainer.feature_map(trainer.world.features)
     with torch.no_grad():
-        scores, _ = trainer.network(states[history], states[world.target_state][target], world.target_scene[target])
+        scores, value = trainer.network(states[history], states[world.target_state][target], world.target_scene[target])
     torch.testing.assert_close(found, torch.softmax(scores, 1), rtol=1e-4, atol=1e-6)
     torch.testing.assert_close(found.sum(1), torch.ones(9))
+    scale = request.learner.reward_scale
+    np.testing.assert_allclose(decisions.value * scale, value.numpy(), rtol=1e-4, atol=1e-5)
     assert (found.max(1).values > 0.26).any()  # three updates have moved it off the uniform policy
 
 
@@ -63,7 +67,7 @@ def test_an_earlier_checkpoint_can_be_asked_for(tmp_path: Path) -> None:
     untrained = newest_checkpoint(folder.checkpoints)
     trainer.update()
     save(trainer, folder, seconds=1.0)
-    agents = [load_agent(folder.path, path) for path in (None, untrained)]
+    agents = [load_network(folder.path, path) for path in (None, untrained)]
     assert [agent.frames for agent in agents] == [trainer.frames, 0]
     weights = [agent.network.siamese_weight for agent in agents]
     assert torch.equal(weights[0], trainer.network.siamese_weight)
@@ -117,27 +121,27 @@ def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:
     wider = train(small_request(learner=small_learner(frames=80, width=24)), tmp_path / "wider")
     theirs = newest_checkpoint(wider.checkpoints)
     with pytest.raises(RunError, match=r"frames-\d+: not a checkpoint of .*run\. Name one in its check"):
-        load_agent(run.path, theirs)
+        load_network(run.path, theirs)
     copied = shutil.copytree(theirs, run.path / "milestones" / theirs.name)
     with pytest.raises(RunError, match="does not fit its run"):
-        load_agent(run.path, copied)
+        load_network(run.path, copied)
     with pytest.raises(RunError, match="no run here"):
-        load_agent(tmp_path)
+        load_network(tmp_path)
 
 
 def test_a_world_of_other_scenes_or_features_is_refused(tmp_path: Path) -> None:
     request = small_request(learner=small_learner(frames=80))
-    agent = load_agent(train(request, tmp_path / "run").path)
+    agent = load_network(train(request, tmp_path / "run").path)
     fewer = [replace(scene, features=scene.features[:, :1]) for scene in request.scenes]
     with pytest.raises(RunError, match="have 1 features, expected 12"):
-        agent.policy(run_world(agent.record, fewer))
+        agent.on_poses(run_world(agent.record, fewer))
     turned = make_world(request.scenes[::-1], request.targets)
     with pytest.raises(RunError, match=r"the scenes are \('grid', 'corridor'\), but the agent's"):
-        agent.critic(turned)
+        agent.on_poses(turned)
 
 
 def test_a_world_without_features_is_refused(tmp_path: Path) -> None:
     request = small_request(learner=small_learner(frames=80))
-    agent = load_agent(train(request, tmp_path / "run").path)
+    agent = load_network(train(request, tmp_path / "run").path)
     with pytest.raises(RunError, match="no features"):
-        agent.policy(replace(request.trainer().world, features=None))
+        agent.on_poses(replace(request.trainer().world, features=None))

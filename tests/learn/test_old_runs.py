@@ -66,7 +66,7 @@ def test_a_run_begun_then_goes_on_now_to_the_same_bits(
     (tmp_path / "parts" / "run.json").write_text(json.dumps(content))
     agent = load_agent(tmp_path / "parts")
     assert agent.frames == 880
-    agent.policy(run_world(agent.record, small_scenes()))
+    agent.on_poses(run_world(agent.record, small_scenes()))
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*goes on with")  # the recorded machine may be another
         parts = train.train(request, tmp_path / "parts", resume=True)

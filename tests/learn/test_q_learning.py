@@ -11,11 +11,12 @@ from clearway.errors import RunError
 from clearway.evaluation.oracle import action_values, make_task, optimal_policy
 from clearway.evaluation.run import evaluate_run
 from clearway.learn.checkpoint import newest_checkpoint, read_network
-from clearway.learn.load import load_acting, load_agent, run_world
+from clearway.learn.load import load_agent, load_network, run_world
 from clearway.learn.q_learning import QLearning, TableTrainer, best_actions, table_rows
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.world.tables import make_world
+from helpers.agents import after_poses
 from helpers.made import corridor_scene
 from helpers.small_runs import (
     CORRIDOR_TARGETS,
@@ -92,28 +93,32 @@ def test_a_run_evaluates_at_the_shortest_paths_and_has_no_network(tmp_path: Path
     row = folder.metrics()[-1]
     assert set(row) >= {"episodes", "success", "value_error", "explore"}
     assert not set(row) & {"loss", "entropy", "lr", "gradient_norm"}
-    agent = load_acting(tmp_path)
+    agent = load_agent(tmp_path)
     found = evaluate_run(agent, small_scenes(), episodes_per_target=20, step_cap=100)
     by_name = {evaluation.agent: evaluation.to_json()["average"] for evaluation in found}
     learnt, shortest = by_name["shortest"], by_name["shortest path"]
     assert learnt["steps"] == pytest.approx(shortest["steps"], rel=0.02)
     with pytest.raises(RunError, match="an agent of q-learning has no network"):
-        load_agent(tmp_path)
+        load_network(tmp_path)
 
 
 def test_a_table_knows_its_own_targets_and_scenes_alone(tmp_path: Path) -> None:
     train(small_request(learner=replace(SMALL, frames=80)), tmp_path)
-    agent = load_acting(tmp_path)
+    agent = load_agent(tmp_path)
     scenes = small_scenes()
     some = make_world(scenes, {"corridor": (8,), "grid": (22, 5)})  # in another order
     whole = run_world(agent.record, scenes)
     state, ours = torch.tensor([[3], [1], [25]]), torch.tensor([0, 0, 1])
     theirs = torch.tensor([1, 1, 4])
-    assert torch.equal(agent.policy(some)(state, ours), agent.policy(whole)(state, theirs))
+    found, same = (
+        after_poses(agent.on_poses(world), world, state, to) for world, to in ((some, ours), (whole, theirs))
+    )
+    assert np.array_equal(found.probabilities, same.probabilities) and np.array_equal(found.value, same.value)
+    assert np.array_equal(found.action, same.action)
     with pytest.raises(RunError, match=r"corridor: no table for target 4. .*: 0, 8, 16"):
-        agent.policy(make_world(scenes, {"corridor": (4,), "grid": (5,)}))
+        agent.on_poses(make_world(scenes, {"corridor": (4,), "grid": (5,)}))
     with pytest.raises(RunError, match="the scenes are"):
-        agent.policy(make_world(scenes[:1], {"corridor": (8,)}))
+        agent.on_poses(make_world(scenes[:1], {"corridor": (8,)}))
 
 
 def test_a_seed_repeats_and_tensors_bring_a_trainer_back_bit_for_bit(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from clearway.live.report import LiveResult, summarise
 from clearway.live.settings import Perturbations
 from clearway.live.tables import agent_rows, compared_rows, markdown_tables, rich_tables
 
-PROTOCOL = LiveProtocol(2, 10, 0, "sampled", 4)
+PROTOCOL = LiveProtocol(2, 10, 0, "sampled")
 
 
 def table(**columns: list[float]) -> LiveTable:

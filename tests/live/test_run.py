@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import torch
 
+from clearway.agents.agent import FEATURES, Decisions
+from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
-from clearway.learn.load import Agent
-from clearway.live.agent import live_policy
+from clearway.learn.load import TrainedNetwork
 from clearway.live.episodes import LiveProtocol
 from clearway.live.room import LiveRoom
 from clearway.live.run import LiveScene, check_alike, finish_live, stages, walk_setting
@@ -21,6 +22,7 @@ from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
 from clearway.scenes.actions import Action
 from clearway.world.tables import World, make_world
+from helpers.agents import after_poses
 from helpers.made import corridor_scene
 from helpers.small_live import state_at
 from helpers.small_runs import small_request, small_world
@@ -29,13 +31,13 @@ SURE = 1_000.0  # of an action's score
 
 
 @pytest.fixture
-def agent() -> Agent:
+def agent() -> TrainedNetwork:
     """Trained for a moment on a corridor and a grid."""
     request = small_request()
     trainer = request.trainer()
     for _ in range(3):
         trainer.update()
-    return Agent(request.record(), trainer.network, trainer.feature_map, trainer.frames)
+    return TrainedNetwork(request.record(), trainer.network, trainer.feature_map, trainer.frames)
 
 
 def histories(world: World, target: torch.Tensor) -> torch.Tensor:
@@ -44,21 +46,31 @@ def histories(world: World, target: torch.Tensor) -> torch.Tensor:
     return first[:, None] + torch.randint(20, (len(target), 4), generator=torch.Generator().manual_seed(0))
 
 
-def test_the_policy_of_pictures_is_the_evaluated_one_in_every_scene(agent) -> None:
+def by_features(agent: FeatureAgent, history: np.ndarray, target: np.ndarray) -> Decisions:
+    """What an agent does after features (B, K, F), the first of which begin the episode, to targets (B, F)."""
+    memory = agent.reset({FEATURES: target}, np.arange(len(target)))
+    for step in range(history.shape[1]):
+        decisions, memory = agent.act({FEATURES: history[:, step]}, memory)
+    return decisions
+
+
+def test_the_agent_of_pictures_is_the_evaluated_one_in_every_scene(agent) -> None:
     world = small_world()
     features = world.features
     assert features is not None
     for scene, targets in enumerate(([0, 1, 2], [3, 4])):
         target = torch.tensor(targets * 3)
         history = histories(world, target)
-        expected = agent.policy(world)(history, target)
-        seen = features[history], features[world.target_state[target]]
-        torch.testing.assert_close(live_policy(agent, scene)(*seen), expected, rtol=1e-4, atol=1e-6)
-        other = live_policy(agent, 1 - scene)(*seen)
-        assert not torch.allclose(other, expected, rtol=1e-2)
+        expected = after_poses(agent.on_poses(world), world, history, target)
+        seen = features[history].numpy(), features[world.target_state[target]].numpy()
+        found, other = (by_features(FeatureAgent(agent.in_scene(own)), *seen) for own in (scene, 1 - scene))
+        np.testing.assert_allclose(found.probabilities, expected.probabilities, rtol=1e-4, atol=1e-6)
+        np.testing.assert_allclose(found.value, expected.value, rtol=1e-4, atol=1e-5)
+        np.testing.assert_array_equal(found.action, expected.action)
+        assert not np.allclose(other.probabilities, expected.probabilities, rtol=1e-2)
 
 
-def resolved(live: LiveRoom, names: tuple[str, ...]) -> tuple[list[LiveRoom], Agent]:
+def resolved(live: LiveRoom, names: tuple[str, ...]) -> tuple[list[LiveRoom], TrainedNetwork]:
     """The room under several names, and an agent that walks ahead in the first and turns right in the others."""
     scenes = [replace(live.scene, name=name) for name in names]
     targets = {name: (state_at(live.scene, 1.75, 1.75, 0),) for name in names}
@@ -68,14 +80,14 @@ def resolved(live: LiveRoom, names: tuple[str, ...]) -> tuple[list[LiveRoom], Ag
     bias[0, Action.MOVE_FORWARD] = SURE
     bias[1:, Action.TURN_RIGHT] = SURE
     rooms = [replace(live, scene=scene) for scene in scenes]
-    return rooms, Agent(request.record(), trainer.network, trainer.feature_map, 0)
+    return rooms, TrainedNetwork(request.record(), trainer.network, trainer.feature_map, 0)
 
 
 def test_in_every_scene_its_own_layers_decide(live) -> None:
     rooms, agent = resolved(live, ("first", "second"))
     assert live.scene.encoder is not None
     encoder = encoder_from_record(live.scene.encoder)
-    protocol = LiveProtocol(2, 3, 0, "sampled", agent.record.learner.history_length)
+    protocol = LiveProtocol(2, 3, 0, "sampled")
     with studio(live.model, eye_view(), workers=1) as camera:
         places = []
         for room in rooms:
@@ -104,16 +116,16 @@ def test_finished_results_are_written_where_links_lead(tmp_path) -> None:
 
 
 def test_agents_that_differ_in_what_they_walk_to_are_not_compared(agent) -> None:
-    check_alike({"one": agent, "same": agent})
     record = agent.record
+    shorter = replace(record, learner=replace(record.learner, history_length=2))  # its memory is its own
+    check_alike({"one": agent, "same": agent, "shorter": replace(agent, record=shorter)})
     corridor, grid = record.scenes
     others = (
         replace(record, scenes=(corridor, replace(grid, targets=(5, 21)))),
         replace(record, scenes=(corridor, replace(grid, digest="0" * 16))),
-        replace(record, learner=replace(record.learner, history_length=2)),
     )
     for other in others:
-        with pytest.raises(RunError, match="differ in their scenes, targets or history length"):
+        with pytest.raises(RunError, match="differ in their scenes or targets"):
             check_alike({"one": agent, "other": replace(agent, record=other)})
 
 

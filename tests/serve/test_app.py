@@ -223,7 +223,7 @@ def test_what_takes_too_long_is_given_up_and_leaves_the_session_as_it_was(called
 
 def test_a_failing_agent_says_nothing_of_itself(called, caplog) -> None:
     class Broken(Sums):
-        def step(self, seen, start, history, target):
+        def reset(self, target, seed):
             raise RuntimeError("secret")
 
     client = called(Service(Broken(), Limits()))

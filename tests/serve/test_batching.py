@@ -1,4 +1,4 @@
-"""Concurrent pictures go through the model together."""
+"""Concurrent pictures go through the agent together."""
 
 import asyncio
 import threading
@@ -6,14 +6,18 @@ import threading
 import numpy as np
 import pytest
 
+from clearway.agents.agent import Decisions, State
+from clearway.scenes.sensors import RGB
 from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.service import Answer, Service
+from helpers.agents import equal
 from helpers.serving import grey
 from helpers.sums import Sums, plain
 
-TARGET = np.array([1.0, 1.0], np.float32)
+BEGUN = Sums().reset({RGB: plain(1)[None]}, np.zeros(1, np.int64))
+"""What `Sums` remembers when it begins to walk to a picture of level 1."""
 PATIENT_S = 10  # for what must happen, on a busy machine
 
 
@@ -21,32 +25,66 @@ def ignore(pictures: int, seconds: float) -> None:
     pass
 
 
+def value(step: tuple[Decisions, State]) -> float:
+    return float(step[0].value[0])
+
+
 def test_everyone_gets_the_own_row_and_waits_for_no_fuller_batch() -> None:
-    model, watched = Sums(0.05), []
+    agent, watched = Sums(0.05), []
+    _, walking = Sums().act({RGB: plain(0)[None]}, BEGUN)
 
     async def ask() -> list[float]:
-        batcher = Batcher(model, Limits(batch=8), lambda *told: watched.append(told))
-        history = np.zeros((4, 2), np.float32)
-        steps = await asyncio.gather(*(batcher.step(plain(level), history, TARGET) for level in range(20)))
-        return [float(step.value[0]) for step in steps]
+        batcher = Batcher(agent, Limits(batch=8), lambda *told: watched.append(told))
+        steps = await asyncio.gather(*(batcher.act(plain(level), walking) for level in range(20)))
+        again = await asyncio.gather(*(batcher.act(plain(0), after) for _, after in steps))
+        assert [value(step) for step in again] == [1000.0 + level for level in range(20)]  # each by its own memory
+        return [value(step) for step in steps]
 
     assert asyncio.run(ask()) == [1000.0 + level for level in range(20)]
-    assert sum(model.batches) == 20 and max(model.batches) == 8 and len(model.batches) <= 4
-    assert [pictures for pictures, _ in watched] == model.batches
+    assert sum(agent.batches) == 40 and max(agent.batches) == 8 and len(agent.batches) <= 8
+    assert [pictures for pictures, _ in watched] == agent.batches
     assert all(seconds >= 0.05 for _, seconds in watched)
 
 
 def test_pictures_of_different_sizes_share_no_batch_and_none_is_passed_over() -> None:
-    model = Sums(0.01)
+    agent = Sums(0.01)
 
     async def ask() -> list[float]:
-        batcher = Batcher(model, Limits(), ignore)
+        batcher = Batcher(agent, Limits(), ignore)
         sizes = [(3, 4), (5, 6), (3, 4), (5, 6), (7, 7)]
-        steps = [batcher.step(plain(level, size), None, TARGET) for level, size in enumerate(sizes)]
-        return [float(step.value[0]) for step in await asyncio.gather(*steps)]
+        steps = [batcher.act(plain(level, size), BEGUN) for level, size in enumerate(sizes)]
+        return [value(step) for step in await asyncio.gather(*steps)]
 
     assert asyncio.run(ask()) == [1000.0 + 4 * level for level in range(5)]
-    assert sorted(model.batches) == [1, 2, 2]
+    assert sorted(agent.batches) == [1, 2, 2]
+
+
+def test_begins_and_steps_share_no_batch_and_each_begin_has_its_own_seed_and_target() -> None:
+    agent = Sums(0.01)
+
+    async def ask() -> tuple[list[State], float]:
+        batcher = Batcher(agent, Limits(), ignore)
+        begins = [batcher.reset(plain(level), np.array([seed])) for level, seed in ((1, 5), (2, 6), (2, 5))]
+        *states, step = await asyncio.gather(*begins, batcher.act(plain(3), BEGUN))
+        return states, value(step)
+
+    states, stepped = asyncio.run(ask())
+    assert stepped == 1012.0 and sorted(agent.batches) == [1, 3]
+    for state, (level, seed) in zip(states, ((1, 5), (2, 6), (2, 5)), strict=True):
+        alone = Sums().reset({RGB: plain(level)[None]}, np.array([seed]))
+        assert equal(alone, state)
+
+
+def test_an_answer_does_not_keep_its_batch() -> None:
+    """A session's state is as large as one episode's, whoever was asked beside it."""
+
+    async def ask() -> list[tuple[Decisions, State]]:
+        batcher = Batcher(Sums(), Limits(), ignore)
+        return await asyncio.gather(*(batcher.act(plain(level), BEGUN) for level in range(3)))
+
+    for decisions, state in asyncio.run(ask()):
+        for array in (*state.values(), decisions.action, decisions.probabilities, decisions.value):
+            assert array.base is None or array.base.nbytes == array.nbytes
 
 
 def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() -> None:
@@ -72,11 +110,11 @@ def test_a_step_sent_while_the_target_is_computed_waits_for_it() -> None:
 
 
 def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:
-    model = Sums(0.05)
+    agent = Sums(0.05)
 
     async def ask() -> None:
-        batcher = Batcher(model, Limits(batch=1), ignore)
-        first, *others = [asyncio.create_task(batcher.step(plain(1), None, TARGET)) for _ in range(5)]
+        batcher = Batcher(agent, Limits(batch=1), ignore)
+        first, *others = [asyncio.create_task(batcher.act(plain(1), BEGUN)) for _ in range(5)]
         await asyncio.sleep(0.01)
         for other in others[:3]:
             other.cancel()
@@ -84,27 +122,27 @@ def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:
         await others[3]
 
     asyncio.run(ask())
-    assert model.batches == [1, 1]
+    assert agent.batches == [1, 1]
 
 
-@pytest.mark.parametrize("fails", [False, True], ids=["answers", "a model that fails"])
+@pytest.mark.parametrize("fails", [False, True], ids=["answers", "an agent that fails"])
 def test_an_asker_who_goes_while_the_batch_is_computed_leaves_the_others_theirs(fails) -> None:
     gone = threading.Event()
 
     class Waits(Sums):
-        def step(self, seen, start, history, target):
-            result = super().step(seen, start, history, target)
+        def act(self, observation, state):
+            result = super().act(observation, state)
             assert gone.wait(PATIENT_S)
             if fails:
                 raise ZeroDivisionError
             return result
 
-    model = Waits()
+    agent = Waits()
 
     async def ask() -> list[object]:
-        batcher = Batcher(model, Limits(), ignore)
-        first, *others = [asyncio.create_task(batcher.step(plain(level), None, TARGET)) for level in range(3)]
-        while not model.batches:
+        batcher = Batcher(agent, Limits(), ignore)
+        first, *others = [asyncio.create_task(batcher.act(plain(level), BEGUN)) for level in range(3)]
+        while not agent.batches:
             await asyncio.sleep(0.001)
         first.cancel()
         gone.set()
@@ -112,38 +150,38 @@ def test_an_asker_who_goes_while_the_batch_is_computed_leaves_the_others_theirs(
             return await asyncio.gather(*others, return_exceptions=True)
 
     found = asyncio.run(ask())
-    assert model.batches == [3]
+    assert agent.batches == [3]
     if fails:
         assert [type(each) for each in found] == [ZeroDivisionError] * 2
     else:
-        assert [float(step.value[0]) for step in found] == [1004.0, 1008.0]
+        assert [value(step) for step in found] == [1004.0, 1008.0]
 
 
 def test_too_many_that_wait_are_refused_at_once() -> None:
     async def ask() -> list[object]:
         batcher = Batcher(Sums(0.05), Limits(waiting=3, batch=2), ignore)
-        return await asyncio.gather(*(batcher.step(plain(1), None, TARGET) for _ in range(5)), return_exceptions=True)
+        return await asyncio.gather(*(batcher.act(plain(1), BEGUN) for _ in range(5)), return_exceptions=True)
 
     found = asyncio.run(ask())
     refused = [step for step in found if isinstance(step, Fault)]
     assert [fault.code for fault in refused] == ["overloaded", "overloaded"]
 
 
-def test_a_model_that_fails_fails_its_batch_alone() -> None:
+def test_an_agent_that_fails_fails_its_batch_alone() -> None:
     class Moody(Sums):
-        def step(self, seen, start, history, target):
-            if seen.max() == 13:
+        def act(self, observation, state):
+            if observation[RGB].max() == 13:
                 raise ZeroDivisionError
-            return super().step(seen, start, history, target)
+            return super().act(observation, state)
 
     async def ask() -> list[object]:
         batcher = Batcher(Moody(), Limits(batch=1), ignore)
         return await asyncio.gather(
-            *(batcher.step(plain(level), None, TARGET) for level in (12, 13, 14)), return_exceptions=True
+            *(batcher.act(plain(level), BEGUN) for level in (12, 13, 14)), return_exceptions=True
         )
 
     found = asyncio.run(ask())
     assert isinstance(found[1], ZeroDivisionError)
-    assert [float(found[index].value[0]) for index in (0, 2)] == [1048.0, 1056.0]
+    assert [value(found[index]) for index in (0, 2)] == [1048.0, 1056.0]
     with pytest.raises(ZeroDivisionError):
         raise found[1]

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from clearway.deploy.model import MAX_PICTURE_SIDE
+from clearway.deploy.agent import MAX_PICTURE_SIDE
 from clearway.serve.faults import Fault
 from clearway.serve.pictures import decoded
 from helpers.serving import picture_bytes

@@ -104,7 +104,7 @@ def test_the_map_is_what_the_plain_network_says(stage: Stage) -> None:
     session, _ = begun(stage, "scene=bare&start=0&target=30")
     answer = session.answer({"do": "map", "walker": 1})
     assert (answer["kind"], answer["walker"]) == ("map", 1)
-    agent, scene = stage.agents[1].agent, stage.agents[1].scenes[2]
+    agent, scene = stage.agents[1].trained, stage.agents[1].scenes[2]
     assert scene.features is not None
     features = agent.feature_map(torch.from_numpy(scene.features))
     history = features[:, None].expand(-1, 4, -1)

@@ -8,6 +8,7 @@ import torch
 from clearway.errors import RunError, SceneError
 from clearway.reward import Reward
 from clearway.view.stage import Stage, _has, run_stage, scene_stage
+from helpers.agents import after_poses
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import FEATURES
 from helpers.small_stage import small_agent, write_scenes
@@ -73,11 +74,14 @@ def test_an_agent_thinks_of_a_target_as_if_it_had_been_there_from_the_beginning(
     shown = stage.agents[0]
     for scene, target in (("grid", 7), ("corridor", 3)):
         placed = shown.place(scene, target)
-        history = placed.start_state[:, None].expand(-1, shown.agent.record.learner.history_length)
-        goal = torch.zeros(len(history), dtype=torch.int64)
-        expected = shown.agent.critic(placed)(history, goal)
-        for found, wanted in zip(shown.critic(placed)(history, goal), expected, strict=True):
-            torch.testing.assert_close(found, wanted)
+        starts, goal = placed.start_state[:, None], torch.zeros(len(placed.start_state), dtype=torch.int64)
+        found, expected = (
+            after_poses(agent, placed, starts, goal)
+            for agent in (shown.on_poses(placed), shown.trained.on_poses(placed))
+        )
+        np.testing.assert_allclose(found.probabilities, expected.probabilities, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(found.value, expected.value, rtol=1e-5, atol=1e-6)
+        assert np.ptp(found.value) > 0
 
 
 def paid(reward: Reward, stage: Stage) -> float:
@@ -88,15 +92,15 @@ def paid(reward: Reward, stage: Stage) -> float:
 def test_values_and_rewards_are_of_one_scale(stage: Stage) -> None:
     """A learner that clipped its rewards knows of no reward of 10."""
     shown = stage.agents[0]
-    record = shown.agent.record
+    record = shown.trained.record
     clipping = replace(record, learner=replace(record.learner, clip_rewards=True))
     assert paid(shown.reward, stage) == 10
-    assert paid(replace(shown, agent=replace(shown.agent, record=clipping)).reward, stage) == 1
+    assert paid(replace(shown, trained=replace(shown.trained, record=clipping)).reward, stage) == 1
 
 
 def test_the_map_shows_the_zones_that_the_first_agent_learnt_from(stage: Stage) -> None:
     shown, other = stage.agents
-    by_cell = replace(shown, agent=replace(shown.agent, record=replace(shown.agent.record, zone_level="cell")))
+    by_cell = replace(shown, trained=replace(shown.trained, record=replace(shown.trained.record, zone_level="cell")))
     assert (stage.zone_level, replace(stage, agents=(by_cell, other)).zone_level) == ("pose", "cell")
 
 

@@ -3,11 +3,13 @@
 import pytest
 import torch
 
+from clearway.agents.agent import POSE, Agent
+from clearway.agents.by_pose import PoseAgent, RandomWalk
+from clearway.agents.selection import ActionSelection, selecting
 from clearway.evaluation.episodes import episode_seeds, run_episodes
-from clearway.evaluation.selection import ActionSelection
 from clearway.reward import COLLISION_AWARE
 from clearway.view.episode import MOST_STEPS
-from clearway.view.walker import Mind, Walker
+from clearway.view.walker import Walker
 from clearway.world.tables import World
 from helpers.small_runs import corridor_world
 
@@ -16,21 +18,23 @@ FREE, PRECOLLISION, COLLISION = range(3)
 TARGET = 1  # of the world: state 8, the third cell, looking along the corridor
 
 
-def mind(world: World, selection: ActionSelection = "argmax", likes: int = FORWARD, asked: list | None = None) -> Mind:
-    """An agent that likes one action, and whose value is the newest state."""
+def likes(
+    world: World, action: int = FORWARD, selection: ActionSelection = "argmax", asked: list | None = None
+) -> Agent:
+    """An agent that likes one action, and whose value is twice the newest state."""
 
-    def critic(history, target):
+    def rule(history, target):
         if asked is not None:
             asked.append(history.tolist())
         probabilities = torch.full((len(target), 4), 0.1)
-        probabilities[:, likes] = 0.7
-        return probabilities, history[:, -1].float()
+        probabilities[:, action] = 0.7
+        return probabilities, 2 * history[:, -1].float()
 
-    return Mind(critic, 0.5, selection, history_length=3)
+    return selecting(PoseAgent(world, rule, 3), selection, world)
 
 
-def walker(start: int, own_mind: Mind | None = None, **changes) -> Walker:
-    return Walker(corridor_world(), TARGET, start, COLLISION_AWARE, seed=0, mind=own_mind, **changes)
+def walker(start: int, agent: Agent | None = None, **changes) -> Walker:
+    return Walker(corridor_world(), TARGET, start, COLLISION_AWARE, seed=0, agent=agent, **changes)
 
 
 def test_the_user_walks_to_the_target() -> None:
@@ -63,25 +67,25 @@ def test_blocked_moves_are_counted() -> None:
 
 def test_an_agent_tells_what_it_is_about_to_do_and_does_it() -> None:
     asked: list = []
-    walk = walker(0, mind(corridor_world(), asked=asked))
+    walk = walker(0, likes(corridor_world(), asked=asked))
     for _ in range(2):
         assert walk.steps[-1].next == FORWARD
         assert walk.steps[-1].probabilities == pytest.approx((0.7, 0.1, 0.1, 0.1))
         walk.step()
     assert walk.actions == [FORWARD, FORWARD]
     assert asked == [[[0, 0, 0]], [[0, 0, 4]], [[0, 4, 8]]]
-    assert [step.value for step in walk.steps] == [0.0, 8.0, 16.0]  # without the learner's scale of 0.5
+    assert [step.value for step in walk.steps] == [0.0, 8.0, 16.0]
     assert walk.steps[-1].next is None and walk.steps[-1].probabilities is None
 
 
 def test_a_start_at_the_target_is_the_end() -> None:
-    walk = walker(8, mind(corridor_world()))
+    walk = walker(8, likes(corridor_world()))
     assert walk.ended and walk.step() is None
     assert walk.steps[0].reached
 
 
 def test_argmax_goes_on_for_ever_and_is_stopped() -> None:
-    walk = walker(0, mind(corridor_world(), likes=LEFT))
+    walk = walker(0, likes(corridor_world(), LEFT))
     while walk.step():
         pass
     assert walk.ended and not walk.steps[-1].reached
@@ -89,7 +93,8 @@ def test_argmax_goes_on_for_ever_and_is_stopped() -> None:
 
 
 def test_argmax_untried_tries_another_action_in_the_same_pose() -> None:
-    walk = walker(1, mind(corridor_world(), "argmax-untried"))  # looks across the corridor: forward is blocked
+    agent = likes(corridor_world(), FORWARD, "argmax-untried")
+    walk = walker(1, agent)  # looks across the corridor: forward is blocked
     taken = [walk.steps[-1].next]
     walk.step()
     taken.append(walk.steps[-1].next)
@@ -98,9 +103,8 @@ def test_argmax_untried_tries_another_action_in_the_same_pose() -> None:
 
 def test_sampled_actions_repeat_with_the_seed_and_follow_the_probabilities() -> None:
     def actions(seed: int) -> list[int]:
-        walk = Walker(
-            corridor_world(), TARGET, 0, COLLISION_AWARE, seed=seed, mind=mind(corridor_world(), "sampled", RIGHT)
-        )
+        agent = likes(corridor_world(), RIGHT, "sampled")
+        walk = Walker(corridor_world(), TARGET, 0, COLLISION_AWARE, seed=seed, agent=agent)
         for _ in range(150):
             walk.step()
         return walk.actions
@@ -114,26 +118,18 @@ def test_sampled_actions_repeat_with_the_seed_and_follow_the_probabilities() -> 
 
 def test_by_an_episode_s_seed_it_walks_as_in_the_evaluation() -> None:
     world = corridor_world()
-    own = mind(world, "sampled")
-    table = run_episodes(
-        world,
-        lambda history, target: own.critic(history, target)[0],
-        episodes_per_target=1,
-        step_cap=MOST_STEPS,
-        seed=5,
-        record=True,
-        history_length=own.history_length,
-    )
+    agent = likes(world, FORWARD, "sampled")
+    table = run_episodes(world, agent, episodes_per_target=1, step_cap=MOST_STEPS, seed=5, record=True)
     assert table.trajectories is not None
     for target, seed in enumerate(episode_seeds(world, 1, 5).tolist()):
-        walk = Walker(world, target, int(table.start[target]), COLLISION_AWARE, seed=seed, mind=own)
+        walk = Walker(world, target, int(table.start[target]), COLLISION_AWARE, seed=seed, agent=agent)
         while walk.step():
             pass
         assert walk.actions == table.trajectories[target].actions.tolist()
 
 
 def test_recorded_actions_come_first_then_the_agent_chooses() -> None:
-    walk = walker(0, mind(corridor_world()), recorded=[RIGHT, LEFT])
+    walk = walker(0, likes(corridor_world()), recorded=[RIGHT, LEFT])
     assert walk.steps[0].next == RIGHT
     for _ in range(3):
         walk.step()
@@ -145,8 +141,8 @@ def test_recorded_actions_come_first_then_the_agent_chooses() -> None:
 
 def test_a_replayed_walk_goes_on_as_the_first_one_would_have() -> None:
     def walk(recorded: list[int]) -> list[int]:
-        sampled = mind(corridor_world(), "sampled", RIGHT)
-        walked = Walker(corridor_world(), TARGET, 0, COLLISION_AWARE, seed=6, mind=sampled, recorded=recorded)
+        sampled = likes(corridor_world(), RIGHT, "sampled")
+        walked = Walker(corridor_world(), TARGET, 0, COLLISION_AWARE, seed=6, agent=sampled, recorded=recorded)
         for _ in range(12):
             walked.step()
         return walked.actions
@@ -156,8 +152,26 @@ def test_a_replayed_walk_goes_on_as_the_first_one_would_have() -> None:
 
 def test_the_map_of_a_mind_asks_for_every_pose_as_a_start() -> None:
     asked: list = []
-    walk = walker(0, mind(corridor_world(), asked=asked))
-    probabilities, values = walk.map_of_mind()
+    walk = walker(0, likes(corridor_world(), asked=asked))
+    before = len(walk.steps), walk.steps[-1].next
+    held = walk.map_of_mind()
     assert asked[-1] == [[state] * 3 for state in range(20)]
-    assert probabilities.shape == (20, 4)
-    assert values.tolist() == [2.0 * state for state in range(20)]
+    assert held.probabilities.shape == (20, 4)
+    assert held.value.tolist() == [2.0 * state for state in range(20)]
+    assert (len(walk.steps), walk.steps[-1].next) == before
+    walk.step()
+    assert asked[-1] == [[0, 0, 4]]  # the walk's own memory is as it was
+
+
+def test_an_agent_that_tells_no_value_has_none_to_show() -> None:
+    walk = walker(0, RandomWalk())
+    assert walk.steps[0].value is None and walk.steps[0].probabilities == (0.25,) * 4
+    assert walk.step() is not None
+
+
+def test_an_agent_that_sees_more_than_poses_is_not_for_the_viewer() -> None:
+    class Seeing(RandomWalk):
+        sees = (POSE, "rgb")
+
+    with pytest.raises(AssertionError, match="knows its pose"):
+        walker(0, Seeing())

@@ -3,9 +3,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import torch
 from PIL import Image
 
+from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.by_pose import RandomWalk
 from clearway.live.episodes import LiveProtocol, run_live_episodes
 from clearway.live.report import Comparison, Figures, LiveResult, summarise
 from clearway.live.run import LiveOutcome, LiveScene
@@ -13,7 +14,7 @@ from clearway.live.settings import REFERENCE, Condition, Perturbations
 from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
-from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.sensors import RGB
 from clearway.viz.figures import CURVES
 from clearway.viz.live import PANELS, ROW_IN, _moves_to, _view, draw_live_figures
 from clearway.world.tables import make_world
@@ -63,18 +64,17 @@ def test_the_view_is_what_the_agent_saw_in_that_episode() -> None:
     assert live.scene.encoder is not None
     encoder = encoder_from_record(live.scene.encoder)
 
-    class Looking:
-        def encode(self, pictures: np.ndarray) -> np.ndarray:
-            seen.append(pictures.copy())
-            return encoder.encode(pictures)
+    class Looking(RandomWalk):
+        sees = (RGB,)
 
-    def uniform(history: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
-        return torch.full((len(target), ACTION_COUNT), 1 / ACTION_COUNT)
+        def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+            seen.append(observation[RGB].copy())
+            return super().act({}, state)
 
     world = make_world([live.scene], {live.scene.name: (8, 41)})
-    protocol = LiveProtocol(episodes_per_target=2, step_cap=1, seed=5, selection="sampled", history_length=4)
+    protocol = LiveProtocol(episodes_per_target=2, step_cap=1, seed=5, selection="sampled")
     with studio(live.model, eye_view(), workers=1) as camera:
-        table = run_live_episodes(live, world, uniform, Looking(), camera, REFERENCE, protocol)
+        table = run_live_episodes(live, world, Looking(), camera, REFERENCE, protocol)
         result = summarise("all", REFERENCE, {"uniform": (table,)}, seed=0)
         outcome = LiveOutcome(Condition("all", REFERENCE), result, {"uniform": (table,)})
         stage = LiveScene(live, world, encoder, camera)

@@ -3,31 +3,36 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
+from clearway.agents.agent import POSE, Decisions, Observation, State
+from clearway.agents.by_features import FeatureAgent
+from clearway.agents.by_pose import RandomWalk
 from clearway.errors import ClearwayError, RunError, SceneError
 from clearway.evaluation.single import single_episode
-from clearway.learn.load import Agent, load_agent
+from clearway.learn.load import TrainedNetwork, load_network
 from clearway.learn.train import train
 from clearway.viz.video import LAST_FRAME_TIMES, frames, walked, write_video
+from helpers.agents import told_after
 from helpers.small_runs import small_learner, small_request, small_scenes
 
 
 @pytest.fixture(scope="module")
-def agent(tmp_path_factory: pytest.TempPathFactory) -> Agent:
+def agent(tmp_path_factory: pytest.TempPathFactory) -> TrainedNetwork:
     folder = tmp_path_factory.mktemp("run") / "run"
-    return load_agent(train(small_request(learner=small_learner(frames=160)), folder).path)
+    return load_network(train(small_request(learner=small_learner(frames=160)), folder).path)
 
 
-def episode(agent: Agent, scene: str | None = None, target: int | None = None, step_cap: int = 9):
+def episode(agent: TrainedNetwork, scene: str | None = None, target: int | None = None, step_cap: int = 9):
     return single_episode(agent, small_scenes(), scene, target, selection="sampled", step_cap=step_cap, seed=4)
 
 
-def test_the_frames_follow_the_episode(agent: Agent) -> None:
+def test_the_frames_follow_the_episode(agent: TrainedNetwork) -> None:
     world, trajectory = episode(agent, "grid", 3)
     assert world.scene_names[int(world.target_scene[0])] == "grid"
     assert world.scene_state(0) == 3  # not trained on
-    shown = walked(world, agent.policy(world), 0, trajectory, 4)
+    shown = walked(world, agent.on_poses(world), 0, trajectory)
     assert shown.probabilities.shape == (len(trajectory.states), 4)
     np.testing.assert_allclose(shown.probabilities.sum(1), 1, rtol=1e-5)
     pictures = list(frames(small_scenes(), shown))
@@ -36,26 +41,50 @@ def test_the_frames_follow_the_episode(agent: Agent) -> None:
     assert all((a != b).any() for a, b in itertools.pairwise(pictures))
 
 
-def test_the_policy_is_asked_with_the_history_that_it_walked_with(agent: Agent) -> None:
+def test_the_agent_is_asked_with_the_poses_that_it_walked_through(agent: TrainedNetwork) -> None:
     world, trajectory = episode(agent)
-    asked = []
+    goals, asked = [], []
 
-    def policy(history, target):
-        asked.append((history, target))
-        return agent.policy(world)(history, target)
+    class Watched:
+        sees = (POSE,)
 
-    walked(world, policy, 0, trajectory, 4)
-    ((history, target),) = asked
+        def reset(self, target: Observation, seed: np.ndarray) -> State:
+            goals.append(target[POSE].tolist())
+            return agent.on_poses(world).reset(target, seed)
+
+        def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+            asked.append(observation[POSE].tolist())
+            return agent.on_poses(world).act(observation, state)
+
+    shown = walked(world, Watched(), 0, trajectory)
     states = trajectory.states.tolist()
-    assert history[0].tolist() == [states[0]] * 4
-    assert history[5].tolist() == states[2:6]
-    assert set(target.tolist()) == {0}
+    assert goals == [world.target_state.tolist()]
+    assert asked == [[state] for state in states]
+    history = torch.from_numpy(trajectory.states[[2, 3, 4, 5]])[None]
+    told = told_after(agent.on_poses(world), world, history, torch.tensor([0]))
+    np.testing.assert_allclose(shown.probabilities[5], told[0], rtol=1e-5)  # by what it remembers of the three before
+
+
+def test_an_agent_that_sees_features_tells_the_same_and_a_silent_one_nothing(agent: TrainedNetwork) -> None:
+    world, trajectory = episode(agent, "grid", 3)
+    by_pose = walked(world, agent.on_poses(world), 0, trajectory)
+    by_features = walked(world, FeatureAgent(agent.in_scene(1)), 0, trajectory)
+    np.testing.assert_allclose(by_features.probabilities, by_pose.probabilities, rtol=1e-4, atol=1e-6)
+
+    class Silent(RandomWalk):
+        def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+            decisions, after = super().act(observation, state)
+            return Decisions(decisions.action), after
+
+    shown = walked(world, Silent(), 0, trajectory)
+    assert shown.probabilities is None
+    assert len(list(frames(small_scenes(), shown))) == len(trajectory.states)
 
 
 @pytest.mark.parametrize("name", ["film.mp4", "film.gif"])
-def test_a_film_can_be_read_again(agent: Agent, tmp_path: Path, name: str) -> None:
+def test_a_film_can_be_read_again(agent: TrainedNetwork, tmp_path: Path, name: str) -> None:
     world, trajectory = episode(agent, step_cap=4)
-    pictures = list(frames(small_scenes(), walked(world, agent.policy(world), 0, trajectory, 4)))
+    pictures = list(frames(small_scenes(), walked(world, agent.on_poses(world), 0, trajectory)))
     write_video(tmp_path / name, iter(pictures), frames_per_s=2)
     expected = len(pictures) + LAST_FRAME_TIMES
     if name.endswith(".gif"):
@@ -95,15 +124,15 @@ def test_a_gif_faster_than_viewers_show_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_another_ending_is_refused_and_leaves_nothing(agent: Agent, tmp_path: Path) -> None:
+def test_another_ending_is_refused_and_leaves_nothing(agent: TrainedNetwork, tmp_path: Path) -> None:
     world, trajectory = episode(agent, step_cap=2)
-    pictures = frames(small_scenes(), walked(world, agent.policy(world), 0, trajectory, 4))
+    pictures = frames(small_scenes(), walked(world, agent.on_poses(world), 0, trajectory))
     with pytest.raises(ClearwayError, match=r"film\.avi.*\.mp4 or \.gif"):
         write_video(tmp_path / "film.avi", pictures)
     assert not list(tmp_path.iterdir())
 
 
-def test_scenes_and_targets_that_are_not_there_are_refused(agent: Agent) -> None:
+def test_scenes_and_targets_that_are_not_there_are_refused(agent: TrainedNetwork) -> None:
     with pytest.raises(RunError, match="corridor, grid"):
         episode(agent, "attic")
     with pytest.raises(SceneError, match="99999"):

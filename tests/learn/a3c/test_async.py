@@ -27,6 +27,7 @@ from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
+from helpers.agents import told_after
 from helpers.plain_a3c import PlainA3C
 from helpers.small_runs import equal_bits, small_learner, small_network, small_request, small_world
 
@@ -91,8 +92,8 @@ def test_one_process_repeats_and_resumes_bit_for_bit(tmp_path: Path, monkeypatch
     assert counts[0] == counts[1] > 0  # rows fall elsewhere: workers walk on until they pause for a checkpoint
     assert whole.metrics()[-1]["lr"] < whole.metrics()[0]["lr"] <= PAPER_A3C.lr_start
     world = small_world()
-    policy = load_agent(whole.path).policy(world)
-    probabilities = policy(torch.zeros(2, 4, dtype=torch.int64), torch.tensor([0, 2]))
+    agent = load_agent(whole.path).on_poses(world)
+    probabilities = told_after(agent, world, torch.zeros(2, 4, dtype=torch.int64), torch.tensor([0, 2]))
     assert torch.allclose(probabilities.sum(1), torch.ones(2))
 
 
