@@ -159,7 +159,7 @@ class _Walk:
         while len(self.walking):
             decisions, self.memory = self.agent.act(self.sight(self.env.state), self.memory)
             _check(decisions, len(self.walking))
-            action = torch.from_numpy(decisions.action).to(self.world.device)
+            action = torch.from_numpy(decisions.action.astype(np.int64)).to(self.world.device)
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
             self._close_circles(decisions.certain)
@@ -213,9 +213,11 @@ class _Walk:
 def _check(decisions: Decisions, count: int) -> None:
     """Raise AgentError where these are no decisions of so many episodes."""
     action, told = decisions.action, decisions.probabilities
-    if action.shape != (count,) or action.dtype.kind != "i":
-        problem = f"the agent gave actions {action.dtype} {action.shape}, expected int64 ({count},)"
-        raise AgentError(f"{problem}. Give one for each episode")
+    _check_array("actions", action, "int64", (count,))
+    if told is not None:
+        _check_array("probabilities", told, "float32", (count, ACTION_COUNT))
+    if decisions.certain is not None:
+        _check_array("certain", decisions.certain, "bool", (count,))
     if action.min() < 0 or action.max() >= ACTION_COUNT:
         wrong = int(action[(action < 0) | (action >= ACTION_COUNT)][0])
         raise AgentError(f"the agent gave action {wrong}, expected 0 to {ACTION_COUNT - 1}, see scenes.actions.Action")
@@ -223,6 +225,17 @@ def _check(decisions: Decisions, count: int) -> None:
         total = told.astype(np.float64).sum(1)
         if not ((total > 0) & np.isfinite(total)).all():
             raise AgentError("the agent gave probabilities that are not finite or all zero. Give finite ones")
+
+
+def _check_array(name: str, given: object, expected: str, shape: tuple[int, ...]) -> None:
+    """Raise AgentError where it is no array of this shape and kind; its numbers may be longer or shorter."""
+    if isinstance(given, np.ndarray):
+        if given.shape == shape and given.dtype.kind == np.dtype(expected).kind:
+            return
+        found = f"{given.dtype} {given.shape}"
+    else:
+        found = type(given).__name__
+    raise AgentError(f"the agent gave {name} {found}, expected {expected} {shape}. Give a row for each episode")
 
 
 def _array(tensor: Tensor) -> np.ndarray:

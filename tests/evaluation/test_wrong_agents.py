@@ -1,0 +1,95 @@
+"""An agent that does what no agent may is refused in one line, not in a traceback out of somewhere else."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from clearway.agents.agent import Decisions
+from clearway.agents.by_pose import RandomWalk
+from clearway.errors import AgentError
+from clearway.evaluation.episodes import run_episodes
+from clearway.world.tables import make_world
+from helpers.made import corridor_scene
+
+WORLD = make_world([corridor_scene(5)], {"corridor": [0, 8]})
+
+
+class Wrong(RandomWalk):
+    """Takes good steps, then a wrong one."""
+
+    def __init__(self, wrong: Callable[[int], Decisions], after: int) -> None:
+        self.wrong, self.left = wrong, after
+
+    def act(self, observation, state):
+        self.left -= 1
+        decisions, after = super().act(observation, state)
+        return (self.wrong(len(decisions.action)) if self.left < 0 else decisions), after
+
+
+def told(last: float) -> Callable[[int], Decisions]:
+    def decisions(count: int) -> Decisions:
+        probabilities = np.full((count, 4), 0.25)
+        probabilities[-1, 2] = last
+        return Decisions(np.zeros(count, np.int64), probabilities)
+
+    return decisions
+
+
+WRONG = {
+    "too few": (lambda n: Decisions(np.zeros(n - 1, np.int64)), r"actions int64 \(5,\), expected int64 \(6,\)"),
+    "a column": (lambda n: Decisions(np.zeros((n, 1), np.int64)), r"actions int64 \(6, 1\), expected int64 \(6,\)"),
+    "a scalar": (lambda n: Decisions(np.array(2)), r"actions int64 \(\), expected int64 \(6,\)"),
+    "floats": (lambda n: Decisions(np.zeros(n)), r"actions float64 \(6,\), expected int64 \(6,\)"),
+    "flags": (lambda n: Decisions(np.ones(n, bool)), r"actions bool \(6,\), expected int64 \(6,\)"),
+    "words": (lambda n: Decisions(np.array(["left"] * n)), r"actions <U4 \(6,\), expected int64 \(6,\)"),
+    "unsigned": (lambda n: Decisions(np.zeros(n, np.uint8)), r"actions uint8 \(6,\), expected int64 \(6,\)"),
+    "a list": (lambda n: Decisions([0] * n), r"actions list, expected int64 \(6,\)"),
+    "a fifth": (lambda n: Decisions(np.array([0, 1, 2, 3, 4, 0])), "action 4, expected 0 to 3"),
+    "a negative one": (lambda n: Decisions(np.array([0, 1, 2, 3, -1, 7])), "action -1, expected 0 to 3"),
+    "NaN": (told(np.nan), "probabilities that are not finite or all zero"),
+    "infinite": (told(np.inf), "probabilities that are not finite or all zero"),
+    "negative in sum": (told(-1.0), "probabilities that are not finite or all zero"),
+    "all zero": (lambda n: Decisions(np.zeros(n, np.int64), np.zeros((n, 4))), "not finite or all zero"),
+    "too few told": (
+        lambda n: Decisions(np.zeros(n, np.int64), np.ones((n, 3))),
+        r"probabilities float64 \(6, 3\), expected float32 \(6, 4\)",
+    ),
+    "told once": (
+        lambda n: Decisions(np.zeros(n, np.int64), np.ones(4)),
+        r"probabilities float64 \(4,\), expected float32 \(6, 4\)",
+    ),
+}
+
+
+@pytest.mark.parametrize("after", [0, 2], ids=["at once", "later"])
+@pytest.mark.parametrize("name", WRONG)
+def test_what_no_agent_may_do_is_said_in_one_line(name: str, after: int) -> None:
+    wrong, said = WRONG[name]
+    with pytest.raises(AgentError, match=said) as caught:
+        run_episodes(WORLD, Wrong(wrong, after), episodes_per_target=3, seed=4)
+    assert str(caught.value).startswith("the agent gave ") and "\n" not in str(caught.value)
+
+
+def test_certainty_for_all_at_once_is_none() -> None:
+    """One flag for all would make circles of walks that are none."""
+    agent = Wrong(lambda count: Decisions(np.zeros(count, np.int64), certain=np.ones(1, bool)), 0)
+    with pytest.raises(
+        AgentError, match=r"gave certain bool \(1,\), expected bool \(6,\)\. Give a row for each episode"
+    ):
+        run_episodes(WORLD, agent, episodes_per_target=3)
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.int32])
+def test_short_integers_are_actions_too(kind: type) -> None:
+    turning, short = (
+        run_episodes(
+            WORLD, Wrong(lambda count, of=of: Decisions(np.ones(count, of)), 0), episodes_per_target=3, step_cap=9
+        )
+        for of in (np.int64, kind)
+    )
+    assert np.array_equal(turning.steps, short.steps) and np.array_equal(turning.start, short.start)
+
+
+def test_the_same_good_steps_alone_are_walked_to_the_end() -> None:
+    assert run_episodes(WORLD, Wrong(told(0.25), 2), episodes_per_target=3, step_cap=9, seed=4).steps.max() <= 9
