@@ -1,6 +1,6 @@
 """A run of an instant on two scenes with a tiny encoder, and what `clearway export` makes of it.
 
-The translation to ONNX takes seconds, however small the network: one file for all tests, another for the slow ones.
+The translation to ONNX takes seconds, however small the network: one file with the encoder and one without, for all.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def deployed(tmp_path_factory: pytest.TempPathFactory) -> Deployed:
 
 @pytest.fixture(scope="session")
 def policy_file(deployed: Deployed) -> Path:
-    """The policy alone; for slow tests."""
+    """The policy alone."""
     path = deployed.agent.with_name("policy.onnx")
     export_onnx(deployed.chosen, path, with_encoder=False)
     return path

@@ -31,7 +31,6 @@ def histories(rows: int, states: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.integers(0, states, (rows, 4)), rng.integers(0, states, rows)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 2, 7, 64])
 def test_the_policy_alone_equals_the_network_in_pytorch(deployed, policy_file, rows) -> None:
     """The whole network with its scene switch is the reference, not the module that was exported."""
@@ -118,7 +117,6 @@ def test_the_card_says_what_the_agent_is(deployed) -> None:
     assert card.training["seed"] == 3
 
 
-@pytest.mark.slow
 def test_the_card_of_a_policy_alone(deployed, policy_file) -> None:
     alone = OnnxAgent(policy_file).card
     assert alone.encoder["identity"] == deployed.scenes[1].encoder.identity

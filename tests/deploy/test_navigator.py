@@ -51,7 +51,6 @@ def test_decisions_are_the_evaluated_agent_s_along_an_episode(deployed, source) 
         navigation.step(torch.tensor([int(action)]))
 
 
-@pytest.mark.slow
 def test_a_file_without_encoder_takes_features(deployed, policy_file) -> None:
     """And agrees with the one that holds the encoder."""
     alone, whole = (clearway.Navigator(path, seed=0) for path in (policy_file, deployed.agent))

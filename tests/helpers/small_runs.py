@@ -10,6 +10,7 @@ from torch import Tensor
 
 from clearway.learn.bc import Cloning
 from clearway.learn.learner import Learner
+from clearway.learn.load import TrainedNetwork
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.rollout import sample_actions
@@ -71,6 +72,15 @@ def small_request(**changes: Any) -> RunRequest:
     """A training run on the two small scenes."""
     request = RunRequest(small_scenes(), small_targets(), small_learner(), COLLISION_AWARE, seed=3)
     return replace(request, **changes)
+
+
+def trained_network(updates: int = 4) -> TrainedNetwork:
+    """What the small run has learnt after so many updates."""
+    request = small_request()
+    trainer = request.trainer()
+    for _ in range(updates):
+        trainer.update()
+    return TrainedNetwork(request.record(), trainer.network, trainer.feature_map, trainer.frames)
 
 
 @torch.no_grad()

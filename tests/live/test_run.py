@@ -25,7 +25,7 @@ from clearway.world.tables import World, make_world
 from helpers.agents import after_poses
 from helpers.made import corridor_scene
 from helpers.small_live import state_at
-from helpers.small_runs import small_request, small_world
+from helpers.small_runs import small_request, small_world, trained_network
 
 SURE = 1_000.0  # of an action's score
 
@@ -33,11 +33,7 @@ SURE = 1_000.0  # of an action's score
 @pytest.fixture
 def agent() -> TrainedNetwork:
     """Trained for a moment on a corridor and a grid."""
-    request = small_request()
-    trainer = request.trainer()
-    for _ in range(3):
-        trainer.update()
-    return TrainedNetwork(request.record(), trainer.network, trainer.feature_map, trainer.frames)
+    return trained_network(updates=3)
 
 
 def histories(world: World, target: torch.Tensor) -> torch.Tensor:
