@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import clearway
+from helpers.imported import imported_by
 
 ORDER = (
     {
@@ -99,3 +100,26 @@ def test_imports_point_backwards(path: Path) -> None:
     here = part_of(path)
     forward = sorted(part for part in imported if part != here and rank(part) >= rank(here) and rank(here) > 0)
     assert not forward, f"clearway.{here} imports {forward}, which come after it or stand beside it"
+
+
+WITHOUT_TORCH = (
+    "clearway.agents.agent",
+    "clearway.agents.chance",
+    "clearway.agents.memory",
+    "clearway.agents.selection",
+    "clearway.deploy.agent",
+    "clearway.deploy.navigator",
+    "clearway.deploy.onnx_file",
+    "clearway.world.randomness",
+)
+
+
+@pytest.mark.parametrize("module", WITHOUT_TORCH)
+def test_what_a_robot_imports_needs_no_torch(module: str) -> None:
+    loaded = imported_by(f"import {module}")
+    assert module in loaded
+    assert not loaded & {"torch", "scipy", "h5py", "gymnasium", "transformers", "onnx", "onnxruntime"}
+
+
+def test_a_module_that_needs_torch_would_be_noticed() -> None:
+    assert "torch" in imported_by("import clearway.agents.by_pose")
