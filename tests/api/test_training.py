@@ -120,6 +120,7 @@ def test_a3c_by_name(corridor) -> None:
         ({"feature_store": "disk"}, "expected one of 'memory'"),
         ({"device": 0}, "device=0: expected a word"),
         ({"reward": 3}, "reward=3 is unknown"),
+        ({"reward": replace(SHORTEST, clip=True)}, "reward shortest clips, and ppo's setting clip_rewards does not"),
         ({"targets": 3}, r"targets=3: expected state ids by scene name, such as \{'bathroom': \[26, 37\]\}"),
         ({"targets": "16"}, "expected state ids"),
         ({"targets": [1.5]}, r"targets\['corridor'\]=1\.5: expected a whole number"),

@@ -40,12 +40,12 @@ def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:
     state = torch.arange(world.state_count)
     target = torch.zeros_like(state)
     policies = []
-    for reward in (record.reward, record.paid):
+    for reward in (request.reward, record.reward):
         (exact, _) = world_yardsticks(world, reward)
         policies.append(torch.from_numpy(exact.yardstick.optimal_policy)[state])
     assert not torch.allclose(*policies)
-    best = _optima(world, [record.paid])["optimum (collision-aware)"]
+    best = _optima(world, [record.reward])["optimum (collision-aware)"]
     walking = state != world.target_state[0]
     found = best(state[:, None].expand(-1, 4), target)[walking]
     torch.testing.assert_close(found.double(), policies[1][walking], rtol=1e-5, atol=1e-6)
-    assert "optimum (collision-aware, unclipped)" in _optima(world, [record.reward])
+    assert "optimum (collision-aware, unclipped)" in _optima(world, [request.reward])

@@ -64,7 +64,7 @@ def small_learner(learner: Kind = DEFAULT, **changes: Any) -> Kind:
 
 def small_trainer(learner: OnPolicy, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
     """A trainer on the two small scenes."""
-    return Trainer(small_world(), learner, reward, seed)
+    return Trainer(small_world(), learner, learner.paid(reward), seed)
 
 
 def small_request(**changes: Any) -> RunRequest:

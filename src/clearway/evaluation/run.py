@@ -64,7 +64,7 @@ def evaluate_runs(
         evaluations = evaluate_agents(
             world,
             {name: agent.policy(world) for name, agent in agents.items()},
-            references=_optima(world, [record.paid for record in records]),
+            references=_optima(world, [record.reward for record in records]),
             encoder=encoder_names(scenes),
             episodes_per_target=episodes_per_target,
             step_cap=step_cap,
@@ -90,4 +90,4 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Policy]:
 
 def _trained(agent: Acting) -> Trained:
     record = agent.record
-    return Trained(agent.frames, record.seed, record.paid, record.zone_level)
+    return Trained(agent.frames, record.seed, record.reward, record.zone_level)

@@ -96,7 +96,7 @@ class Cloning:
         seeds = torch.arange(learner.envs, dtype=torch.int64, device=world.device) + (seed << 32)
         self.navigation = Navigation(
             world,
-            learner.paid(reward),
+            reward,
             seeds,
             choice=TargetChoice.by_scene(world, scene),
             step_limit=learner.step_limit,

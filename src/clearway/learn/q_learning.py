@@ -92,7 +92,7 @@ class TableTrainer:
         self.values = torch.zeros(rows, ACTION_COUNT, device=world.device)
         seeds = torch.arange(learner.envs, dtype=torch.int64, device=world.device) + (seed << 32)
         self.navigation = Navigation(
-            world, learner.paid(reward), seeds, step_limit=learner.step_limit, history_length=learner.history_length
+            world, reward, seeds, step_limit=learner.step_limit, history_length=learner.history_length
         )
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)

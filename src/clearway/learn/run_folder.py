@@ -27,7 +27,7 @@ from clearway.errors import ClearwayError, RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.learner import Learner
-from clearway.learn.old_runs import own_settings
+from clearway.learn.old_runs import clipped_once, own_settings
 from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
@@ -58,7 +58,7 @@ class SceneRecord:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Everything that determines a run, and where it was made."""
+    """Everything that determines a run, and where it was made. The reward is as training paid it."""
 
     learner: Learner
     reward: Reward
@@ -73,11 +73,6 @@ class RunRecord:
     def targets(self) -> dict[str, tuple[int, ...]]:
         """Targets by scene name."""
         return {scene.name: scene.targets for scene in self.scenes}
-
-    @property
-    def paid(self) -> Reward:
-        """The reward as training paid it."""
-        return self.learner.paid(self.reward)
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
@@ -252,9 +247,10 @@ def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
     for name, kind in wanted.items():
         if not _fits(content[name], kind):
             raise TypeError(f"{name} is {content[name]!r:.40}")
+    learner, reward = clipped_once(_learner(content["learner"], version), reward_from_json(content["reward"]))
     return RunRecord(
-        learner=_learner(content["learner"], version),
-        reward=reward_from_json(content["reward"]),
+        learner=learner,
+        reward=reward,
         seed=content["seed"],
         zone_level=content["zone_level"],
         scenes=tuple(_scene_record(scene) for scene in content["scenes"]),

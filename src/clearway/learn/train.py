@@ -97,10 +97,15 @@ class RunRequest:
     device: str = "cpu"
     feature_store: FeatureStore = "memory"
 
+    @property
+    def paid(self) -> Reward:
+        """The reward as training pays it, see `Learner.paid`."""
+        return self.learner.paid(self.reward)
+
     def record(self) -> RunRecord:
         """The record to be written to the run folder."""
         record = record_of(
-            self.scenes, self.paths or {}, self.targets, self.learner, self.reward, self.seed, self.zone_level
+            self.scenes, self.paths or {}, self.targets, self.learner, self.paid, self.seed, self.zone_level
         )
         device = torch.device(self.device)
         where = {
@@ -115,7 +120,7 @@ class RunRequest:
         """A trainer at its first frame."""
         device = usable_device(self.device)
         world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store).to(device)
-        return self.learner.trainer(world, self.reward, self.seed)
+        return self.learner.trainer(world, self.paid, self.seed)
 
 
 def train(

@@ -88,7 +88,7 @@ class Trainer:
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         self.navigation = Navigation(
             world,
-            learner.paid(reward),
+            reward,
             seeds,
             choice=TargetChoice.by_scene(world, scene_of_envs(envs_per_scene, device)),
             step_limit=learner.step_limit,

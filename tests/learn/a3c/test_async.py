@@ -38,7 +38,8 @@ def a3c_request(frames: int) -> RunRequest:
 
 
 def async_trainer(frames: int, processes: int) -> AsyncTrainer:
-    return AsyncTrainer(small_world(), a3c_request(frames).learner, COLLISION_AWARE, 3, processes)
+    request = a3c_request(frames)
+    return AsyncTrainer(small_world(), request.learner, request.paid, 3, processes)
 
 
 def children_of(process: int) -> list[int]:
@@ -100,11 +101,12 @@ def test_one_process_learns_and_counts_what_plain_a3c_does(monkeypatch: pytest.M
     monkeypatch.setattr(statistics, "WINDOW", 1)
     learner = small_learner(PAPER_A3C, frames=300, rollout_steps=5, step_limit=200, lr_start=0.05, centre_features=True)
     world = small_world()
-    with closing(AsyncTrainer(world, learner, COLLISION_AWARE, 3)) as trainer:
+    reward = learner.paid(COLLISION_AWARE)
+    with closing(AsyncTrainer(world, learner, reward, 3)) as trainer:
         while not trainer.finished:
             trainer.update()
     prepared = replace(world, features=trainer.feature_map(world.features))
-    plain = PlainA3C(prepared, learner, COLLISION_AWARE, 3, workers=[0, 5, 1, 6, 2, 7, 3, 8, 4, 9])
+    plain = PlainA3C(prepared, learner, reward, 3, workers=[0, 5, 1, 6, 2, 7, 3, 8, 4, 9])
     plain.begin(small_network(world, seed=3))
     frames = 0
     while frames < learner.frames:
