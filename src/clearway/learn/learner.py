@@ -105,7 +105,9 @@ class Learner:
             return reward
         if reward.clip and not self.clip_rewards:
             problem = f"reward {reward.name} clips, and {self.algorithm}'s setting clip_rewards does not"
-            raise RunError(f"{problem}. Set clip_rewards to true (--set clip_rewards=true), or take clip=True out of the reward")
+            raise RunError(
+                f"{problem}. Set clip_rewards to true (--set clip_rewards=true), or take clip=True out of the reward"
+            )
         return replace(reward, clip=self.clip_rewards)
 
     def trainer(self, world: World, reward: Reward, seed: int) -> Learning:
