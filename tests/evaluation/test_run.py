@@ -8,6 +8,7 @@ from clearway.evaluation.optimum import world_yardsticks
 from clearway.evaluation.run import _optima, evaluate_run
 from clearway.evaluation.tables import markdown_table
 from clearway.learn.load import load_agent
+from clearway.learn.run_folder import record_of
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE
 from helpers.made import grid_scene
@@ -36,7 +37,7 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
 
 def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:
     request = small_request(scenes=[SCENE], targets={SCENE.name: (5, 100)}, learner=small_learner(clip_rewards=True))
-    record, world = request.record(), request.trainer().world
+    record, world = record_of(request), request.trainer().world
     state = torch.arange(world.state_count)
     target = torch.zeros_like(state)
     policies = []

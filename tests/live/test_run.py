@@ -10,6 +10,7 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn.load import Agent
+from clearway.learn.run_folder import record_of
 from clearway.live.agent import live_policy
 from clearway.live.episodes import LiveProtocol
 from clearway.live.room import LiveRoom
@@ -35,7 +36,7 @@ def agent() -> Agent:
     trainer = request.trainer()
     for _ in range(3):
         trainer.update()
-    return Agent(request.record(), trainer.network, trainer.feature_map, trainer.frames)
+    return Agent(record_of(request), trainer.network, trainer.feature_map, trainer.frames)
 
 
 def histories(world: World, target: torch.Tensor) -> torch.Tensor:
@@ -68,7 +69,7 @@ def resolved(live: LiveRoom, names: tuple[str, ...]) -> tuple[list[LiveRoom], Ag
     bias[0, Action.MOVE_FORWARD] = SURE
     bias[1:, Action.TURN_RIGHT] = SURE
     rooms = [replace(live, scene=scene) for scene in scenes]
-    return rooms, Agent(request.record(), trainer.network, trainer.feature_map, 0)
+    return rooms, Agent(record_of(request), trainer.network, trainer.feature_map, 0)
 
 
 def test_in_every_scene_its_own_layers_decide(live) -> None:

@@ -24,7 +24,7 @@ from clearway.learn.figures import Figures
 from clearway.learn.load import load_agent
 from clearway.learn.named_tensors import part_of
 from clearway.learn.presets import PAPER_A3C
-from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
 from helpers.plain_a3c import PlainA3C
@@ -201,8 +201,9 @@ def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -
     assert are_gone_soon(workers)
     trainer = a3c_request(10_000_000).trainer()
     folder = RunFolder(tmp_path)
+    other_bits = folder.begin(record_of(a3c_request(10_000_000)), resume=True)
     with pytest.warns(UserWarning, match="threads 1 instead of 2"):
-        train._prepare(folder, a3c_request(10_000_000).record(), trainer, resume=True)
+        train._resumed(trainer, folder, other_bits)
     assert trainer.frames == read_progress(newest_checkpoint(folder.checkpoints)).frames > 0
 
 
