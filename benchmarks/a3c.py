@@ -224,7 +224,7 @@ def run(processes: int, seconds: float, repeats: int, progress: Callable[[str], 
     numbers = [LEARNER.envs * process // processes for process in range(processes)]
     ours, plain, bandwidth = [], [], []
     with (
-        closing(AsyncTrainer(world, LEARNER, COLLISION_AWARE, 0, processes)) as trainer,
+        closing(AsyncTrainer(world, LEARNER, LEARNER.paid(COLLISION_AWARE), 0, processes)) as trainer,
         closing(Servers(serve_plain_worker, [(number, world, shared, squares) for number in numbers])) as plain_workers,
         closing(Servers(serve_bandwidth, [()] * processes)) as copiers,
     ):

@@ -16,6 +16,7 @@ from clearway.deploy.from_run import load_scene_agent
 from clearway.errors import EncoderError, PluginError
 from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
+from clearway.learn.presets import PRESETS
 from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
@@ -48,7 +49,7 @@ def test_the_built_in_names_are_those_that_there_are() -> None:
     assert BUILT_IN["encoders"] == (encode.AUTO, encode.TRAINED, encode.RANDOM, depth_grid.NAME)
     assert BUILT_IN["importers"] == tuple(importers)
     assert set(BUILT_IN["rewards"]) == set(REWARDS)
-    assert BUILT_IN["algorithms"] == tuple(ALGORITHMS)
+    assert BUILT_IN["algorithms"] == (*ALGORITHMS, *PRESETS)
     assert set(BUILT_IN) == set(KINDS)
 
 

@@ -161,7 +161,8 @@ class Reward:
     Attributes:
         name: in tables.
         terms: in the order in which they apply; `Arrival` applies last, at the target alone.
-        clip: clip to [-1, 1] as Zhu's training loop does, so that the target is worth 1.
+        clip: clip to [-1, 1] as Zhu's training loop does, so that the target is worth 1. In a training the algorithm's
+            setting `clip_rewards` says so, see `learn.learner.Learner.paid`.
     """
 
     name: str

@@ -13,6 +13,7 @@ from clearway.agents.by_pose import RandomWalk, network_on_poses, shortest_paths
 from clearway.agents.selection import Argmax, ArgmaxUntried
 from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.learn.q_learning import QLearning, TrainedTable
+from clearway.learn.run_folder import record_of
 from clearway.reward import COLLISION_AWARE
 from clearway.world.tables import World
 from helpers.agents import alike, by_rule, check_agent, equal
@@ -27,7 +28,7 @@ def trained_table() -> TrainedTable:
     trainer = request.trainer()
     for _ in range(10):
         trainer.update()
-    return TrainedTable(request.record(), trainer.values, trainer.frames)
+    return TrainedTable(record_of(request), trainer.values, trainer.frames)
 
 
 def network(world: World) -> Agent:

@@ -103,7 +103,7 @@ def test_a3c_by_name(corridor) -> None:
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        ({"algorithm": "sac"}, "algorithm='sac': no such algorithm. Use one of 'ppo', 'a2c', 'a3c'"),
+        ({"algorithm": "sac"}, "algorithm='sac': no such algorithm. Use one of ppo, a2c, a3c, .*, paper, paper-a3c"),
         ({"algorithm": 3}, "no such algorithm"),
         ({"learning_rate": 3}, "learning_rate: no such setting. Use one of frames, centre_features"),
         ({"envs": 2.5}, r"envs=2\.5: expected a whole number"),
@@ -132,6 +132,13 @@ def test_what_does_not_fit_is_told_in_one_line_that_is_also_a_value_error(corrid
         clearway.train(corridor, **arguments)
     assert isinstance(caught.value, ValueError)
     assert "\n" not in str(caught.value)
+
+
+def test_a_reward_that_clips_needs_settings_that_do(corridor) -> None:
+    clipped = replace(SHORTEST, clip=True)
+    with pytest.raises(clearway.ClearwayError, match="reward shortest clips, and ppo's setting clip_rewards does not"):
+        clearway.train(corridor, reward=clipped, **SMALL)
+    assert clearway.train(corridor, reward=clipped, clip_rewards=True, **SMALL).record.reward == clipped
 
 
 def test_targets_without_names_are_for_one_scene(corridor) -> None:

@@ -1,10 +1,12 @@
 """`clearway train --algorithm`: every algorithm from its name to a table, and what it refuses."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from clearway.learn.algorithms import ALGORITHMS
+from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
 
 SETTINGS = ("--frames", 400, "--threads", 1, "--set", "envs=10")
@@ -44,7 +46,10 @@ def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):
     ("words", "parts"),
     [
         (("--algorithm", "a3c", "--set", "hindsight=true"), ("hindsight=true", "a3c's settings", "clip_norm")),
-        (("--algorithm", "q-learning", "--feature-basis", 8), ("feature_basis=8", "q-learning's settings")),
+        (
+            ("--algorithm", "q-learning", "--feature-basis", 8),
+            ("--feature-basis: q-learning has no setting", "Leave it out"),
+        ),
         (("--preset", "paper", "--set", "epochs=2"), ("epochs=2", "a2c's settings")),
         (("--algorithm", "bc", "--set", "ratio_clip=0.1"), ("ratio_clip=0.1", "bc's settings")),
     ],
@@ -52,6 +57,14 @@ def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):
 def test_a_setting_that_the_algorithm_lacks_is_refused(clearway, trained, tmp_path, words, parts):
     assert clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(*parts)
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("option", ["--algorithm", "--preset"])
+def test_a_preset_is_an_algorithm_with_settings(clearway, trained, tmp_path, option):
+    words = (option, "paper", "--frames", 400, "--set", "envs=10", "rollout_steps=8", "width=16")
+    assert clearway("train", trained.scene, "--out", tmp_path, *words).code == 0
+    expected = replace(PAPER_A2C, frames=400, envs=10, rollout_steps=8, width=16)
+    assert RunFolder(tmp_path).read_record().learner == expected
 
 
 def test_a_preset_s_settings_go_with_another_algorithm(clearway, trained, tmp_path):

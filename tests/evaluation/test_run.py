@@ -8,6 +8,7 @@ from clearway.evaluation.optimum import world_yardsticks
 from clearway.evaluation.run import _optima, evaluate_run
 from clearway.evaluation.tables import markdown_table
 from clearway.learn.load import load_agent
+from clearway.learn.run_folder import record_of
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE
 from helpers.agents import told_after
@@ -37,16 +38,16 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
 
 def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:
     request = small_request(scenes=[SCENE], targets={SCENE.name: (5, 100)}, learner=small_learner(clip_rewards=True))
-    record, world = request.record(), request.trainer().world
+    record, world = record_of(request), request.trainer().world
     state = torch.arange(world.state_count)
     target = torch.zeros_like(state)
     policies = []
-    for reward in (record.reward, record.paid):
+    for reward in (request.reward, record.reward):
         (exact, _) = world_yardsticks(world, reward)
         policies.append(torch.from_numpy(exact.yardstick.optimal_policy)[state])
     assert not torch.allclose(*policies)
-    best = _optima(world, [record.paid])["optimum (collision-aware)"]
+    best = _optima(world, [record.reward])["optimum (collision-aware)"]
     walking = state != world.target_state[0]
     found = told_after(best, world, state[:, None], target)[walking]
     torch.testing.assert_close(found.double(), policies[1][walking], rtol=1e-5, atol=1e-6)
-    assert "optimum (collision-aware, unclipped)" in _optima(world, [record.reward])
+    assert "optimum (collision-aware, unclipped)" in _optima(world, [request.reward])

@@ -126,8 +126,9 @@ def test_exact_references_begin_where_the_agents_did(
         assert by_target.headings[6] == "shortest_path_steps"
         assert {scene: named[scene] for scene in paths} == pytest.approx(paths)
     world = setting.world()
-    many = navigation_tables._references(world, [(COLLISION_AWARE, True)], episode_starts(world, 2000, 0))
-    every = [each.yardstick for each in world_yardsticks(world, replace(COLLISION_AWARE, clip=True))]
+    clipped = replace(COLLISION_AWARE, clip=True)
+    many = navigation_tables._references(world, [clipped], episode_starts(world, 2000, 0))
+    every = [each.yardstick for each in world_yardsticks(world, clipped)]
     assert many[0][2]["steps"] == pytest.approx([each.shortest_path_steps for each in every], rel=0.05)
     assert many[2][2]["collisions"] == pytest.approx([each.soft.collisions for each in every], rel=0.2)
 

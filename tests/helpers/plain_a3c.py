@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -28,7 +27,6 @@ class PlainWorker:
         self.target = torch.tensor([number % world.target_count])
         self.scene = world.target_scene[self.target]
         seeds = torch.tensor([(seed << 32) + number])
-        reward = replace(reward, clip=learner.clip_rewards)
         self.navigation = Navigation(world, reward, seeds, step_limit=learner.step_limit)
         self.actions = Streams(seeds, ACTION_STREAM)
         self.ended, self.reached = 0, 0  # episodes

@@ -14,6 +14,7 @@ from clearway.learn.load import TrainedNetwork
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.rollout import sample_actions
+from clearway.learn.run_folder import record_of
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -65,7 +66,7 @@ def small_learner(learner: Kind = DEFAULT, **changes: Any) -> Kind:
 
 def small_trainer(learner: OnPolicy, reward: Reward = COLLISION_AWARE, seed: int = 0) -> Trainer:
     """A trainer on the two small scenes."""
-    return Trainer(small_world(), learner, reward, seed)
+    return Trainer(small_world(), learner, learner.paid(reward), seed)
 
 
 def small_request(**changes: Any) -> RunRequest:
@@ -80,7 +81,7 @@ def trained_network(updates: int = 4) -> TrainedNetwork:
     trainer = request.trainer()
     for _ in range(updates):
         trainer.update()
-    return TrainedNetwork(request.record(), trainer.network, trainer.feature_map, trainer.frames)
+    return TrainedNetwork(record_of(request), trainer.network, trainer.feature_map, trainer.frames)
 
 
 @torch.no_grad()

@@ -9,9 +9,11 @@ from clearway.learn.a2c import A2C
 from clearway.learn.a3c.config import A3C
 from clearway.learn.algorithms import ALGORITHMS, algorithm, carried_over
 from clearway.learn.bc import BC
+from clearway.learn.learner import Learner
 from clearway.learn.ppo import PPO
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.q_learning import QLearning
+from clearway.reward import COLLISION_AWARE
 
 
 def test_algorithms_are_found_by_name() -> None:
@@ -38,3 +40,20 @@ def test_settings_of_the_same_name_are_carried_over() -> None:
         carried_over(DEFAULT, BC), frames=77, width=33
     )
     assert carried_over(PAPER_A2C, PAPER_A2C.__class__) == PAPER_A2C
+
+
+@pytest.mark.parametrize("learner", [PAPER_A2C, PAPER_A3C, QLearning(clip_rewards=True)])
+def test_an_algorithm_that_clips_pays_a_clipped_reward_whoever_was_asked(learner: Learner) -> None:
+    clipped = replace(COLLISION_AWARE, clip=True)
+    assert learner.paid(COLLISION_AWARE) == learner.paid(clipped) == clipped
+
+
+def test_a_reward_that_clips_under_settings_that_do_not_is_refused_with_the_remedy() -> None:
+    assert PPO().paid(COLLISION_AWARE) == COLLISION_AWARE
+    with pytest.raises(RunError, match=r"reward collision-aware clips, .*ppo's setting.* Set clip_rewards to true"):
+        PPO().paid(replace(COLLISION_AWARE, clip=True))
+
+
+def test_an_algorithm_without_the_setting_pays_the_reward_as_it_is() -> None:
+    for reward in (COLLISION_AWARE, replace(COLLISION_AWARE, clip=True)):
+        assert BC().paid(reward) is reward

@@ -11,7 +11,7 @@ import torch
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_network, run_scenes, run_world
-from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.train import RunRequest, save, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -37,7 +37,7 @@ def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path, directions: int
     for _ in range(3):
         trainer.update()
     folder = RunFolder(tmp_path / "run")
-    folder.write_record(request.record())
+    folder.write_record(record_of(request))
     save(trainer, folder, seconds=1.0)
 
     agent = load_network(folder.path)
@@ -62,7 +62,7 @@ def test_the_agent_acts_as_the_trainer_s_network(tmp_path: Path, directions: int
 def test_an_earlier_checkpoint_can_be_asked_for(tmp_path: Path) -> None:
     request = small_request()
     trainer, folder = request.trainer(), RunFolder(tmp_path / "run")
-    folder.write_record(request.record())
+    folder.write_record(record_of(request))
     save(trainer, folder, seconds=0.0)
     untrained = newest_checkpoint(folder.checkpoints)
     trainer.update()
@@ -113,7 +113,7 @@ def test_a_scene_made_in_memory_has_no_file_to_come_back_from(tmp_path: Path) ->
 def test_a_scene_in_memory_and_read_back_from_its_file_are_the_same_to_a_run(tmp_path: Path) -> None:
     from_files = request_with_files(tmp_path)
     in_memory = small_request(learner=small_learner(frames=160))
-    assert in_memory.record().same_experiment(from_files.record())
+    assert record_of(in_memory).same_experiment(record_of(from_files))
 
 
 def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path) -> None:

@@ -1,21 +1,23 @@
-"""Runs whose run.json has the first format: `recorded/run-1-*.json`, each written by the clearway of that time."""
+"""Runs that earlier versions recorded: `recorded/run-1-*.json`, each written by the clearway of that time."""
 
 import json
 import signal
 import warnings
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
 from clearway.errors import RunError
 from clearway.learn import train
+from clearway.learn.bc import BC
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.learner import Learner
 from clearway.learn.load import load_agent, run_world
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
-from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.trainer import Trainer
+from clearway.reward import COLLISION_AWARE
 from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 RECORDED = Path(__file__).parent / "recorded"
@@ -39,7 +41,7 @@ def test_a_recorded_run_has_the_algorithm_s_own_settings(
     record = RunFolder(tmp_path).read_record()
     assert record.learner == small_learner(preset, frames=2400)
     assert {name: content["learner"][name] for name in asdict(record.learner)} == asdict(record.learner)
-    now = small_request(learner=record.learner, seed=seed).record()
+    now = record_of(small_request(learner=record.learner, seed=seed))
     assert record.same_experiment(now)
 
 
@@ -71,6 +73,25 @@ def test_a_run_begun_then_goes_on_now_to_the_same_bits(
         warnings.filterwarnings("ignore", message=".*goes on with")  # the recorded machine may be another
         parts = train.train(request, tmp_path / "parts", resume=True)
     assert equal_bits(*[read_network(newest_checkpoint(folder.checkpoints)) for folder in (whole, parts)])
+
+
+@pytest.mark.parametrize("clips", [("learner",), ("reward",), ("learner", "reward"), ()])
+def test_either_of_two_switches_clipped_where_a_run_recorded_both(clips: tuple[str, ...], tmp_path: Path) -> None:
+    learner = small_learner(clip_rewards=bool(clips))
+    now = record_of(small_request(learner=learner))
+    content = {"format_version": 2, **json.loads(json.dumps(now.to_json()))}
+    content["learner"]["clip_rewards"], content["reward"]["clip"] = "learner" in clips, "reward" in clips
+    (tmp_path / "run.json").write_text(json.dumps(content))
+    record = RunFolder(tmp_path).read_record()
+    assert (record.learner.clip_rewards, record.reward.clip) == (bool(clips), bool(clips))
+    assert record.same_experiment(now)
+
+
+def test_a_run_of_an_algorithm_without_the_setting_keeps_its_reward_s_clipping(tmp_path: Path) -> None:
+    for clip in (False, True):
+        request = small_request(learner=small_learner(BC()), reward=replace(COLLISION_AWARE, clip=clip))
+        RunFolder(tmp_path).write_record(record_of(request))
+        assert RunFolder(tmp_path).read_record().reward.clip == clip
 
 
 def test_what_no_algorithm_had_is_refused(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from clearway.learn import checkpoint, train
 from clearway.learn.checkpoint import Progress, newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.figures import Figures
 from clearway.learn.presets import PAPER_A2C
-from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.trainer import Trainer
 from clearway.reward import SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -45,7 +45,7 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, frames: int, number: int = sig
 def test_a_run_leaves_record_metrics_and_checkpoint(tmp_path: Path) -> None:
     request = small_request()
     folder = train.train(request, tmp_path / "run")
-    assert folder.read_record().same_experiment(request.record())
+    assert folder.read_record().same_experiment(record_of(request))
     rows = folder.metrics()
     assert [row["frames"] for row in rows] == [80 * k for k in range(1, 11)]
     assert {"seconds", "episodes", "success", "solved_targets", "loss", "entropy", "lr"} <= set(rows[0])
@@ -155,7 +155,7 @@ def test_a_second_training_in_the_folder_is_refused_and_changes_nothing(tmp_path
 def test_resume_begins_where_there_is_no_run_or_no_checkpoint_yet(tmp_path: Path) -> None:
     request = small_request(learner=small_learner(frames=160))
     folder = RunFolder(tmp_path / "killed early")
-    record = request.record()
+    record = record_of(request)
     folder.write_record(replace(record, versions={"torch": "0.1"}, hardware={"threads": 7}, command=("elsewhere",)))
     folder.metrics_path.write_text('{"frames": 80, "seconds": 1, "loss": 1}\n')
     train.train(request, folder.path, resume=True)
@@ -288,7 +288,7 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     assert progress.frames == 80 * progress.updates > 0
     request = small_request(learner=small_learner(frames=160_000))
     trainer = request.trainer()
-    assert train._prepare(folder, request.record(), trainer, resume=True) == progress.seconds
+    assert train._resumed(trainer, folder, folder.begin(record_of(request), resume=True)) == progress.seconds
     assert Progress(trainer.frames, trainer.updates, progress.seconds) == progress
 
 
@@ -353,7 +353,7 @@ def test_features_in_a_mapped_file_train_the_same_agent_bit_for_bit(
         trainer = request.trainer()
         trainer.update()
         parameters[store] = dict(trainer.network.named_parameters())
-        assert request.record().same_experiment(small_request().record())
+        assert record_of(request).same_experiment(record_of(small_request()))
     assert equal_bits(parameters["mapped"], parameters["memory"])
     assert not equal_bits(parameters["float16"], parameters["memory"])
     torch.testing.assert_close(parameters["float16"], parameters["memory"], rtol=0.05, atol=0.01)

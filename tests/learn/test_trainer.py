@@ -20,7 +20,7 @@ from clearway.model import lookup
 from clearway.model.first_layer import AllStates, VisitedStates
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from helpers.small_runs import corridor_world, equal_bits, small_learner, small_trainer, small_world
+from helpers.small_runs import corridor_world, equal_bits, small_learner, small_request, small_trainer, small_world
 
 PLAIN_A2C = small_learner(A2C(), hindsight=False, lookahead=0.0, step_limit=5, matmul_precision="highest")
 
@@ -276,8 +276,8 @@ def test_a_world_without_features_is_refused() -> None:
 @pytest.mark.parametrize("seed", [-1, 2**31])
 def test_seeds_out_of_range_are_refused(seed: int) -> None:
     with pytest.raises(RunError, match="seed is"):
-        small_trainer(small_learner(), seed=seed)
-    small_trainer(small_learner(), seed=2**31 - 1).update()
+        small_request(seed=seed)
+    small_request(seed=2**31 - 1).trainer().update()
 
 
 @pytest.mark.parametrize(("envs_by", "counts"), [("states", [20, 40]), ("scenes", [30, 30])])

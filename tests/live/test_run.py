@@ -12,6 +12,7 @@ from clearway.agents.agent import FEATURES, Decisions
 from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
 from clearway.learn.load import TrainedNetwork
+from clearway.learn.run_folder import record_of
 from clearway.live.episodes import LiveProtocol
 from clearway.live.room import LiveRoom
 from clearway.live.run import LiveScene, check_alike, finish_live, stages, walk_setting
@@ -76,7 +77,7 @@ def resolved(live: LiveRoom, names: tuple[str, ...]) -> tuple[list[LiveRoom], Tr
     bias[0, Action.MOVE_FORWARD] = SURE
     bias[1:, Action.TURN_RIGHT] = SURE
     rooms = [replace(live, scene=scene) for scene in scenes]
-    return rooms, TrainedNetwork(request.record(), trainer.network, trainer.feature_map, 0)
+    return rooms, TrainedNetwork(record_of(request), trainer.network, trainer.feature_map, 0)
 
 
 def test_in_every_scene_its_own_layers_decide(live) -> None:

@@ -93,7 +93,7 @@ def test_values_and_rewards_are_of_one_scale(stage: Stage) -> None:
     """A learner that clipped its rewards knows of no reward of 10."""
     shown = stage.agents[0]
     record = shown.trained.record
-    clipping = replace(record, learner=replace(record.learner, clip_rewards=True))
+    clipping = replace(record, reward=replace(record.learner, clip_rewards=True).paid(record.reward))
     assert paid(shown.reward, stage) == 10
     assert paid(replace(shown, trained=replace(shown.trained, record=clipping)).reward, stage) == 1
 

@@ -188,3 +188,14 @@ def test_it_goes_on_from_its_tensors() -> None:
         going.reset(left.ended.nonzero()[:, 0])
         other.reset(right.ended.nonzero()[:, 0])
         assert torch.equal(going.history, other.history) and torch.equal(going.target, other.target)
+
+
+def test_episodes_that_begin_staggered_share_a_group_s_targets_and_spread_their_clocks() -> None:
+    scenes = [corridor_scene(5), corridor_scene(4, name="short")]
+    world = make_world(scenes, {"corridor": (0, 8, 16), "short": (4,)})
+    choice = TargetChoice.by_scene(world, torch.tensor([0] * 7 + [1] * 20))
+    navigation = Navigation(world, SHORTEST, torch.arange(27), choice=choice, step_limit=40)
+    navigation.begin_staggered()
+    assert navigation.target.tolist() == [0, 1, 2, 0, 1, 2, 0] + [3] * 20
+    assert int(navigation.elapsed.min()) >= 0 and int(navigation.elapsed.max()) < 40
+    assert len(set(navigation.elapsed.tolist())) > 10

@@ -7,6 +7,7 @@ import torch
 from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import EncoderRecord, Scene
+from clearway.world import tables
 from clearway.world.tables import World, make_world
 from clearway.zones import scene_zones
 from helpers.made import corridor_scene, grid_scene
@@ -139,3 +140,13 @@ def test_a_target_that_is_no_whole_number_is_refused() -> None:
     with pytest.raises(SceneError, match=r"target 1\.9 is no state id"):
         make_world([scene], {scene.name: [1.9]})
     assert make_world([scene], {scene.name: np.array([3])}).target_state.tolist() == [3]
+
+
+def test_targets_are_refused_before_features_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+    monkeypatch.setattr(tables, "joined_features", lambda *arguments: read.append(arguments))
+    with pytest.raises(SceneError, match="out of range"):
+        make_world([corridor_scene()], {"corridor": [99]})
+    assert not read
+    make_world([corridor_scene()], {"corridor": [16]})
+    assert len(read) == 1

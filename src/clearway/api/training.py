@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias, get_args
+from types import MappingProxyType
+from typing import Any, get_args
 
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
+from clearway.api.targets import Targets, chosen_targets
 from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
 from clearway.learn.algorithms import ALGORITHMS, algorithm
@@ -25,10 +27,7 @@ from clearway.markdown import table_lines
 from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
-from clearway.scenes.targets import default_targets
 from clearway.torch_threads import torch_threads
-
-Targets: TypeAlias = Mapping[str, Iterable[int]] | Iterable[int] | None
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
 
@@ -129,7 +128,7 @@ def train(
     loaded = [scene for scene, _ in pairs]
     request = RunRequest(
         scenes=loaded,
-        targets=_chosen_targets(loaded, targets, number),
+        targets=chosen_targets(loaded, targets, number),
         learner=learner,
         reward=reward_named(reward),
         seed=number,
@@ -150,8 +149,15 @@ def train(
         )
 
 
-def chosen_learner(wanted: str | Learner, frames: int | None, settings: Mapping[str, object]) -> Learner:
+def chosen_learner(
+    wanted: str | Learner, frames: int | None = None, settings: Mapping[str, object] = MappingProxyType({})
+) -> Learner:
     """The settings of an algorithm, some of them changed.
+
+    Args:
+        wanted: the algorithm's name, a preset's, or settings.
+        frames: training frames; None: the algorithm's own.
+        settings: others by name.
 
     Raises:
         ArgumentError: there is no such algorithm or setting, or a value is of the wrong type.
@@ -167,10 +173,8 @@ def chosen_learner(wanted: str | Learner, frames: int | None, settings: Mapping[
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
         learner = algorithm(wanted)()
     else:
-        names = ", ".join(map(repr, (*ALGORITHMS, *PRESETS)))
-        raise ArgumentError(
-            f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}, or settings such as PPO()"
-        )
+        names = ", ".join((*ALGORITHMS, *PRESETS))
+        raise ArgumentError(f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}")
     given = settings if frames is None else {**settings, "frames": frames}
     return replace(learner, **as_settings(type(learner), given))
 
@@ -179,26 +183,6 @@ def _is_known(learner: Learner) -> bool:
     """The class is the one that a run's record would be read with."""
     name = learner.algorithm
     return (name in ALGORITHMS or find_plugin("algorithms", name) is not None) and algorithm(name) is type(learner)
-
-
-def _chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict[str, tuple[int, ...]]:
-    """Targets by scene name, default ones where none are given."""
-    expected = "expected state ids by scene name, such as {'bathroom': [26, 37]}"
-    if targets is None:
-        targets = {}
-    if not isinstance(targets, Mapping):
-        if len(scenes) > 1 or isinstance(targets, str) or not isinstance(targets, Iterable):
-            raise ArgumentError(f"targets={targets!r:.80}: {expected}. Name the scene of each")
-        targets = {scenes[0].name: targets}
-    names = [scene.name for scene in scenes]
-    chosen: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
-    for name, states in targets.items():
-        if name not in names:
-            raise ArgumentError(f"targets: no scene {name!r:.80} is given. Name one of {', '.join(names)}")
-        if isinstance(states, str) or not isinstance(states, Iterable):
-            raise ArgumentError(f"targets[{name!r}]={states!r:.80}: {expected}. Give a list of them")
-        chosen[name] = tuple(as_whole(f"targets[{name!r}]", state) for state in states)
-    return {scene.name: chosen[scene.name] or default_targets(scene, seed) for scene in scenes}
 
 
 @contextmanager

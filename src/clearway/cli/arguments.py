@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from clearway.errors import ClearwayError
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
-
-if TYPE_CHECKING:
-    from clearway.scenes.scene import Scene
 
 __all__ = [
     "SCENE_SUFFIXES",
@@ -21,7 +17,7 @@ __all__ = [
     "check_named",
     "check_positive",
     "check_seeds",
-    "chosen_targets",
+    "given_targets",
     "scene_files",
 ]
 
@@ -74,26 +70,23 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def chosen_targets(scenes: Sequence[Scene], words: Sequence[str], seed: int) -> dict[str, tuple[int, ...]]:
-    """Targets by scene name from the command line's words; scenes without any get their default ones.
+def given_targets(words: Sequence[str], scene_count: int) -> dict[str, list[int]] | list[int] | None:
+    """Targets from the command line's words: state ids by scene name, or of the only scene; None where none are given.
 
     Raises:
-        ClearwayError: a word cannot be read, names no scene given, or leaves open which scene it means.
+        ClearwayError: a word cannot be read, or leaves open which of several scenes it means.
     """
-    from clearway.scenes.targets import default_targets
-
-    names = [scene.name for scene in scenes]
-    named: dict[str, tuple[int, ...]] = {}
+    named: dict[str, list[int]] = {}
+    bare: list[int] = []
     for word in words:
-        name, equals, states = word.rpartition("=")
-        if not equals:
-            if len(scenes) > 1:
-                raise ClearwayError(f"--targets {word}: several scenes are given. Write SCENE={word}")
-            name = names[0]
-        if name not in names:
-            raise ClearwayError(f"--targets {word}: no scene of that name. Name one of {', '.join(names)}")
+        name, equals, text = word.rpartition("=")
+        if not equals and scene_count > 1:
+            raise ClearwayError(f"--targets {word}: several scenes are given. Write SCENE={word}")
         try:
-            named[name] = named.get(name, ()) + tuple(int(state) for state in states.split(","))
+            states = [int(state) for state in text.split(",")]
         except ValueError as error:
             raise ClearwayError(f"--targets {word}: expected state numbers such as 26,37,43. Correct it") from error
-    return {scene.name: named.get(scene.name) or default_targets(scene, seed) for scene in scenes}
+        (named.setdefault(name, []) if equals else bare).extend(states)
+    if named and bare:
+        raise ClearwayError(f"--targets {' '.join(words)}: some words name their scene. Name it in each, or in none")
+    return named or bare or None

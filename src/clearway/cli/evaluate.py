@@ -8,14 +8,12 @@ from typing import Annotated
 
 import tyro
 
-from clearway.cli.arguments import check_at_least, check_seeds, scene_files
+from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, say, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
 from clearway.cli.live import STEP_CAP as LIVE_STEP_CAP
 from clearway.cli.live import Live, evaluate_live
 from clearway.errors import ClearwayError
-
-EPISODES, STEP_CAP = 100, 10_000
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class Evaluate:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
         self.room.check()
         if not self.room.live:
-            self._on_grid(_or(self.episodes, EPISODES), _or(self.step_cap, STEP_CAP))
+            self._on_grid()
             return
         if self.beside:
             raise ClearwayError("--beside walks on the grid. Leave it out with --live, or use --against")
@@ -69,11 +67,11 @@ class Evaluate:
             json=self.json,
         )
 
-    def _on_grid(self, episodes: int, step_cap: int) -> None:
+    def _on_grid(self) -> None:
         from clearway.api.evaluation import evaluate, load_agent
+        from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
 
-        check_at_least(1, episodes=episodes, step_cap=step_cap)
-        check_seeds(seed=self.seed)
+        episodes, step_cap = _or(self.episodes, EPISODES_PER_TARGET), _or(self.step_cap, STEP_CAP)
         files = scene_files(self.scenes) if self.scenes else None
         exported = self.folder.suffix == ".onnx"
         if exported and (self.checkpoint or self.pictures):

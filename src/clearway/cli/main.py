@@ -29,7 +29,7 @@ from clearway.cli.serve import Serve
 from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.cli.view import View, ViewScene
-from clearway.errors import ClearwayError
+from clearway.errors import ArgumentError, ClearwayError
 
 DESCRIPTION = (
     "Train, evaluate and look at agents that walk to the place where a picture was taken "
@@ -91,6 +91,8 @@ def _exit_code(words: Sequence[str]) -> int:
         else:
             _run(words)
         sys.stdout.flush()  # here, where it can still be told that nothing could be written
+    except ArgumentError as error:
+        return _refused(_as_option(str(error)))
     except ClearwayError as error:
         return _refused(str(error))
     except OSError as error:
@@ -118,6 +120,12 @@ def _run(words: Sequence[str]) -> None:
         )
     with showing_warnings():
         command.run()
+
+
+def _as_option(told: str) -> str:
+    """What a function says of an argument, "step_cap=0: expected 1", as of an option: "--step-cap 0: expected 1"."""
+    name, equals, rest = told.partition("=")
+    return f"--{name.replace('_', '-')} {rest}" if equals and name.isidentifier() else told
 
 
 def _reader_has_left() -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from clearway.choices import ZoneLevel
-from clearway.cli.arguments import check_finite, check_seeds, chosen_targets, scene_files
+from clearway.cli.arguments import check_finite, check_seeds, given_targets, scene_files
 from clearway.cli.console import print_json, stdout_console
 from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
 from clearway.errors import ClearwayError
@@ -47,6 +47,7 @@ class Oracle:
 
     def run(self) -> None:
         """Solve and print."""
+        from clearway.api.targets import chosen_targets
         from clearway.evaluation.optimum import world_yardsticks
         from clearway.scenes.thor_v1 import read_scene
         from clearway.world.tables import make_world
@@ -58,7 +59,8 @@ class Oracle:
         if not self.entropy > 0:
             raise ClearwayError(f"--entropy is {self.entropy}, expected more than 0. Give a positive weight")
         scenes = [replace(read_scene(path), features=None) for path in scene_files(self.files)]
-        world = make_world(scenes, chosen_targets(scenes, self.targets, self.seed), self.zones)
+        targets = chosen_targets(scenes, given_targets(self.targets, len(scenes)), self.seed)
+        world = make_world(scenes, targets, self.zones)
         reward = chosen_reward(self.reward, self.parameters, self.clip)
         found = world_yardsticks(world, reward, discount=self.discount, entropy_weight=self.entropy)
         if self.json:

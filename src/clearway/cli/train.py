@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from clearway.choices import FeatureStore, PresetName, ZoneLevel
-from clearway.cli.arguments import check_at_least, check_seeds, chosen_targets, scene_files
+from clearway.cli.arguments import given_targets, scene_files
 from clearway.cli.console import say
 from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
+from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
     from clearway.learn.learner import Learner
@@ -36,10 +37,10 @@ class Train:
     zones: ZoneLevel = "pose"
     """Whether zones are those of poses or of whole cells."""
     algorithm: str | None = None
-    """ppo, a2c, a3c, bc or q-learning, with the preset's settings as far as it has them; without --preset its own."""
+    """ppo (our recipe, and the default), a2c, a3c, bc or q-learning, with its own settings; or a preset, see there."""
     preset: PresetName | None = None
-    """default is our recipe, PPO, and taken where there is no --algorithm either; paper is the published settings,
-    synchronous; paper-a3c is the published algorithm."""
+    """Named settings: default is our recipe, PPO; paper is the published settings, synchronous; paper-a3c is the
+    published algorithm. With --algorithm, its settings go with that algorithm as far as it has them."""
     set: tuple[str, ...] = ()
     """Single settings of the algorithm, for example --set envs=200 clip_rewards=true (all: docs/learning.md)."""
     frames: int | None = None
@@ -61,45 +62,44 @@ class Train:
 
     def run(self) -> None:
         """Train."""
-        from clearway.learn.train import RunRequest, set_threads, train
-        from clearway.scenes.thor_v1 import read_scene
+        from clearway.api.training import train
 
-        check_at_least(1, threads=self.threads)
-        check_seeds(seed=self.seed)
-        set_threads(self.threads)
         files = scene_files(self.files)
-        scenes = [read_scene(path, features_in_file=self.feature_store != "memory") for path in files]
-        request = RunRequest(
-            scenes=scenes,
-            targets=chosen_targets(scenes, self.targets, self.seed),
-            learner=self._learner(),
+        result = train(
+            files,
+            given_targets(self.targets, len(files)),
             reward=chosen_reward(self.reward, self.parameters),
+            algorithm=self._learner(),
             seed=self.seed,
+            out=self.out,
+            resume=self.resume,
             zone_level=self.zones,
-            paths={scene.name: path for scene, path in zip(scenes, files, strict=True)},
             device=self.device,
             feature_store=self.feature_store,
+            threads=self.threads,
+            show_progress=True,
         )
-        folder = train(request, self.out, resume=self.resume, show_progress=True)
-        rows, count = folder.metrics(), sum(map(len, request.targets.values()))
-        if not rows:  # a finished run whose metrics.jsonl was removed
+        if not result.metrics:  # a finished run whose metrics.jsonl was removed
             say(f"{self.out}: trained. Next: clearway evaluate {self.out}")
             return
-        solved = int(rows[-1]["solved_targets"])
+        solved, count = result.solved_targets, sum(map(len, result.record.targets.values()))
         each = "" if solved == count else " --targets"
         say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{each}")
 
     def _learner(self) -> Learner:
-        from clearway.learn.algorithms import algorithm, carried_over
+        """The algorithm with its settings, as the words have it."""
+        from clearway.api.training import chosen_learner
+        from clearway.learn.algorithms import carried_over
+        from clearway.learn.learner import setting_names
         from clearway.learn.presets import PRESETS
         from clearway.learn.settings import with_settings
 
-        learner = PRESETS[self.preset or "default"]
-        if self.algorithm is not None:
-            kind = algorithm(self.algorithm)
-            learner = kind() if self.preset is None else carried_over(learner, kind)
-        if self.frames is not None:
-            learner = replace(learner, frames=self.frames)
-        if self.feature_basis is not None:
-            learner = with_settings(learner, [f"feature_basis={self.feature_basis}"])
-        return with_settings(learner, self.set)
+        learner = chosen_learner(self.algorithm or self.preset or "default")
+        if self.algorithm is not None and self.preset is not None:
+            if self.algorithm in PRESETS:
+                raise ClearwayError(f"--algorithm {self.algorithm} is a preset itself. Leave --preset out")
+            learner = carried_over(PRESETS[self.preset], type(learner))
+        basis = {} if self.feature_basis is None else {"feature_basis": self.feature_basis}
+        if basis and "feature_basis" not in setting_names(type(learner)):
+            raise ClearwayError(f"--feature-basis: {learner.algorithm} has no setting feature_basis. Leave it out")
+        return with_settings(chosen_learner(learner, self.frames, basis), self.set)

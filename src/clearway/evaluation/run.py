@@ -55,7 +55,7 @@ def evaluate_runs(
             world,
             {name: agent.on_poses(world) for name, agent in agents.items()},
             references={
-                **_optima(world, [record.paid for record in records]),
+                **_optima(world, [record.reward for record in records]),
                 **{name: make(world) for name, make in beside.items()},
             },
             scenes=scenes,
@@ -83,4 +83,4 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Agent]:
 
 def _trained(agent: TrainedAgent) -> Trained:
     record = agent.record
-    return Trained(agent.frames, record.seed, record.paid, record.zone_level)
+    return Trained(agent.frames, record.seed, record.reward, record.zone_level)

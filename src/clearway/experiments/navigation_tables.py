@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -40,9 +39,9 @@ def navigation_tables(
     """
     world = setting.world(targets)
     found = [(group, group.scores(setting.out, world.target_count)) for group in groups]
-    kinds = list(dict.fromkeys((group.runs[0].reward, group.runs[0].learner.clip_rewards) for group in groups))
+    rewards = list(dict.fromkeys(group.runs[0].learner.paid(group.runs[0].reward) for group in groups))
     trial = setting.trial(targets)
-    exact = _references(world, kinds, episode_starts(world, trial.episodes_per_target, trial.seed))
+    exact = _references(world, rewards, episode_starts(world, trial.episodes_per_target, trial.seed))
     walked = random_walk(world, trial)
     rows: list[tuple[Value, ...]] = []
     for metric in METRICS:
@@ -108,24 +107,24 @@ def _by_scene(world: World, by_target: np.ndarray) -> list[float]:
 
 
 def _references(
-    world: World, kinds: Sequence[tuple[Reward, bool]], starts: np.ndarray
+    world: World, rewards: Sequence[Reward], starts: np.ndarray
 ) -> list[tuple[str, str, dict[str, np.ndarray]]]:
     """Kind, name, and steps and collisions, (M,) each, of the shortest path and of the rewards' exact policies.
 
     Args:
         world: see there.
-        kinds: rewards, and whether they are clipped.
+        rewards: as agents were paid them.
         starts: (M, E) int64 that the agents walked from. A hundred starts are luck: their shortest paths differ from
             those of all starts by up to a tenth, more than agents from optima.
     """
     found: list[tuple[str, str, dict[str, np.ndarray]]] = []
-    for reward, clip in kinds:
-        exact = [each.yardstick for each in world_yardsticks(world, replace(reward, clip=clip), starts=starts)]
+    for reward in rewards:
+        exact = [each.yardstick for each in world_yardsticks(world, reward, starts=starts)]
         if not found:
             shortest = np.array([each.shortest_path_steps for each in exact])
             found.append((EXACT, "shortest path", {"steps": shortest, "collisions": np.zeros(len(exact))}))
         for name, policies in ((OPTIMUM, [e.optimal for e in exact]), (SOFT_FIXED_POINT, [e.soft for e in exact])):
-            label = f"{name} ({reward.name}{'' if clip else ', unclipped'})"
+            label = f"{name} ({reward.name}{'' if reward.clip else ', unclipped'})"
             found.append((EXACT, label, {m: np.array([getattr(policy, m) for policy in policies]) for m in METRICS}))
     return found
 

@@ -24,7 +24,6 @@ from clearway.learn.learner import Learner, OnFeatures, linear
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import Adam, clip_gradients
 from clearway.learn.rollout import ACTION_STREAM, Collector, as_rows
-from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import network_input
 from clearway.model.lookup import Activations, LookupNetwork
@@ -74,11 +73,10 @@ class Cloning:
         seed: of parameters, environments and actions.
 
     Raises:
-        RunError: the seed is out of range, features are missing or not finite, or a scene has no environment.
+        RunError: features are missing or not finite, or a scene has no environment.
     """
 
     def __init__(self, world: World, learner: BC, reward: Reward, seed: int) -> None:
-        check_seed(seed)
         if learner.envs < world.scene_count:
             raise RunError(f"{learner.envs} environments for {world.scene_count} scenes. Give more environments (envs)")
         self.feature_map, features = network_input(world, learner)
@@ -96,7 +94,7 @@ class Cloning:
         seeds = torch.arange(learner.envs, dtype=torch.int64, device=world.device) + (seed << 32)
         self.navigation = Navigation(
             world,
-            learner.paid(reward),
+            reward,
             seeds,
             choice=TargetChoice.by_scene(world, scene),
             step_limit=learner.step_limit,

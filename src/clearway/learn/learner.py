@@ -72,9 +72,9 @@ class Learner:
             _check_range(name, value)
 
     @property
-    def clip_rewards(self) -> bool:
-        """Whether rewards are clipped to [-1, 1]."""
-        return False
+    def clip_rewards(self) -> bool | None:
+        """Whether training clips rewards to [-1, 1]; None where there is no such setting: as the reward itself says."""
+        return None
 
     @property
     def reward_scale(self) -> float:
@@ -96,11 +96,22 @@ class Learner:
         return scenes if self.heads_by_scene else 1
 
     def paid(self, reward: Reward) -> Reward:
-        """The reward as training pays it: clipped, where it or these settings say so."""
-        return replace(reward, clip=reward.clip or self.clip_rewards)
+        """The reward as training pays it: `clip_rewards` alone says whether it is clipped, where there is that setting.
+
+        Raises:
+            RunError: the reward clips and the setting does not, so that one of the two is a mistake.
+        """
+        if self.clip_rewards is None:
+            return reward
+        if reward.clip and not self.clip_rewards:
+            problem = f"reward {reward.name} clips, and {self.algorithm}'s setting clip_rewards does not"
+            raise RunError(
+                f"{problem}. Set clip_rewards to true (--set clip_rewards=true), or take clip=True out of the reward"
+            )
+        return replace(reward, clip=self.clip_rewards)
 
     def trainer(self, world: World, reward: Reward, seed: int) -> Learning:
-        """A trainer at its first frame.
+        """A trainer at its first frame; the reward is that of `paid`.
 
         Raises:
             RunError: the seed or the settings do not fit the world.

@@ -1,12 +1,18 @@
-"""Runs of the first format of run.json, in which every algorithm had the settings of all three."""
+"""Runs that earlier versions recorded in another way.
+
+In the first format of run.json every algorithm had the settings of all three. Later on, the reward and the algorithm's
+settings could each clip, and run.json held the reward as it was given rather than as it was paid.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
+from clearway.reward import Reward
 
 
 def own_settings(kind: type[Learner], settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -16,3 +22,10 @@ def own_settings(kind: type[Learner], settings: Mapping[str, Any]) -> dict[str, 
     """
     foreign = set(setting_names(PPO)) - set(setting_names(kind))
     return {name: value for name, value in settings.items() if name not in foreign}
+
+
+def clipped_once(learner: Learner, reward: Reward) -> tuple[Learner, Reward]:
+    """Settings and reward that agree in clipping: either of them was enough."""
+    if reward.clip and learner.clip_rewards is False:
+        learner = replace(learner, **{"clip_rewards": True})
+    return learner, learner.paid(reward)

@@ -25,12 +25,16 @@ def package_versions() -> dict[str, str]:
     return found
 
 
-def hardware() -> dict[str, Any]:
-    """Processor, memory, usable cores and threads of this machine; whether it multiplies bfloat16."""
+def hardware(device: str | None = None) -> dict[str, Any]:
+    """Processor, memory, usable cores and threads of this machine; whether it multiplies bfloat16.
+
+    device: of torch, told of too where one is given; bfloat16 is then the device's, else the processor's.
+    """
     import torch
 
     from clearway.model.precision import multiplies_bfloat16
 
+    where = torch.device(device or "cpu")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "machine": platform.machine(),
@@ -39,7 +43,9 @@ def hardware() -> dict[str, Any]:
         "memory_gib": _memory_gib(),
         "cores": cores,
         "threads": torch.get_num_threads(),
-        "bfloat16": multiplies_bfloat16(torch.device("cpu")),
+        "bfloat16": multiplies_bfloat16(where),
+        **({} if device is None else {"device": device}),
+        **({"gpu": torch.cuda.get_device_name(where)} if where.type == "cuda" else {}),
     }
 
 

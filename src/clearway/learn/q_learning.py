@@ -26,7 +26,6 @@ from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import Learner, linear
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.rollout import ACTION_STREAM
-from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.policy import sampled
 from clearway.reward import Reward
@@ -80,20 +79,16 @@ class TableTrainer:
         learner: the settings.
         reward: what is earned.
         seed: of environments and actions.
-
-    Raises:
-        RunError: the seed is out of range.
     """
 
     def __init__(self, world: World, learner: QLearning, reward: Reward, seed: int) -> None:
-        check_seed(seed)
         self.world, self.learner = world, learner
         self.frames, self.updates = 0, 0
         self.first_row, rows = table_rows(world.scene_offset, world.target_scene)
         self.values = torch.zeros(rows, ACTION_COUNT, device=world.device)
         seeds = torch.arange(learner.envs, dtype=torch.int64, device=world.device) + (seed << 32)
         self.navigation = Navigation(
-            world, learner.paid(reward), seeds, step_limit=learner.step_limit, history_length=learner.history_length
+            world, reward, seeds, step_limit=learner.step_limit, history_length=learner.history_length
         )
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)

@@ -94,7 +94,8 @@ class Collector:
         self.one_step = Activations.empty(count, network.width, device, dtype=network.dtype)
         width = network.width if keep_hidden else 0
         self.kept = Activations.empty(count * steps, width, device, dtype=network.dtype)
-        self.memory = [self._memory(t) for t in range(steps)]
+        # what each step is written to
+        self.memory = self.kept.by_step(steps) if keep_hidden else [self.one_step] * steps
 
     @torch.no_grad()
     def collect(self) -> Rollout:
@@ -125,9 +126,3 @@ class Collector:
             history_after=nav.history,
             target_after=nav.target,
         )
-
-    def _memory(self, t: int) -> Activations:
-        """Where the activations of step t are written: to their rows, where all of them are kept."""
-        if not self.keep_hidden:
-            return self.one_step
-        return Activations(**{name: by_step(rows, self.steps)[t] for name, rows in vars(self.kept).items()})

@@ -6,6 +6,8 @@ same however many rows it has. Simulators that load one scene at a time train in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -60,6 +62,12 @@ def divided_envs(world: World, learner: OnPolicy, scenes: Tensor) -> tuple[int, 
         counts[scene] = 1
     _check_rows(learner, int(counts[scenes].min()))
     return tuple(counts.tolist())
+
+
+def scene_of_envs(envs_per_scene: Sequence[int], device: torch.device) -> Tensor:
+    """The scene of every environment, (N,) int64; environments are ordered by scene."""
+    counts = torch.tensor(envs_per_scene, device=device)
+    return torch.arange(len(counts), device=device).repeat_interleave(counts)
 
 
 def check_division(world: World, learner: OnPolicy, rotation: Rotation) -> None:

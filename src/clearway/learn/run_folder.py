@@ -13,12 +13,12 @@ import hashlib
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -27,13 +27,17 @@ from clearway.errors import ClearwayError, RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.learner import Learner
-from clearway.learn.old_runs import own_settings
+from clearway.learn.old_runs import clipped_once, own_settings
 from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
 
+if TYPE_CHECKING:
+    from clearway.learn.train import RunRequest
+
 FORMAT_VERSION = 2
+SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
 
 
@@ -58,7 +62,7 @@ class SceneRecord:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Everything that determines a run, and where it was made."""
+    """Everything that determines a run, and where it was made. The reward is as training paid it."""
 
     learner: Learner
     reward: Reward
@@ -74,15 +78,19 @@ class RunRecord:
         """Targets by scene name."""
         return {scene.name: scene.targets for scene in self.scenes}
 
-    @property
-    def paid(self) -> Reward:
-        """The reward as training paid it."""
-        return self.learner.paid(self.reward)
-
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
         learner = {"algorithm": self.learner.algorithm, **asdict(self.learner)}
         return {**asdict(self), "learner": learner, "reward": self.reward.to_json()}
+
+    def other_bits(self, now: RunRecord) -> list[str]:
+        """Where a run goes on in another way than this one began, so that its bits are not an uninterrupted one's."""
+        then, here = ({**record.versions, **record.hardware} for record in (self, now))
+        return [
+            f"{name} {here.get(name)} instead of {then[name]}"
+            for name in SHAPES_BITS
+            if name in then and then[name] != here.get(name)
+        ]
 
     def same_experiment(self, other: RunRecord) -> bool:
         """Both would give the same agent: all but versions, hardware, paths and command agree."""
@@ -104,33 +112,26 @@ def scene_digest(scene: Scene) -> str:
     return digest.hexdigest()[:16]
 
 
-def record_of(
-    scenes: Sequence[Scene],
-    paths: Mapping[str, Path],
-    targets: Mapping[str, Sequence[int]],
-    learner: Learner,
-    reward: Reward,
-    seed: int,
-    zone_level: ZoneLevel,
-) -> RunRecord:
-    """The record of a run that is about to start; paths: file of each scene by name, where it has one."""
+def record_of(request: RunRequest) -> RunRecord:
+    """The record of a run that is about to start."""
+    paths = request.paths or {}
     return RunRecord(
-        learner=learner,
-        reward=reward,
-        seed=seed,
-        zone_level=zone_level,
+        learner=request.learner,
+        reward=request.paid,
+        seed=request.seed,
+        zone_level=request.zone_level,
         scenes=tuple(
             SceneRecord(
                 name=scene.name,
                 path=str(paths[scene.name].resolve()) if scene.name in paths else None,
                 digest=scene_digest(scene),
                 encoder=scene.encoder_name,
-                targets=tuple(int(target) for target in targets[scene.name]),
+                targets=tuple(int(target) for target in request.targets[scene.name]),
             )
-            for scene in scenes
+            for scene in request.scenes
         ),
         versions=package_versions(),
-        hardware=hardware(),
+        hardware=hardware(request.device) | {"feature_store": request.feature_store},
         command=tuple(sys.argv),
     )
 
@@ -180,6 +181,37 @@ class RunFolder:
             yield
         finally:
             lock.release()
+
+    def begin(self, record: RunRecord, resume: bool) -> list[str] | None:
+        """Begin a run here, or find one to go on with.
+
+        Returns:
+            None for a run that begins; else `RunRecord.other_bits` of the one to go on with.
+
+        Raises:
+            RunError: the folder holds a run already (and resume is off), or another experiment.
+        """
+        if not self.exists:
+            for left in (self.metrics_path, self.checkpoints):
+                if left.exists():
+                    raise RunError(f"{self.path}: holds {left.name} but no {RUN_FILE}. Empty it, or give another --out")
+            self.write_record(record)
+            return None
+        if not resume:
+            raise RunError(f"{self.path}: holds a run already. Give --resume to go on with it, or another --out")
+        before = self.read_record()
+        longer = replace(before, learner=replace(before.learner, frames=record.learner.frames))
+        if not longer.same_experiment(record):
+            problem = f"{self.path}: holds another experiment (see its {RUN_FILE})"
+            raise RunError(f"{problem}. Give the same settings, or another --out")
+        if not before.same_experiment(record):
+            problem = f"{self.path}: was started for {before.learner.frames} frames, and its schedules end there"
+            raise RunError(f"{problem}. Give --frames {before.learner.frames}, or another --out")
+        if not any(self.checkpoints.glob("frames-*")):
+            self.write_record(record)  # nothing is left of what was done elsewhere
+            self.forget_metrics_after(-1)
+            return None
+        return before.other_bits(record)
 
     def write_record(self, record: RunRecord) -> None:
         """Write run.json."""
@@ -252,9 +284,10 @@ def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
     for name, kind in wanted.items():
         if not _fits(content[name], kind):
             raise TypeError(f"{name} is {content[name]!r:.40}")
+    learner, reward = clipped_once(_learner(content["learner"], version), reward_from_json(content["reward"]))
     return RunRecord(
-        learner=_learner(content["learner"], version),
-        reward=reward_from_json(content["reward"]),
+        learner=learner,
+        reward=reward,
         seed=content["seed"],
         zone_level=content["zone_level"],
         scenes=tuple(_scene_record(scene) for scene in content["scenes"]),

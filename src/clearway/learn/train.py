@@ -9,7 +9,7 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -30,16 +30,15 @@ from clearway.learn.figures import Figures
 from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.learn.progress import ProgressView, progress_view
-from clearway.learn.run_folder import RunFolder, RunRecord, record_of
+from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.precision import multiplies_bfloat16
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 from clearway.world.tables import World, make_world
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
-SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 
 
 class Learning(Protocol):
@@ -85,6 +84,9 @@ class RunRequest:
         paths: file of each scene by name, where it has one.
         device: torch device, for example "cpu" or "cuda".
         feature_store: where features are kept, see `clearway.world.feature_store`.
+
+    Raises:
+        RunError: the seed is out of range.
     """
 
     scenes: Sequence[Scene]
@@ -97,25 +99,19 @@ class RunRequest:
     device: str = "cpu"
     feature_store: FeatureStore = "memory"
 
-    def record(self) -> RunRecord:
-        """The record to be written to the run folder."""
-        record = record_of(
-            self.scenes, self.paths or {}, self.targets, self.learner, self.reward, self.seed, self.zone_level
-        )
-        device = torch.device(self.device)
-        where = {
-            "device": self.device,
-            "feature_store": self.feature_store,
-            "bfloat16": multiplies_bfloat16(device),
-            **({"gpu": torch.cuda.get_device_name(device)} if device.type == "cuda" else {}),
-        }
-        return replace(record, hardware={**record.hardware, **where})
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+
+    @property
+    def paid(self) -> Reward:
+        """The reward as training pays it, see `Learner.paid`."""
+        return self.learner.paid(self.reward)
 
     def trainer(self) -> Learning:
         """A trainer at its first frame."""
-        device = usable_device(self.device)
+        device, reward = usable_device(self.device), self.paid  # before the scenes, which may take long
         world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store).to(device)
-        return self.learner.trainer(world, self.reward, self.seed)
+        return self.learner.trainer(world, reward, self.seed)
 
 
 def train(
@@ -141,7 +137,8 @@ def train(
     """
     trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
     with folder.held():
-        seconds = _prepare(folder, request.record(), trainer, resume)
+        other_bits = folder.begin(record_of(request), resume)
+        seconds = 0.0 if other_bits is None else _resumed(trainer, folder, other_bits)
         with (
             closing(trainer),
             progress_view(trainer.learner.frames, show_progress) as view,
@@ -151,35 +148,17 @@ def train(
     return folder
 
 
-def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bool) -> float:
-    """Begin a new run or load the newest checkpoint; returns the seconds trained so far."""
-    if not folder.exists:
-        for left in (folder.metrics_path, folder.checkpoints):
-            if left.exists():
-                raise RunError(f"{folder.path}: holds {left.name} but no run.json. Empty it, or give another --out")
-        folder.write_record(record)
-        return 0.0
-    if not resume:
-        raise RunError(f"{folder.path}: holds a run already. Give --resume to go on with it, or another --out")
-    before = folder.read_record()
-    longer = replace(before, learner=replace(before.learner, frames=record.learner.frames))
-    if not longer.same_experiment(record):
-        raise RunError(
-            f"{folder.path}: holds another experiment (see its run.json). Give the same settings, or another --out"
-        )
-    if not before.same_experiment(record):
-        raise RunError(
-            f"{folder.path}: was started for {before.learner.frames} frames, and its schedules end there. "
-            f"Give --frames {before.learner.frames}, or another --out"
-        )
-    if not any(folder.checkpoints.glob("frames-*")):
-        folder.write_record(record)  # nothing is left of what was done elsewhere
-        folder.forget_metrics_after(-1)
-        return 0.0
+def _resumed(trainer: Learning, folder: RunFolder, other_bits: Sequence[str]) -> float:
+    """Load the newest checkpoint; returns the seconds trained so far.
+
+    Warns:
+        UserWarning: there is more to train, in another way than the run began, see `RunRecord.other_bits`.
+    """
     checkpoint = newest_checkpoint(folder.checkpoints)
     progress = read_progress(checkpoint)
-    if progress.frames < record.learner.frames:
-        _warn_of_other_bits(folder, before, record)
+    if other_bits and progress.frames < trainer.learner.frames:
+        told = f"{folder.path}: goes on with {', '.join(other_bits)}"
+        warnings.warn(f"{told}; results will not be those of an uninterrupted run", stacklevel=2)
     tensors = {**read_training(checkpoint), **read_network(checkpoint)}
     try:
         trainer.load_tensors(tensors, progress.frames, progress.updates)
@@ -190,19 +169,6 @@ def _prepare(folder: RunFolder, record: RunRecord, trainer: Learning, resume: bo
         ) from error
     folder.forget_metrics_after(progress.frames)
     return progress.seconds
-
-
-def _warn_of_other_bits(folder: RunFolder, before: RunRecord, now: RunRecord) -> None:
-    """Say where a run goes on in another way than it began, so that an uninterrupted one would have other bits."""
-    then, here = ({**record.versions, **record.hardware} for record in (before, now))
-    differ = [
-        f"{name} {here.get(name)} instead of {then[name]}"
-        for name in SHAPES_BITS
-        if name in then and then[name] != here.get(name)
-    ]
-    if differ:
-        text = f"{folder.path}: goes on with {', '.join(differ)}; results will not be those of an uninterrupted run"
-        warnings.warn(text, stacklevel=2)
 
 
 def _run(

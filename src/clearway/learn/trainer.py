@@ -6,7 +6,6 @@ Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import torch
@@ -22,8 +21,7 @@ from clearway.learn.on_policy import OnPolicy
 from clearway.learn.optimiser import clip_gradients, optimisers
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
-from clearway.learn.rotation import Rotation, check_division, divided_envs
-from clearway.learn.seeds import check_seed
+from clearway.learn.rotation import Rotation, check_division, divided_envs, scene_of_envs
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import network_input
 from clearway.model.lookup import Activations, LookupNetwork
@@ -59,41 +57,35 @@ class Trainer:
         seed: of parameters, environments, actions and shuffling.
 
     Raises:
-        RunError: the seed is out of range, features are missing or not finite, a scene has no environment or fewer
-            rows than there are minibatches.
+        RunError: features are missing or not finite, or a scene has no environment or fewer rows than there are
+            minibatches.
     """
 
     def __init__(self, world: World, learner: OnPolicy, reward: Reward, seed: int) -> None:
-        check_seed(seed)
-        self.feature_map, features = network_input(world, learner)
         self.world, self.learner, self.seed = world, learner, seed
         self.frames, self.updates = 0, 0
+        device = world.device
         self.rotation = Rotation(world.scene_count, learner.scenes_at_once, learner.scene_updates, seed)
         check_division(world, learner, self.rotation)
         envs_per_scene = divided_envs(world, learner, self.rotation.scenes(0))
-        self.env_count = sum(envs_per_scene)
-        device = world.device
+        self.env_count, env_scene = sum(envs_per_scene), scene_of_envs(envs_per_scene, device)
+        self.feature_map, features = network_input(world, learner)
+        seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
+        choice = TargetChoice.by_scene(world, env_scene)
+        self.navigation = Navigation(
+            world, reward, seeds, choice=choice, step_limit=learner.step_limit, history_length=learner.history_length
+        )
         heads = learner.head_count(world.scene_count)
         shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(device)
-        dtype = factor_dtype(learner.matmul_precision, device)
         self.lookup = LookupNetwork(
             self.network,
             features,
             world.target_state,
-            dtype,
+            factor_dtype(learner.matmul_precision, device),
             most_seen=self.env_count * (learner.history_length + learner.rollout_steps),
         )
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner.optimiser)
-        seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
-        self.navigation = Navigation(
-            world,
-            learner.paid(reward),
-            seeds,
-            choice=TargetChoice.by_scene(world, scene_of_envs(envs_per_scene, device)),
-            step_limit=learner.step_limit,
-            history_length=learner.history_length,
-        )
         self.observed = Observed(world)
         self.statistics = EpisodeStatistics(self.env_count, world.target_count, device)
         self.action_stream = Streams(seeds, ACTION_STREAM)
@@ -101,7 +93,7 @@ class Trainer:
         self.collector = Collector(
             self.navigation, self.lookup, self.action_stream, envs_per_scene, learner.rollout_steps, self.one_pass
         )
-        self._begin_staggered()
+        self.navigation.begin_staggered()
 
     @property
     def frames_per_update(self) -> int:
@@ -123,7 +115,7 @@ class Trainer:
         if self.updates and self.rotation.begins(self.updates):
             self._seat(self.updates)
             self.statistics.drop_open()
-            self._begin_staggered()
+            self.navigation.begin_staggered()
         lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
         rollout = self.collector.collect()
@@ -153,16 +145,6 @@ class Trainer:
         counts = divided_envs(self.world, self.learner, self.rotation.scenes(update))
         self.navigation.choice.groups = scene_of_envs(counts, self.world.device)
         self.collector.rows_per_scene = counts
-
-    def _begin_staggered(self) -> None:
-        """Begin all episodes, targets in turn, with clocks spread so that cuts do not fall together."""
-        nav, world = self.navigation, self.world
-        group = nav.choice.groups
-        envs = torch.bincount(group, minlength=world.scene_count)
-        place = torch.arange(self.env_count, device=world.device) - (envs.cumsum(0) - envs)[group]
-        counts = torch.bincount(world.target_scene, minlength=world.scene_count)
-        nav.reset(target=nav.choice.members[group, place % counts[group]])
-        nav.elapsed = (nav.start_stream.uniform() * self.learner.step_limit).long()
 
     @torch.no_grad()
     def _batch(self, rollout: Rollout, looks_ahead: bool) -> tuple[Batch, Tensor]:
@@ -340,9 +322,3 @@ class Trainer:
         self.frames, self.updates = frames, updates
         self._seat(max(updates - 1, 0))
         self.lookup.refresh()
-
-
-def scene_of_envs(envs_per_scene: Sequence[int], device: torch.device) -> Tensor:
-    """The scene of every environment, (N,) int64; environments are ordered by scene."""
-    counts = torch.tensor(envs_per_scene, device=device)
-    return torch.arange(len(counts), device=device).repeat_interleave(counts)

@@ -82,6 +82,11 @@ class Activations:
         fused, special = (torch.empty(rows, width, device=device, dtype=dtype) for _ in range(2))
         return cls(seen, fused, special, torch.empty(rows, OUTPUTS, device=device))
 
+    def by_step(self, steps: int) -> list[Activations]:
+        """Views of each step's rows, where rows hold so many steps of every environment together."""
+        parts = {name: rows.unflatten(0, (-1, steps)).unbind(1) for name, rows in vars(self).items()}
+        return [Activations(**{name: part[step] for name, part in parts.items()}) for step in range(steps)]
+
 
 def projects_all(states: int, most_seen: int | None, device: torch.device) -> bool:
     """Whether the first layer is computed of all states, or of those that occur, of which there are `most_seen`.

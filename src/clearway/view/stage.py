@@ -63,8 +63,8 @@ class StageAgent:
 
     @property
     def reward(self) -> Reward:
-        """What it learnt from: clipped, if its learner clipped rewards, so that values and rewards compare."""
-        return self.trained.record.paid.as_known()
+        """What it learnt from, clipped if training clipped, so that values and rewards compare."""
+        return self.trained.record.reward.as_known()
 
 
 @dataclass(frozen=True)

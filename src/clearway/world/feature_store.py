@@ -14,18 +14,54 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from clearway.choices import FeatureStore
-from clearway.errors import RunError
+from clearway.errors import RunError, SceneError
 from clearway.files import CACHE_VARIABLE, cache_dir
+from clearway.scenes.scene import Scene
 
 FEW_STATES = 16_384  # up to so many, whatever is computed of states is computed of all of them at once
 BLOCK_ROWS = 8_192  # features that go through memory at a time
 LARGEST_FLOAT16 = 65_504.0
+
+
+def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | None:
+    """The scenes' features one after the other, (S, F), or None where they have none.
+
+    Raises:
+        SceneError: only some have features, or they do not belong together or fit the store.
+        RunError: there is no room for them.
+    """
+    if all(scene.features is None for scene in scenes):
+        return None
+    first = scenes[0]
+    for scene in scenes:
+        if scene.features is None or first.features is None:
+            raise SceneError(scene.name, "only some of the scenes have features", "Encode all scenes together")
+        if scene.features.shape[1] != first.features.shape[1]:
+            sizes = f"{scene.features.shape[1]} features a state, {first.name} has {first.features.shape[1]}"
+            raise SceneError(scene.name, sizes, "Encode all scenes with the same encoder", "resnet_feature")
+        if _identity(scene) != _identity(first):
+            problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
+            raise SceneError(scene.name, problem, "Encode all scenes together with one encoder", "resnet_feature")
+    assert first.features is not None
+    joined = empty_store(sum(scene.state_count for scene in scenes), first.features.shape[1], store)
+    for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
+        features = np.asarray(scene.features, np.float32)
+        if store == "float16" and np.abs(features).max() > LARGEST_FLOAT16:
+            problem = f"holds features beyond {LARGEST_FLOAT16:,.0f}, the largest of float16"
+            raise SceneError(scene.name, problem, "Keep features in another store, mapped", "resnet_feature")
+        rows.numpy()[:] = features
+    return joined
+
+
+def _identity(scene: Scene) -> str:
+    return f"{scene.encoder.name} ({scene.encoder.identity})" if scene.encoder else "an unknown encoder"
 
 
 def empty_store(states: int, features: int, store: FeatureStore) -> Tensor:

@@ -117,7 +117,8 @@ class Navigation:
         count = len(seeds)
         self.world, self.reward, self.step_limit = world, reward, step_limit
         self.choice = choice or TargetChoice.uniform(world, count)
-        self.reward_table = torch.from_numpy(reward.table(world.moves())).to(world.device, reward_dtype)
+        moves = world.moves()
+        self.reward_table = torch.from_numpy(reward.table(moves)).to(world.device, reward_dtype)
         seeds = seeds.to(world.device)
         self.start_stream, self.target_stream = Streams(seeds, START_STREAM), Streams(seeds, TARGET_STREAM)
         self.history = torch.zeros(count, history_length, dtype=torch.int64, device=world.device)
@@ -146,6 +147,19 @@ class Navigation:
         self.target[index] = target
         self.history[index] = start[:, None]
         self.elapsed[index] = 0
+
+    def begin_staggered(self) -> None:
+        """Begin all episodes, a group's targets in turn, with clocks spread so that cuts do not fall together.
+
+        Environments are ordered by group; there is a step limit.
+        """
+        assert self.step_limit is not None
+        group, members = self.choice.groups, self.choice.members
+        envs = torch.bincount(group, minlength=len(members))
+        place = torch.arange(len(group), device=self.world.device) - (envs.cumsum(0) - envs)[group]
+        counts = (self.choice.weights > 0).sum(1)
+        self.reset(target=members[group, place % counts[group]])
+        self.elapsed = (self.start_stream.uniform() * self.step_limit).long()
 
     def restart(self, ended: Tensor) -> None:
         """Begin new episodes where `ended` (N,) is True, as `reset` does, without telling the host where that is.

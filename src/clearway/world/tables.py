@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -23,8 +24,8 @@ from clearway.reward import Moves
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import Scene
-from clearway.world.feature_store import LARGEST_FLOAT16, empty_store
-from clearway.world.targets import Starts, checked_states, starts_to
+from clearway.world.feature_store import joined_features
+from clearway.world.targets import NO_TARGETS, Walked, target_tables
 from clearway.zones import scene_zones
 
 
@@ -112,30 +113,14 @@ class World:
             SceneError: a scene is not there, or a target is no state id, out of range, repeated or out of reach.
         """
         _check_names(self.scene_names, targets)
-        starts: list[Starts] = []
-        state, scene = [], []
-        for index, name in enumerate(self.scene_names):
-            if name not in targets:
-                continue
-            first, last = self.scene_offset[index : index + 2].tolist()
-            own = checked_states(name, targets[name], last - first)
-            starts += starts_to(name, self.graph(index), own, first, int(self.largest_part[index]))
-            state += [first + one for one in own]
-            scene += [index] * len(own)
-        count = np.array([len(one.state) for one in starts], np.int64)
+        walked = [self._walked(index) for index, name in enumerate(self.scene_names) if name in targets]
+        found = target_tables(walked, targets).items()
+        tables: dict[str, Any] = {name: torch.from_numpy(table).to(self.device) for name, table in found}
+        return replace(self, **tables)
 
-        def table(values: np.ndarray) -> Tensor:
-            return torch.from_numpy(values).to(self.device)
-
-        return replace(
-            self,
-            target_state=table(np.array(state, np.int64)),
-            target_scene=table(np.array(scene, np.int64)),
-            start_state=table(np.concatenate([one.state for one in starts])),
-            start_steps=table(np.concatenate([one.steps for one in starts])),
-            start_offset=table(np.cumsum(count) - count),
-            start_count=table(count),
-        )
+    def _walked(self, index: int) -> Walked:
+        first = int(self.scene_offset[index])
+        return Walked(index, self.scene_names[index], self.graph(index), first, int(self.largest_part[index]))
 
     def scene_state(self, target: int) -> int:
         """The target's state in its own scene's numbering."""
@@ -175,7 +160,7 @@ class DistanceTable:
 
 def make_world(
     scenes: Sequence[Scene],
-    targets: Mapping[str, Sequence[int]],
+    targets: Mapping[str, Sequence[int]] | None,
     zone_level: ZoneLevel = "pose",
     feature_store: FeatureStore = "memory",
 ) -> World:
@@ -183,7 +168,7 @@ def make_world(
 
     Args:
         scenes: scenes with distinct names.
-        targets: state ids of each scene's targets by scene name, in the scene's own numbering.
+        targets: state ids of each scene's targets by scene name, in the scene's own numbering; None: no targets.
         zone_level: whether zones are those of poses or of cells.
         feature_store: where to keep the features; features that lie in files are read scene by scene.
 
@@ -193,39 +178,39 @@ def make_world(
             the store.
         RunError: there is no room for the features.
     """
-    names = [scene.name for scene in scenes]
+    names = tuple(scene.name for scene in scenes)
     _check_distinct(names)
-    _check_names(names, targets)
-    for name in names:
-        checked_states(name, targets.get(name, ()), scenes[names.index(name)].state_count)
-    return scene_tables(scenes, zone_level, feature_store).with_targets(targets)
+    largest = [int(np.count_nonzero(scene.components == 0)) for scene in scenes]
+    offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
+    graph = np.concatenate([_shifted(scene.graph, first) for scene, first in zip(scenes, offset, strict=False)])
+    if targets is None:
+        found = NO_TARGETS
+    else:
+        _check_names(names, targets)
+        walked = [
+            Walked(index, scene.name, scene.graph, int(offset[index]), largest[index])
+            for index, scene in enumerate(scenes)
+        ]
+        found = target_tables(walked, targets)  # before features are read, which may take long
+    return World(
+        scene_names=names,
+        scene_offset=torch.from_numpy(offset),
+        next_state=torch.from_numpy(next_states(graph)),
+        blocked=torch.from_numpy(graph == BLOCKED),
+        largest_part=torch.tensor(largest),
+        features=joined_features(scenes, feature_store),
+        feature_store=feature_store,
+        zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
+        clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
+        **{name: torch.from_numpy(table) for name, table in found.items()},
+    )
 
 
 def scene_tables(
     scenes: Sequence[Scene], zone_level: ZoneLevel = "pose", feature_store: FeatureStore = "memory"
 ) -> World:
     """The tables of some scenes, without targets; arguments and errors as of `make_world`."""
-    _check_distinct([scene.name for scene in scenes])
-    offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
-    graph = np.concatenate([_shifted(scene.graph, first) for scene, first in zip(scenes, offset, strict=False)])
-    none = torch.empty(0, dtype=torch.int64)
-    return World(
-        scene_names=tuple(scene.name for scene in scenes),
-        scene_offset=torch.from_numpy(offset),
-        next_state=torch.from_numpy(next_states(graph)),
-        blocked=torch.from_numpy(graph == BLOCKED),
-        zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
-        clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
-        largest_part=torch.tensor([np.count_nonzero(scene.components == 0) for scene in scenes]),
-        features=_joined_features(scenes, feature_store),
-        target_state=none,
-        target_scene=none,
-        start_state=none,
-        start_steps=none,
-        start_offset=none,
-        start_count=none,
-        feature_store=feature_store,
-    )
+    return make_world(scenes, None, zone_level, feature_store)
 
 
 def _shifted(graph: np.ndarray, first: int) -> np.ndarray:
@@ -243,32 +228,3 @@ def _check_names(names: Sequence[str], targets: Mapping[str, Sequence[int]]) -> 
         if name not in names:
             problem = "targets are given for this scene, which is not among the scenes"
             raise SceneError(name, problem, f"Name targets of {', '.join(names)} alone, or add the scene")
-
-
-def _joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | None:
-    """The scenes' features one after the other, (S, F), or None where they have none."""
-    if all(scene.features is None for scene in scenes):
-        return None
-    first = scenes[0]
-    for scene in scenes:
-        if scene.features is None or first.features is None:
-            raise SceneError(scene.name, "only some of the scenes have features", "Encode all scenes together")
-        if scene.features.shape[1] != first.features.shape[1]:
-            sizes = f"{scene.features.shape[1]} features a state, {first.name} has {first.features.shape[1]}"
-            raise SceneError(scene.name, sizes, "Encode all scenes with the same encoder", "resnet_feature")
-        if _identity(scene) != _identity(first):
-            problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
-            raise SceneError(scene.name, problem, "Encode all scenes together with one encoder", "resnet_feature")
-    assert first.features is not None
-    joined = empty_store(sum(scene.state_count for scene in scenes), first.features.shape[1], store)
-    for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
-        features = np.asarray(scene.features, np.float32)
-        if store == "float16" and np.abs(features).max() > LARGEST_FLOAT16:
-            problem = f"holds features beyond {LARGEST_FLOAT16:,.0f}, the largest of float16"
-            raise SceneError(scene.name, problem, "Keep features in another store, mapped", "resnet_feature")
-        rows.numpy()[:] = features
-    return joined
-
-
-def _identity(scene: Scene) -> str:
-    return f"{scene.encoder.name} ({scene.encoder.identity})" if scene.encoder else "an unknown encoder"

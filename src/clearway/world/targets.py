@@ -1,11 +1,11 @@
-"""Targets of a scene and where episodes to them start; the rule of starts stands here alone.
+"""Targets of scenes and where episodes to them start; the rule of starts stands here alone.
 
 Axis letters: S states of a scene, A actions, K starts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
 
@@ -36,26 +36,72 @@ class Starts:
         return cls(state, steps[state].astype(np.int64))
 
 
-def starts_to(name: str, graph: np.ndarray, targets: Sequence[int], first: int, largest_part: int) -> list[Starts]:
-    """The starts of each target of a scene.
+@dataclass(frozen=True)
+class Walked:
+    """A scene that is walked in, as finding starts needs it.
 
-    Args:
+    Attributes:
+        index: its place among the scenes.
         name: of the scene, for errors.
         graph: (S, A) int, next state by action; -1 where a move is blocked.
-        targets: states.
-        first: is added to the states found.
-        largest_part: states of the scene's largest strongly connected component.
+        first: the number of its first state among those of all scenes.
+        largest_part: states of its largest strongly connected component.
+    """
+
+    index: int
+    name: str
+    graph: np.ndarray
+    first: int
+    largest_part: int
+
+
+NO_TARGETS = {
+    name: np.zeros(0, np.int64)
+    for name in ("target_state", "target_scene", "start_state", "start_steps", "start_offset", "start_count")
+}
+
+
+def target_tables(scenes: Sequence[Walked], targets: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
+    """The tables of targets and starts, named and shaped as in `World`.
+
+    Args:
+        scenes: those with targets, ascending.
+        targets: state ids by scene name, in the scene's own numbering.
+
+    Raises:
+        SceneError: a scene has none, or a target is no state id, out of range, repeated or out of reach.
+    """
+    state, place = [], []
+    starts: list[Starts] = []
+    for scene in scenes:
+        own = checked_states(scene.name, targets.get(scene.name, ()), len(scene.graph))
+        starts += starts_to(scene, own)
+        state += [scene.first + one for one in own]
+        place += [scene.index] * len(own)
+    count = np.array([len(one.state) for one in starts], np.int64)
+    return {
+        "target_state": np.array(state, np.int64),
+        "target_scene": np.array(place, np.int64),
+        "start_state": np.concatenate([one.state for one in starts]),
+        "start_steps": np.concatenate([one.steps for one in starts]),
+        "start_offset": np.cumsum(count) - count,
+        "start_count": count,
+    }
+
+
+def starts_to(scene: Walked, targets: Sequence[int]) -> list[Starts]:
+    """The starts of each target of a scene, in the numbering of all scenes.
 
     Raises:
         SceneError: a target is reached from less than `LEAST_SHARE` of the largest component.
     """
     found = []
-    for target, steps in zip(targets, distances_to(graph, np.asarray(targets)), strict=True):
+    for target, steps in zip(targets, distances_to(scene.graph, np.asarray(targets)), strict=True):
         starts = Starts.of(steps)
-        if len(starts.state) < max(1, LEAST_SHARE * (largest_part - 1)):
-            problem = f"only {len(starts.state)} of {len(graph)} states lead to target {target}"
-            raise SceneError(name, problem, "Choose a target in the scene's largest component", "graph")
-        found.append(Starts(starts.state + first, starts.steps))
+        if len(starts.state) < max(1, LEAST_SHARE * (scene.largest_part - 1)):
+            problem = f"only {len(starts.state)} of {len(scene.graph)} states lead to target {target}"
+            raise SceneError(scene.name, problem, "Choose a target in the scene's largest component", "graph")
+        found.append(Starts(starts.state + scene.first, starts.steps))
     return found
 
 

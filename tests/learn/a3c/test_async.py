@@ -24,7 +24,7 @@ from clearway.learn.figures import Figures
 from clearway.learn.load import load_agent
 from clearway.learn.named_tensors import part_of
 from clearway.learn.presets import PAPER_A3C
-from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
 from helpers.agents import told_after
@@ -39,7 +39,8 @@ def a3c_request(frames: int) -> RunRequest:
 
 
 def async_trainer(frames: int, processes: int) -> AsyncTrainer:
-    return AsyncTrainer(small_world(), a3c_request(frames).learner, COLLISION_AWARE, 3, processes)
+    request = a3c_request(frames)
+    return AsyncTrainer(small_world(), request.learner, request.paid, 3, processes)
 
 
 def children_of(process: int) -> list[int]:
@@ -101,11 +102,12 @@ def test_one_process_learns_and_counts_what_plain_a3c_does(monkeypatch: pytest.M
     monkeypatch.setattr(statistics, "WINDOW", 1)
     learner = small_learner(PAPER_A3C, frames=300, rollout_steps=5, step_limit=200, lr_start=0.05, centre_features=True)
     world = small_world()
-    with closing(AsyncTrainer(world, learner, COLLISION_AWARE, 3)) as trainer:
+    reward = learner.paid(COLLISION_AWARE)
+    with closing(AsyncTrainer(world, learner, reward, 3)) as trainer:
         while not trainer.finished:
             trainer.update()
     prepared = replace(world, features=trainer.feature_map(world.features))
-    plain = PlainA3C(prepared, learner, COLLISION_AWARE, 3, workers=[0, 5, 1, 6, 2, 7, 3, 8, 4, 9])
+    plain = PlainA3C(prepared, learner, reward, 3, workers=[0, 5, 1, 6, 2, 7, 3, 8, 4, 9])
     plain.begin(small_network(world, seed=3))
     frames = 0
     while frames < learner.frames:
@@ -200,8 +202,9 @@ def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -
     assert are_gone_soon(workers)
     trainer = a3c_request(10_000_000).trainer()
     folder = RunFolder(tmp_path)
+    other_bits = folder.begin(record_of(a3c_request(10_000_000)), resume=True)
     with pytest.warns(UserWarning, match="threads 1 instead of 2"):
-        train._prepare(folder, a3c_request(10_000_000).record(), trainer, resume=True)
+        train._resumed(trainer, folder, other_bits)
     assert trainer.frames == read_progress(newest_checkpoint(folder.checkpoints)).frames > 0
 
 

@@ -24,13 +24,13 @@ def group_of(workers: list[int], learner: A3C, seed: int = 4) -> WorkerGroup:
     world = small_world()
     parameters = {name: p.data.clone() for name, p in small_network(world).named_parameters()}
     squares = {name: torch.full_like(p, 1 + EPSILON) for name, p in parameters.items()}
-    return WorkerGroup(world, learner, COLLISION_AWARE, seed, torch.tensor(workers), parameters, squares)
+    return WorkerGroup(world, learner, learner.paid(COLLISION_AWARE), seed, torch.tensor(workers), parameters, squares)
 
 
 def check_against_plain(workers: list[int], learner: A3C, rounds: int) -> list[int]:
     """Both must agree after every round; returns the frames of each round."""
     world, group = small_world(), group_of(workers, learner)
-    plain = PlainA3C(world, learner, COLLISION_AWARE, 4, workers)
+    plain = PlainA3C(world, learner, learner.paid(COLLISION_AWARE), 4, workers)
     plain.begin(small_network(world))
     frames, used = 0, []
     for _ in range(rounds):

@@ -109,7 +109,7 @@ class WorkerGroup:
         seeds = workers + (seed << 32)
         self.navigation = Navigation(
             world,
-            learner.paid(reward),
+            reward,
             seeds,
             step_limit=learner.step_limit,
             history_length=learner.history_length,

@@ -26,7 +26,6 @@ from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import EPSILON
-from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import network_input
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -54,7 +53,6 @@ class AsyncTrainer:
     """
 
     def __init__(self, world: World, learner: A3C, reward: Reward, seed: int, processes: int = 1) -> None:
-        check_seed(seed)
         if world.device.type != "cpu":
             raise RunError(f"a3c on the device {world.device}, expected cpu. Leave out --device")
         if learner.envs < world.target_count:
