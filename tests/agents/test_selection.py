@@ -1,12 +1,14 @@
 """Ways of choosing actions: an agent that walks in circles under argmax gets out of them by its untried actions."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 import torch
 
 from clearway.agents.agent import POSE, Decisions
 from clearway.agents.by_pose import RandomWalk, shortest_paths
-from clearway.agents.selection import Argmax, ArgmaxUntried, most_probable, selecting
+from clearway.agents.selection import ActionSelection, Argmax, ArgmaxUntried, most_probable, selecting
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.protocol import evaluate_agents
@@ -93,6 +95,23 @@ def test_argmax_takes_the_first_of_equals_and_is_certain_of_it():
     taken = most_probable(decisions)
     assert taken.action.tolist() == [1, 2] and taken.certain.all()
     assert taken.value is decisions.value and taken.probabilities is decisions.probabilities
+
+
+class Strict(RandomWalk):
+    """Takes nothing but what it gave."""
+
+    def reset(self, target, seed):
+        assert not target
+        return super().reset(target, seed)
+
+    def act(self, observation, state):
+        assert not observation and set(state) == set(super().reset({}, np.array([0])))
+        return super().act(observation, state)
+
+
+def test_the_other_agent_is_given_what_it_sees_and_its_own_memory_alone(world):
+    for selection in get_args(ActionSelection):
+        assert len(run_episodes(world, Strict(), selection=selection, episodes_per_target=2, step_cap=9)) == 10
 
 
 class Silent(RandomWalk):

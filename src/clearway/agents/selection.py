@@ -75,12 +75,12 @@ class ArgmaxUntried:
         """See `Agent.reset`."""
         scene = np.searchsorted(self._first, target[POSE], side="right") - 1
         tried = np.zeros((len(seed), np.diff(self._first).max()), np.uint8)  # a bit an action
-        return {**self._agent.reset(target, seed), _FIRST: self._first[scene], _TRIED: tried}
+        return {**self._agent.reset(self._its_own(target), seed), _FIRST: self._first[scene], _TRIED: tried}
 
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """See `Agent.act`."""
         others = {name: values for name, values in state.items() if name not in (_FIRST, _TRIED)}
-        decisions, after = self._agent.act(observation, others)
+        decisions, after = self._agent.act(self._its_own(observation), others)
         place = np.arange(len(state[_TRIED])), observation[POSE] - state[_FIRST]
         before = state[_TRIED][place]
         was_tried = (before[:, None] >> _BIT & 1).astype(bool)
@@ -89,6 +89,10 @@ class ArgmaxUntried:
         tried = state[_TRIED].copy()
         tried[place] = np.where(now == _ALL_TRIED, 0, now)
         return replace(decisions, action=action, certain=None), {**after, _FIRST: state[_FIRST], _TRIED: tried}
+
+    def _its_own(self, seen: Observation) -> Observation:
+        """What the other agent sees of it."""
+        return {name: values for name, values in seen.items() if name != POSE or POSE in self._agent.sees}
 
 
 def most_probable(decisions: Decisions) -> Decisions:
