@@ -25,7 +25,7 @@ from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import Scene
 from clearway.world.feature_store import joined_features
-from clearway.world.targets import NO_TARGETS, Walked, target_tables
+from clearway.world.targets import NO_TARGETS, WalkedScene, target_tables
 from clearway.zones import scene_zones
 
 
@@ -118,9 +118,9 @@ class World:
         tables: dict[str, Any] = {name: torch.from_numpy(table).to(self.device) for name, table in found}
         return replace(self, **tables)
 
-    def _walked(self, index: int) -> Walked:
+    def _walked(self, index: int) -> WalkedScene:
         first = int(self.scene_offset[index])
-        return Walked(index, self.scene_names[index], self.graph(index), first, int(self.largest_part[index]))
+        return WalkedScene(index, self.scene_names[index], self.graph(index), first, int(self.largest_part[index]))
 
     def scene_state(self, target: int) -> int:
         """The target's state in its own scene's numbering."""
@@ -188,7 +188,7 @@ def make_world(
     else:
         _check_names(names, targets)
         walked = [
-            Walked(index, scene.name, scene.graph, int(offset[index]), largest[index])
+            WalkedScene(index, scene.name, scene.graph, int(offset[index]), largest[index])
             for index, scene in enumerate(scenes)
         ]
         found = target_tables(walked, targets)  # before features are read, which may take long

@@ -37,7 +37,7 @@ class Starts:
 
 
 @dataclass(frozen=True)
-class Walked:
+class WalkedScene:
     """A scene that is walked in, as finding starts needs it.
 
     Attributes:
@@ -61,7 +61,7 @@ NO_TARGETS = {
 }
 
 
-def target_tables(scenes: Sequence[Walked], targets: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
+def target_tables(scenes: Sequence[WalkedScene], targets: Mapping[str, Sequence[int]]) -> dict[str, np.ndarray]:
     """The tables of targets and starts, named and shaped as in `World`.
 
     Args:
@@ -89,7 +89,7 @@ def target_tables(scenes: Sequence[Walked], targets: Mapping[str, Sequence[int]]
     }
 
 
-def starts_to(scene: Walked, targets: Sequence[int]) -> list[Starts]:
+def starts_to(scene: WalkedScene, targets: Sequence[int]) -> list[Starts]:
     """The starts of each target of a scene, in the numbering of all scenes.
 
     Raises:
