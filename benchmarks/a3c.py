@@ -36,7 +36,7 @@ import torch
 from throughput import FEATURES, PlainNetwork, device_name, made_up_world
 from torch import Tensor
 
-from clearway.learn.a3c.trainer import AsyncTrainer
+from clearway.learn.a3c.parent import AsyncTrainer
 from clearway.learn.presets import PAPER_A3C
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.model.network import OUTPUTS
@@ -44,7 +44,7 @@ from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.navigation import Navigation
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 LEARNER = replace(PAPER_A3C, frames=10**9)  # no schedule ends during a benchmark
 ALPHA, EPSILON = 0.99, 0.1

@@ -11,7 +11,7 @@ from clearway.agents.by_pose import PoseAgent, network_on_poses
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import SC_STEPS
 from clearway.evaluation.quality import Criteria, Quality, quality
-from clearway.evaluation.report import Evaluation, Protocol, summarise
+from clearway.evaluation.summary import Evaluation, Protocol, summarise
 from clearway.learn.train import Learning, RunRequest
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -108,7 +108,7 @@ def learning_curve(
             trainer.world,
             agent_of(trainer),
             episodes_per_target=final.episodes_per_target,
-            step_cap=final.step_cap,
+            step_limit=final.step_limit,
             seed=final.seed,
         )
         evaluation = summarise(trainer.world, table, request.reward.name, encoder, final)
@@ -120,7 +120,7 @@ def _checked(trainer: Learning, episodes: int) -> Quality:
         trainer.world,
         agent_of(trainer),
         episodes_per_target=episodes,
-        step_cap=SC_STEPS,
+        step_limit=SC_STEPS,
         seed=CHECK_SEED,
     )
     return quality(trainer.world, table)

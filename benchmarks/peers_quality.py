@@ -22,7 +22,7 @@ from clearway.model.lookup import LookupNetwork
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 @dataclass(frozen=True)

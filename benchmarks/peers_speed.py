@@ -21,7 +21,7 @@ from clearway.learn.on_policy import OnPolicy
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 A2C_LIKE = replace(
     carried_over(ON_PREPARED, algorithms.A2C), frames=ENDLESS, hindsight=False, lookahead=0.0, feature_basis=0

@@ -8,7 +8,7 @@
 The criteria: every target solved (each of its sampled episodes from random starts ends at it in under 500 steps), steps
 of all targets together at most 5 % above the shortest paths from the same starts, of no target above 15 %, fewer than
 0.05 collisions an episode. The table judges the agent at the end of its training by the paper's protocol: 100 episodes
-a target, at most `--step-cap` steps. Means are those of all tables: over scenes, of their targets' means.
+a target, at most `--step-limit` steps. Means are those of all tables: over scenes, of their targets' means.
 
 Seconds to a criterion: the agent is looked at every `--every` frames, on `--episodes` episodes a target, with the clock
 stopped; the first look at which the criterion is met counts. The clock counts making the trainer and its updates, not
@@ -40,11 +40,11 @@ from throughput import device_name, matrix_peak
 
 from clearway.cli.arguments import scene_files
 from clearway.errors import ClearwayError
-from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.evaluation.metrics import average, by_scene
 from clearway.evaluation.optimum import world_yardsticks
 from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT
-from clearway.evaluation.report import Protocol
+from clearway.evaluation.summary import Protocol
 from clearway.files import written_whole
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import PRESETS
@@ -55,7 +55,7 @@ from clearway.perception import encode_scenes
 from clearway.reward import REWARDS, Reward
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, seeded_targets
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 
 ROOMS = "rooms"
 SHOWN_VERSIONS = ("python", "clearway", "torch", "numpy")
@@ -131,7 +131,7 @@ class Bench:
             encoder_names(self.scenes),
             every_frames=options.every,
             check_episodes=options.episodes,
-            final=Protocol(EPISODES_PER_TARGET, options.step_cap, FINAL_SEED, "sampled"),
+            final=Protocol(EPISODES_PER_TARGET, options.step_limit, FINAL_SEED, "sampled"),
             show=show,
         )
 
@@ -147,7 +147,7 @@ class Bench:
             "criteria": asdict(CRITERIA),
             "every_frames": self.options.every,
             "check_episodes": self.options.episodes,
-            "step_cap": self.options.step_cap,
+            "step_limit": self.options.step_limit,
             "device": device_name(self.options.device),
             "hardware": hardware(),
             "versions": package_versions(),
@@ -184,7 +184,7 @@ def footnote(bench: Bench, peaks: Sequence[float]) -> str:
     machine = hardware()
     return (
         f"`{found['command']}`. Scenes: {counts}; features: {found['encoder']}; reward: {bench.reward.name}. "
-        f"{EPISODES_PER_TARGET} episodes a target of at most {bench.options.step_cap:,} steps; until then looked at "
+        f"{EPISODES_PER_TARGET} episodes a target of at most {bench.options.step_limit:,} steps; until then looked at "
         f"every {bench.options.every:,} frames on {bench.options.episodes} episodes a target. "
         f"{found['device']}, {machine['cores']} cores, {machine['threads']} threads, {machine['system']}; {shown}. "
         f"Matrix-product peak {max(peaks):,.0f} GFLOP/s (between seeds {min(peaks):,.0f} to {max(peaks):,.0f})."
@@ -226,7 +226,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--set", nargs="+", default=[], metavar="NAME=VALUE", help="settings of the preset's algorithm")
     parser.add_argument("--every", type=at_least_one, default=50_000, help="frames between looks (default %(default)s)")
     parser.add_argument("--episodes", type=at_least_one, default=25, help="a target, for a look (default %(default)s)")
-    parser.add_argument("--step-cap", type=at_least_one, default=STEP_CAP, help="of the last evaluation's episodes")
+    parser.add_argument("--step-limit", type=at_least_one, default=STEP_LIMIT, help="of the last evaluation's episodes")
     parser.add_argument("--show-checks", action="store_true", help="print every look to standard error")
     parser.add_argument("--threads", type=at_least_one, help="of torch, or processes of a3c; default: torch's choice")
     parser.add_argument("--device", default="cpu")

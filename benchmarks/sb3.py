@@ -30,7 +30,7 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 Observation = dict[str, np.ndarray]
 VEC_ENVS = ("dummy", "subproc", "batched")

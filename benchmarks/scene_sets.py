@@ -17,7 +17,7 @@ from clearway.rooms.library import cached_room_scene
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 from clearway.scenes.thor_v1 import read_scene
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 
 ENCODER = "random-resnet50"
 ON_PREPARED = replace(DEFAULT, centre_features=False, whiten_features=False)  # the default learner on `prepared` scenes

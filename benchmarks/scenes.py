@@ -50,7 +50,7 @@ from clearway.reward import COLLISION_AWARE
 from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.targets import seeded_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 
 FEW_ROOMS = 4
 BLOCKED_SHARE = 0.2

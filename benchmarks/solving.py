@@ -12,7 +12,7 @@ from clearway.agents.agent import Agent
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, run_episodes
 from clearway.evaluation.metrics import SC_STEPS
 from clearway.evaluation.quality import quality
-from clearway.world.tables import World
+from clearway.world.world import World
 
 CHECK_SEED = 1
 SCREENING_EPISODES = 5  # a target; the rest is walked only where these show no failure
@@ -22,7 +22,7 @@ PAUSE_SHARE = 0.05  # of the training time so far: the precision of the answer
 
 def solved_count(world: World, agent: Agent, episodes: int = EPISODES_PER_TARGET) -> int:
     """How many targets are solved."""
-    table = run_episodes(world, agent, episodes_per_target=episodes, step_cap=SC_STEPS, seed=CHECK_SEED)
+    table = run_episodes(world, agent, episodes_per_target=episodes, step_limit=SC_STEPS, seed=CHECK_SEED)
     return quality(world, table).solved_targets
 
 

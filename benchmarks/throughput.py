@@ -76,7 +76,7 @@ from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.targets import seeded_targets
 from clearway.world.navigation import Navigation, TargetChoice
 from clearway.world.streams import Streams
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 
 STATES = (180, 408, 468, 676)
 FEATURES = 2048

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from clearway.view.episode import Episode
-from clearway.view.session import Session
 from clearway.view.stage import run_stage
+from clearway.view.viewing import Viewing
 
 SIDE = 50  # cells; four headings each
 FEATURES = 2048
@@ -36,7 +36,7 @@ def main() -> None:
         clearway("train", folder / "hall.h5", "--out", folder / "run", "--frames", 8_000)
         stage = run_stage([folder / "run"])
         poses = stage.scenes[0].state_count
-        session, took_ms = Session(stage), []
+        session, took_ms = Viewing(stage), []
         for target in np.random.default_rng(0).integers(poses, size=EPISODES).tolist():
             begun = time.perf_counter()
             session.begin(Episode(target=target))

@@ -84,7 +84,7 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
         "evaluate runs/rooms --targets": "evaluate runs/rooms --episodes 5 --targets",
-        "--step-cap 40": "--step-cap 3",
+        "--step-limit 40": "--step-limit 3",
         "--scene kitchen --out episode.mp4": "--scene bathroom --out episode.mp4",
         "--scene kitchen --out kitchen.onnx": "--scene bathroom --out kitchen.onnx",
         "clearway serve kitchen.onnx ": f"{UNTIL_STOPPED}serve kitchen.onnx || test $? = 124 ",

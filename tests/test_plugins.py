@@ -12,7 +12,7 @@ import clearway
 from clearway.cli.imports.command import ImportScenes
 from clearway.cli.imports.plugin import ImportPlugin
 from clearway.deploy.export import export_onnx
-from clearway.deploy.from_run import load_scene_agent
+from clearway.deploy.from_run import load_run_in_scene
 from clearway.errors import EncoderError, PluginError
 from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
@@ -124,7 +124,7 @@ def test_its_algorithm_trains_for_its_reward_and_its_agent_walks_beside(package,
     words = ("train", tmp_path / "grid.h5", "--out", tmp_path / "run", *chosen)
     trained = clearway_with(package, words=words, cache=tmp_path / "cache")
     assert trained.returncode == 0, trained.stderr
-    words = ("evaluate", tmp_path / "run", "--beside", "still", "--episodes", "3", "--step-cap", "20", "--json")
+    words = ("evaluate", tmp_path / "run", "--beside", "still", "--episodes", "3", "--step-limit", "20", "--json")
     evaluated = clearway_with(package, words=words, cache=tmp_path / "cache")
     assert evaluated.returncode == 0, evaluated.stderr
     first, *others = [json.loads(evaluated.stdout), *json.loads(evaluated.stdout)["others"]]
@@ -239,5 +239,5 @@ def test_an_agent_that_sees_by_it_acts_from_its_run_folder_but_cannot_be_exporte
     navigator.set_target(scenes[0].observations[5])
     assert navigator.act(scenes[0].observations[9]).probabilities.shape == (4,)
     with pytest.raises(EncoderError, match="is another package's, which a file cannot hold"):
-        export_onnx(load_scene_agent(run.folder), tmp_path / "agent.onnx")
+        export_onnx(load_run_in_scene(run.folder), tmp_path / "agent.onnx")
     assert not (tmp_path / "agent.onnx").exists()

@@ -14,7 +14,7 @@ from clearway.scenes.actions import Action
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import check_scene
 from clearway.world.navigation import Navigation
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from clearway.zones import Zone, cell_zones, pose_zones
 
 MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)

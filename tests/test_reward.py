@@ -22,7 +22,7 @@ from clearway.reward import (
     reward_from_json,
     reward_named,
 )
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.made import corridor_scene
 
 NOT_REACHED, REACHED = 0, 1

@@ -15,7 +15,7 @@ from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.learn.q_learning import QLearning, TrainedTable
 from clearway.learn.run_folder import record_of
 from clearway.reward import COLLISION_AWARE
-from clearway.world.tables import World
+from clearway.world.world import World
 from helpers.agents import alike, by_rule, check_agent, equal
 from helpers.small_runs import small_learner, small_request, small_world, trained_network
 

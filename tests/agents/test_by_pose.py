@@ -7,7 +7,7 @@ import torch
 from clearway.agents.agent import POSE
 from clearway.agents.by_pose import PoseAgent, RandomWalk, by_table, network_on_poses, shortest_paths
 from clearway.model.lookup import LookupNetwork
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.agents import after_poses, told_after
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import small_network, small_world

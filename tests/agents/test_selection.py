@@ -13,7 +13,7 @@ from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.protocol import evaluate_agents
 from clearway.scenes.actions import Action
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.agents import alike, arbitrary, by_rule
 from helpers.made import corridor_scene, grid_scene
 
@@ -111,7 +111,7 @@ class Strict(RandomWalk):
 
 def test_the_other_agent_is_given_what_it_sees_and_its_own_memory_alone(world):
     for selection in get_args(ActionSelection):
-        assert len(run_episodes(world, Strict(), selection=selection, episodes_per_target=2, step_cap=9)) == 10
+        assert len(run_episodes(world, Strict(), selection=selection, episodes_per_target=2, step_limit=9)) == 10
 
 
 class Silent(RandomWalk):
@@ -126,7 +126,7 @@ def test_an_agent_that_tells_no_probabilities_cannot_be_asked_for_the_most_proba
     for selection in ("argmax", "argmax-untried"):
         with pytest.raises(AgentError, match=r"tells no probabilities, which argmax goes by\. Let it choose by itself"):
             run_episodes(world, Silent(), selection=selection, episodes_per_target=1)
-    assert len(run_episodes(world, Silent(), episodes_per_target=2, step_cap=9)) == 10
+    assert len(run_episodes(world, Silent(), episodes_per_target=2, step_limit=9)) == 10
 
 
 def test_a_selection_sees_what_its_agent_sees_and_the_pose_where_it_needs_it(world):
@@ -141,7 +141,7 @@ def test_a_walk_typed_in():
     # leads through 1, 2, 3 back to 0; there forward is next. Start and target are fixed by leaving nothing else.
     world = make_world([corridor_scene(2)], {"corridor": [4]})
     table = run_episodes(
-        world, by_rule(world, TURNING), selection="argmax-untried", episodes_per_target=60, record=True, step_cap=100
+        world, by_rule(world, TURNING), selection="argmax-untried", episodes_per_target=60, record=True, step_limit=100
     )
     assert table.reached.all()
     walk = next(walk for walk in table.trajectories if walk.states[0] == 0)
@@ -193,7 +193,7 @@ def test_argmax_as_a_selection_is_the_argmax_agent(world):
 
 
 def test_sampling_never_counts_as_a_loop_and_a_failure_need_not_be_one(world):
-    table = run_episodes(world, RandomWalk(), episodes_per_target=30, step_cap=20)
+    table = run_episodes(world, RandomWalk(), episodes_per_target=30, step_limit=20)
     assert not table.reached.all() and not table.looped.any()
 
 

@@ -2,7 +2,7 @@ import pytest
 
 import clearway
 from clearway.errors import ArgumentError
-from clearway.evaluation.run import evaluate_run
+from clearway.evaluation.runs import evaluate_run
 from clearway.files import read_json
 from clearway.learn.load import run_scenes
 from clearway.scenes.thor_v1 import write_scene
@@ -21,9 +21,9 @@ def trained(tmp_path_factory):
 
 def test_it_is_the_command_s_evaluation_of_a_folder_an_agent_or_a_training(trained) -> None:
     agent = clearway.load_agent(trained.folder)
-    expected = evaluate_run(agent, run_scenes(agent.record), episodes_per_target=4, step_cap=50, seed=1)
+    expected = evaluate_run(agent, run_scenes(agent.record), episodes_per_target=4, step_limit=50, seed=1)
     for run in (trained, trained.agent, trained.folder, str(trained.folder)):
-        found = clearway.evaluate(run, episodes=4, step_cap=50, seed=1)
+        found = clearway.evaluate(run, episodes=4, step_limit=50, seed=1)
         assert [one.to_json() for one in found.evaluations] == [one.to_json() for one in expected]
     assert found.figures == expected[0].average.values
     assert found.intervals == expected[0].average.intervals
@@ -32,16 +32,16 @@ def test_it_is_the_command_s_evaluation_of_a_folder_an_agent_or_a_training(train
 
 def test_scenes_in_memory_need_not_be_named_again() -> None:
     trained = clearway.train(corridor_scene(5, feature_count=FEATURES), [16], **SMALL)
-    assert clearway.evaluate(trained, episodes=2, step_cap=9).scenes == trained.scenes
+    assert clearway.evaluate(trained, episodes=2, step_limit=9).scenes == trained.scenes
     with pytest.raises(clearway.ClearwayError, match="the run's scene file is missing"):
-        clearway.evaluate(trained.agent, episodes=2, step_cap=9)
-    assert clearway.evaluate(trained.agent, trained.scenes, episodes=2, step_cap=9).scenes == trained.scenes
+        clearway.evaluate(trained.agent, episodes=2, step_limit=9)
+    assert clearway.evaluate(trained.agent, trained.scenes, episodes=2, step_limit=9).scenes == trained.scenes
     with pytest.raises(clearway.ClearwayError, match="not the scene that the run was trained on"):
         clearway.evaluate(trained, grid_scene(2, feature_count=FEATURES, name="corridor"))
 
 
 def test_its_tables_and_files(trained, tmp_path, capfd) -> None:
-    result = clearway.evaluate(trained, episodes=3, step_cap=20)
+    result = clearway.evaluate(trained, episodes=3, step_limit=20)
     assert result.markdown().startswith("| agent | solved | steps |") and "shortest path" in result.markdown()
     assert result.markdown("targets").startswith("| scene | agent |") and "target 16" in result.markdown("targets")
     assert "collision-aware" in result.text() and "\x1b" not in result.text()
@@ -60,7 +60,7 @@ def test_its_tables_and_files(trained, tmp_path, capfd) -> None:
     [
         ({"agent": 5}, r"agent=5: expected a run folder, an \.onnx file, what train returned, or an agent"),
         ({"episodes": 0}, "episodes=0"),
-        ({"step_cap": 2.5}, r"step_cap=2\.5"),
+        ({"step_limit": 2.5}, r"step_limit=2\.5"),
         ({"seed": "1"}, "seed='1'"),
         ({"scenes": 7}, "scenes=7"),
     ],

@@ -17,7 +17,7 @@ from clearway.plugins import BUILT_IN
 from clearway.scenes.actions import Action
 from helpers.made import corridor_scene, grid_scene
 
-SHORT = {"episodes": 2, "step_cap": 30}
+SHORT = {"episodes": 2, "step_limit": 30}
 
 
 class Turner:
@@ -135,12 +135,12 @@ def test_the_named_agents_are_those_that_there_are() -> None:
 
 def test_the_scene_of_an_exported_agent_is_asked_for(scene, tmp_path: Path) -> None:
     from clearway.deploy.export import export_onnx
-    from clearway.deploy.from_run import load_scene_agent
+    from clearway.deploy.from_run import load_run_in_scene
     from clearway.scenes.thor_v1 import write_scene
 
     write_scene(scene, tmp_path / "grid.h5")
     run = clearway.train(tmp_path / "grid.h5", targets=[5, 22], frames=400, envs=10, width=16, out=tmp_path / "run")
-    export_onnx(load_scene_agent(tmp_path / "run"), tmp_path / "agent.onnx", with_encoder=False)
+    export_onnx(load_run_in_scene(tmp_path / "run"), tmp_path / "agent.onnx", with_encoder=False)
     exported = clearway.evaluate(tmp_path / "agent.onnx", tmp_path / "grid.h5", **SHORT)
     itself = clearway.evaluate(run, **SHORT)
     assert names(exported)[:3] == ["grid"] * 3

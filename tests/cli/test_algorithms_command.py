@@ -21,9 +21,9 @@ def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, na
     record = json.loads((tmp_path / "run.json").read_text())
     assert (record["learner"]["algorithm"], record["learner"]["envs"]) == (name, 10)
     assert isinstance(RunFolder(tmp_path).read_record().learner, ALGORITHMS[name])
-    found = clearway("evaluate", tmp_path, "--episodes", 1, "--step-cap", 20, "--json").json
+    found = clearway("evaluate", tmp_path, "--episodes", 1, "--step-limit", 20, "--json").json
     assert {"random", "shortest path"} <= {other["agent"] for other in found["others"]}
-    assert clearway("evaluate", tmp_path, "--episodes", 1, "--step-cap", 20, "--pictures", tmp_path / "p").code == 0
+    assert clearway("evaluate", tmp_path, "--episodes", 1, "--step-limit", 20, "--pictures", tmp_path / "p").code == 0
 
 
 @pytest.mark.parametrize("command", ["export", "view", "serve"])

@@ -138,7 +138,7 @@ def test_rooms_have_no_negative_seed(clearway, tmp_path, words):
     ("words", "part"),
     [
         (("--episodes", "0"), "--episodes 0: expected"),
-        (("--step-cap", "-3"), "--step-cap -3: expected"),
+        (("--step-limit", "-3"), "--step-limit -3: expected"),
         (("--seed", "-1"), "--seed -1: expected"),
         (("--checkpoint", "nowhere"), "nowhere"),
         (("--scenes", "nowhere"), "nowhere"),
@@ -160,7 +160,7 @@ def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
     (tmp_path / "file").write_text("not a folder")
     below = tmp_path / "file" / "below"
     source = dump(tmp_path / "attic.h5")
-    evaluate = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5)
+    evaluate = ("evaluate", trained.run, "--episodes", 1, "--step-limit", 5)
     assert clearway("scenes", "inspect", trained.scene, "--map", below).refusal(str(tmp_path / "file"))
     assert clearway("scenes", "import", "thor-v1", source, "--out", below).refusal(str(tmp_path / "file"))
     assert clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))

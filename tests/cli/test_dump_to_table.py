@@ -21,7 +21,7 @@ TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl",
 @pytest.fixture(scope="module")
 def evaluated(clearway, trained):
     """The answer to `evaluate --json`, and the run."""
-    return clearway("evaluate", trained.run, "--episodes", 4, "--step-cap", 300, "--json"), trained.run
+    return clearway("evaluate", trained.run, "--episodes", 4, "--step-limit", 300, "--json"), trained.run
 
 
 @pytest.mark.parametrize(("feature_axis", "unreachable"), [(10, -1), (1, 1000)])
@@ -129,7 +129,7 @@ def test_the_other_agents_stand_beside(evaluated):
 
 
 def test_evaluate_prints_tables_and_draws(clearway, trained, tmp_path):
-    words = ("--episodes", 2, "--step-cap", 40, "--targets", "--pictures", tmp_path / "pictures")
+    words = ("--episodes", 2, "--step-limit", 40, "--targets", "--pictures", tmp_path / "pictures")
     answer = clearway("evaluate", trained.run, *words)
     assert answer.code == 0
     assert answer.err == f"pictures: {tmp_path / 'pictures'}\n"
@@ -141,7 +141,7 @@ def test_evaluate_prints_tables_and_draws(clearway, trained, tmp_path):
 
 def test_scenes_may_have_moved(clearway, trained, dump, tmp_path):
     moved = dump(tmp_path / "moved" / "bathroom_02.h5")
-    words = ("evaluate", trained.run, "--episodes", 1, "--step-cap", 5, "--json", "--scenes")
+    words = ("evaluate", trained.run, "--episodes", 1, "--step-limit", 5, "--json", "--scenes")
     assert clearway(*words, moved.parent).code == 0
     elsewhere = dump(tmp_path / "moved" / "attic.h5")
     assert clearway(*words, elsewhere).refusal("bathroom_02", "--scenes")
@@ -181,7 +181,7 @@ def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):
 
 
 def test_another_seed_walks_other_episodes(clearway, trained):
-    words = ("evaluate", trained.run, "--episodes", 3, "--step-cap", 100, "--json")
+    words = ("evaluate", trained.run, "--episodes", 3, "--step-limit", 100, "--json")
     first, again, other = (clearway(*words, "--seed", seed).json for seed in (0, 0, 1))
     assert first == again
     assert first["targets"] != other["targets"] and other["seed"] == 1

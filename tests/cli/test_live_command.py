@@ -12,7 +12,7 @@ import pytest
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import train
-from clearway.live.run import walk_setting
+from clearway.live.walks import walk_setting
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.small_live import walkable_room, walkable_scene
@@ -47,7 +47,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Runs]:
         yield Runs(**found)
 
 
-SHORT = ("--live", "--episodes", 2, "--step-cap", 4)
+SHORT = ("--live", "--episodes", 2, "--step-limit", 4)
 
 
 def test_two_runs_are_compared_and_the_run_folder_keeps_the_tables(clearway, runs, tmp_path):
@@ -55,7 +55,7 @@ def test_two_runs_are_compared_and_the_run_folder_keeps_the_tables(clearway, run
                       "--pictures", tmp_path / "pictures")  # fmt: skip
     assert answer.code == 0, answer
     (result,) = answer.json["results"]
-    assert answer.json["episodes_per_target"] == 2 and answer.json["step_cap"] == 4
+    assert answer.json["episodes_per_target"] == 2 and answer.json["step_limit"] == 4
     assert result["setting"] == "new obstacle"
     assert set(result["agents"]) == {"shortest", "collision-aware"}
     assert result["comparison"]["first"] == "shortest"
@@ -75,7 +75,7 @@ def test_one_run_alone_is_a_table(clearway, runs):
 @pytest.mark.slow
 def test_a_sweep_has_a_row_a_setting(clearway, runs):
     answer = clearway(
-        "evaluate", runs.bold, "--live", "--episodes", 1, "--step-cap", 1, "--sweep", "--strengths", 1, "--json"
+        "evaluate", runs.bold, "--live", "--episodes", 1, "--step-limit", 1, "--sweep", "--strengths", 1, "--json"
     )
     assert answer.code == 0, answer
     labels = [result["setting"] for result in answer.json["results"]]
@@ -112,7 +112,7 @@ def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_bef
     def names() -> set[str]:
         return {path.name for path in runs.wary.iterdir() if path.name.startswith("live")}
 
-    short = ("evaluate", runs.wary, "--live", "--episodes", 1, "--step-cap", 1)
+    short = ("evaluate", runs.wary, "--live", "--episodes", 1, "--step-limit", 1)
     assert clearway(*short, "--light", 0.2).code == 0
     assert names() == {"live.json", "live.md"}
     before = (runs.wary / "live.json").read_text(), (runs.wary / "live.md").read_text()
@@ -125,7 +125,7 @@ def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_bef
         return walked[-1]
 
     with monkeypatch.context() as patch:
-        patch.setattr("clearway.live.run.walk_setting", walk_twice)
+        patch.setattr("clearway.live.walks.walk_setting", walk_twice)
         assert clearway(*short, "--sweep").code == 130
     assert ((runs.wary / "live.json").read_text(), (runs.wary / "live.md").read_text()) == before
     part = json.loads((runs.wary / "live.part.json").read_text())
@@ -139,7 +139,7 @@ def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_bef
 def test_a_checkpoint_is_the_first_run_s_own(clearway, runs):
     """That of --against is its newest."""
     own, other = (newest_checkpoint(RunFolder(run).checkpoints) for run in (runs.bold, runs.wary))
-    words = ("evaluate", runs.bold, "--live", "--episodes", 1, "--step-cap", 1, "--checkpoint")
+    words = ("evaluate", runs.bold, "--live", "--episodes", 1, "--step-limit", 1, "--checkpoint")
     clearway(*words, other).refusal(str(other), "not a checkpoint of")
     assert clearway(*words, own, "--against", runs.wary).code == 0
 

@@ -210,7 +210,7 @@ def test_a_version_that_cannot_be_printed_is_told_in_one_line():
 
 
 def test_a_terminal_without_the_letters_gets_others(trained):
-    command = [sys.executable, "-m", "clearway", "evaluate", str(trained.run), "--episodes", "1", "--step-cap", "1"]
+    command = [sys.executable, "-m", "clearway", "evaluate", str(trained.run), "--episodes", "1", "--step-limit", "1"]
     done = subprocess.run(
         command, env={**ENVIRONMENT, "PYTHONIOENCODING": "ascii"}, capture_output=True, text=True, timeout=120
     )

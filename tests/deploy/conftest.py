@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from clearway.deploy.export import export_onnx
-from clearway.deploy.from_run import SceneAgent, load_scene_agent
+from clearway.deploy.from_run import RunInScene, load_run_in_scene
 from clearway.learn.train import train
 from clearway.perception import encoder_from_record
 from clearway.perception.preprocess import Preprocessing
@@ -41,7 +41,7 @@ class Deployed:
 
     run: Path
     scenes: list[Scene]
-    chosen: SceneAgent
+    chosen: RunInScene
     agent: Path
 
     @property
@@ -59,7 +59,7 @@ def deployed(tmp_path_factory: pytest.TempPathFactory) -> Deployed:
     scenes = [read_scene(path) for path in paths.values()]
     learner = replace(small_learner(frames=1600), whiten_features=True, centre_features=True, feature_basis=12)
     train(small_request(scenes=scenes, paths=paths, targets=TARGETS, learner=learner), folder / "run")
-    chosen = load_scene_agent(folder / "run", "cellar")
+    chosen = load_run_in_scene(folder / "run", "cellar")
     export_onnx(chosen, folder / "agent.onnx")
     return Deployed(folder / "run", scenes, chosen, folder / "agent.onnx")
 

@@ -15,7 +15,7 @@ from clearway.deploy.onnx_file import OnnxAgent
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.learn.load import run_world
 from clearway.scenes.sensors import RGB
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.agents import check_agent, equal
 
 EPISODES, STEPS = 5, 6
@@ -92,7 +92,7 @@ def test_evaluated_on_the_grid_they_walk_the_episodes_of_the_network(
     deployed, policy_file, cellar, name, selection
 ) -> None:
     """From the same starts, and as the draws are the same, step for step."""
-    settings = {"episodes_per_target": 6, "step_cap": 50, "seed": 3, "selection": selection, "record": True}
+    settings = {"episodes_per_target": 6, "step_limit": 50, "seed": 3, "selection": selection, "record": True}
     found = run_episodes(cellar, made(name, deployed, policy_file), scenes=deployed.scenes[1:], **settings)
     whole = evaluated(deployed, **settings)
     first, there = deployed.scenes[0].state_count, whole.target >= 2
@@ -108,7 +108,7 @@ def test_evaluated_on_the_grid_they_walk_the_episodes_of_the_network(
 
 def test_a_circle_is_found_by_pictures_too(deployed, cellar) -> None:
     """An agent of pictures that is certain of its actions is not walked to the cap, and its counts are the same."""
-    settings = {"scenes": deployed.scenes[1:], "selection": "argmax", "episodes_per_target": 8, "step_cap": 401}
+    settings = {"scenes": deployed.scenes[1:], "selection": "argmax", "episodes_per_target": 8, "step_limit": 401}
     skipped = run_episodes(cellar, OnnxAgent(deployed.agent), **settings)
     every = run_episodes(cellar, OnnxAgent(deployed.agent), record=True, **settings)
     assert skipped.looped.any()

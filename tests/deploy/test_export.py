@@ -12,9 +12,9 @@ import torch
 from torch.nn.functional import interpolate
 
 from clearway.deploy.card import card_from_json
-from clearway.deploy.from_run import load_scene_agent, picture_encoder
-from clearway.deploy.graph import resize_weights
+from clearway.deploy.from_run import load_run_in_scene, picture_encoder
 from clearway.deploy.onnx_file import OnnxAgent
+from clearway.deploy.onnx_graph import resize_weights
 from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
 from clearway.perception import depth_grid, encoder_from_record
@@ -131,12 +131,12 @@ def test_a_file_is_a_sound_model_that_names_no_place_on_this_machine(deployed) -
 
 
 def test_the_scene_is_chosen_by_name_and_is_the_first_otherwise(deployed) -> None:
-    assert load_scene_agent(deployed.run).scene.name == "attic"
-    assert load_scene_agent(deployed.run, "cellar").index == 1
+    assert load_run_in_scene(deployed.run).scene.name == "attic"
+    assert load_run_in_scene(deployed.run, "cellar").index == 1
     with pytest.raises(DeployError, match=r"not trained on a scene den\. Name one of attic, cellar"):
-        load_scene_agent(deployed.run, "den")
+        load_run_in_scene(deployed.run, "den")
     with pytest.raises(RunError, match="no run here"):
-        load_scene_agent(deployed.run.parent)
+        load_run_in_scene(deployed.run.parent)
 
 
 def test_an_encoder_of_depth_is_not_deployed(deployed) -> None:

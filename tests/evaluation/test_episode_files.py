@@ -12,7 +12,7 @@ from helpers.small_runs import small_world
 
 
 def walked() -> EpisodeTable:
-    return run_episodes(small_world(), RandomWalk(), episodes_per_target=4, step_cap=30, seed=1)
+    return run_episodes(small_world(), RandomWalk(), episodes_per_target=4, step_limit=30, seed=1)
 
 
 def test_a_table_comes_back_as_it_was(tmp_path: Path) -> None:

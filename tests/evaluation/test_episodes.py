@@ -9,7 +9,7 @@ from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.agents.selection import Argmax
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.scenes.actions import Action
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from clearway.zones import Zone
 from helpers.agents import alike, arbitrary, by_rule, only
 from helpers.made import corridor_scene, grid_scene, scene_of_cells
@@ -47,7 +47,7 @@ def test_random_walk_on_one_cell_takes_20_thirds_steps():
 
 def test_random_walk_agrees_with_the_solved_hitting_time(world):
     episodes = 1000
-    table = run_episodes(world, RandomWalk(), episodes_per_target=episodes, step_cap=100_000)
+    table = run_episodes(world, RandomWalk(), episodes_per_target=episodes, step_limit=100_000)
     next_state = world.next_state.numpy()
     for target in range(world.target_count):
         mine = table.target == target
@@ -64,7 +64,7 @@ def test_random_walk_agrees_with_the_solved_hitting_time(world):
 def test_walking_forward_into_a_dead_end_collides_at_every_further_step():
     length, cap = 6, 1234
     world = make_world([corridor_scene(length)], {"corridor": [1]})  # heading 90: forward never gets there
-    table = run_episodes(world, by_rule(world, only(Action.MOVE_FORWARD)), step_cap=cap)
+    table = run_episodes(world, by_rule(world, only(Action.MOVE_FORWARD)), step_limit=cap)
     cell, heading = table.start // 4, table.start % 4
     free_moves = np.select([heading == 0, heading == 2], [length - 1 - cell, cell], 0)
     assert not table.reached.any()
@@ -75,7 +75,7 @@ def test_walking_forward_into_a_dead_end_collides_at_every_further_step():
 
 def test_turning_for_ever_is_a_failure_with_the_steps_of_the_cap_and_no_collision():
     world = make_world([corridor_scene(3)], {"corridor": [0]})
-    table = run_episodes(world, by_rule(world, only(Action.TURN_LEFT)), episodes_per_target=200, step_cap=10_001)
+    table = run_episodes(world, by_rule(world, only(Action.TURN_LEFT)), episodes_per_target=200, step_limit=10_001)
     elsewhere = table.start // 4 != 0
     assert np.array_equal(table.reached, ~elsewhere)
     assert (table.steps[elsewhere] == 10_001).all() and (table.collisions == 0).all()
@@ -84,7 +84,7 @@ def test_turning_for_ever_is_a_failure_with_the_steps_of_the_cap_and_no_collisio
 @pytest.mark.parametrize("seed", range(8))
 def test_circles_completed_by_arithmetic_count_like_circles_walked(world, seed):
     agent = Argmax(by_rule(world, arbitrary(seed)))
-    settings = {"episodes_per_target": 20, "step_cap": 977 + seed}
+    settings = {"episodes_per_target": 20, "step_limit": 977 + seed}
     skipped = run_episodes(world, agent, **settings)
     walked = run_episodes(world, agent, record=True, **settings)
     assert not skipped.reached.all(), "this agent shows nothing: it has no circle"
@@ -97,14 +97,14 @@ def test_an_agent_that_is_only_sometimes_certain_is_not_cut_short(world):
         return torch.where((history[:, -1:] % 3 == 0), torch.full_like(certain, 0.25), certain)
 
     agent = by_rule(world, chances)
-    settings = {"episodes_per_target": 50, "step_cap": 700}
+    settings = {"episodes_per_target": 50, "step_limit": 700}
     assert same(run_episodes(world, agent, **settings), run_episodes(world, agent, record=True, **settings))
 
 
 @pytest.mark.parametrize("random", [True, False])
 def test_an_episode_is_the_same_whatever_runs_beside_it(world, random):
     agent = RandomWalk() if random else by_rule(world, arbitrary(0, greed=0.5))
-    settings = {"episodes_per_target": 12, "step_cap": 150, "seed": 5}
+    settings = {"episodes_per_target": 12, "step_limit": 150, "seed": 5}
     together = run_episodes(world, agent, **settings)
     assert same(together, run_episodes(world, agent, episodes_at_once=7, **settings))
     more = run_episodes(world, agent, **{**settings, "episodes_per_target": 15})
@@ -132,7 +132,7 @@ def test_all_agents_face_the_same_starts(world):
 
 
 def test_trajectories_obey_the_graph_and_end_at_the_target(world):
-    table = run_episodes(world, RandomWalk(), episodes_per_target=10, step_cap=200, record=True)
+    table = run_episodes(world, RandomWalk(), episodes_per_target=10, step_limit=200, record=True)
     assert table.trajectories is not None and len(table.trajectories) == len(table)
     next_state, blocked = world.next_state.numpy(), world.blocked.numpy()
     for index, walk in enumerate(table.trajectories):

@@ -11,9 +11,9 @@ from clearway.errors import SceneError
 from clearway.evaluation.episodes import episode_starts, run_episodes
 from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.evaluation.oracle import action_values, make_task, optimal_policy, soft_policy, yardstick
-from clearway.evaluation.run import _optima
+from clearway.evaluation.runs import _optima
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from clearway.zones import Zone, pose_zones
 from helpers.agents import told_after
 from helpers.made import corridor_scene, grid_scene
@@ -64,7 +64,7 @@ def test_where_walking_on_earns_more_than_arriving_no_episode_ends(alpha: float)
     (found,) = world_yardsticks(world, reward)
     assert found.yardstick.optimal.steps == found.yardstick.soft.steps == np.inf
     assert found.to_json()["optimal"] == {"steps": None, "collision_visits": None, "precollision_visits": None}
-    walked = run_episodes(world, optimum_agents(world, [found])[0], episodes_per_target=20, step_cap=300, seed=0)
+    walked = run_episodes(world, optimum_agents(world, [found])[0], episodes_per_target=20, step_limit=300, seed=0)
     assert not walked.reached.all()
 
 

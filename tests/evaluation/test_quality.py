@@ -6,7 +6,7 @@ import pytest
 from clearway.agents.by_pose import shortest_paths
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.quality import Criteria, Quality, quality
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.made import corridor_scene
 
 GOOD = Quality(2, 2, 10.4, 10.0, 0.04, 1.1, "corridor", 3)

@@ -7,10 +7,10 @@ import pytest
 
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.evaluation.episodes import run_episodes
-from clearway.evaluation.showcase import EPISODES, STEP_CAP, showcases
+from clearway.evaluation.showcase import EPISODES, STEP_LIMIT, showcases
 from clearway.scenes.actions import Action
 from clearway.scenes.graph import next_states
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.agents import by_rule, only
 from helpers.made import corridor_scene, grid_scene
 
@@ -53,7 +53,7 @@ def test_all_agents_start_alike_and_the_best_takes_the_shortest_path(shown):
 
 def test_it_is_the_longest_of_the_episodes_that_every_agent_finishes():
     agent = shortest_paths(WORLD)
-    table = run_episodes(WORLD, agent, episodes_per_target=EPISODES, step_cap=STEP_CAP, seed=1)
+    table = run_episodes(WORLD, agent, episodes_per_target=EPISODES, step_limit=STEP_LIMIT, seed=1)
     scene_of_episode = WORLD.target_scene.numpy()[table.target]
     longest = [table.shortest_path_steps[scene_of_episode == scene].max() for scene in range(2)]
     found = showcases(WORLD, {"ideal": agent}, seed=1)
@@ -72,7 +72,7 @@ def test_an_episode_that_more_agents_finish_comes_before_a_longer_one():
 def test_a_walk_that_does_not_arrive_ends_at_the_cap():
     world = make_world(SCENES[:1], {"grid": [3]})
     (show,) = showcases(world, {"stuck": by_rule(world, only(Action.TURN_RIGHT))})
-    assert len(show.walks["stuck"].actions) == STEP_CAP
+    assert len(show.walks["stuck"].actions) == STEP_LIMIT
     assert set(show.walks["stuck"].actions.tolist()) == {Action.TURN_RIGHT}
 
 

@@ -14,7 +14,7 @@ from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.sight import Sight
 from clearway.scenes.actions import Action
 from clearway.scenes.sensors import DEPTH, RGB
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.made import with_depth
 from helpers.small_runs import small_scenes, small_targets, trained_network
 
@@ -53,7 +53,7 @@ def expected(name: str, pose: int) -> np.ndarray:
 )
 def test_an_agent_is_given_what_it_sees_and_nothing_more(sees: tuple[str, ...]) -> None:
     spy = Spy(*sees)
-    table = run_episodes(WORLD, spy, scenes=SCENES, episodes_per_target=3, step_cap=12, record=True)
+    table = run_episodes(WORLD, spy, scenes=SCENES, episodes_per_target=3, step_limit=12, record=True)
     (target,) = spy.targets
     goals = WORLD.target_state.numpy()[table.target]
     assert tuple(target) == sees
@@ -126,7 +126,7 @@ def same(one: EpisodeTable, other: EpisodeTable) -> bool:
 def test_an_agent_by_features_walks_the_episodes_of_the_network_from_tables() -> None:
     trained = trained_network()
     world = make_world([SCENES[1]], {"grid": small_targets()["grid"]})
-    settings = {"episodes_per_target": 20, "step_cap": 60, "seed": 2}
+    settings = {"episodes_per_target": 20, "step_limit": 60, "seed": 2}
     by_features = run_episodes(world, FeatureAgent(trained.in_scene(1)), **settings)
     both = run_episodes(WORLD, trained.on_poses(WORLD), **settings)
     there = WORLD.target_scene.numpy()[both.target] == 1
@@ -151,7 +151,7 @@ class Shade:
 
 def test_an_agent_by_pictures_that_tells_nothing_else_is_evaluated() -> None:
     """Whatever runs beside it; and its actions are those of what it saw."""
-    settings = {"scenes": SCENES, "episodes_per_target": 6, "step_cap": 40}
+    settings = {"scenes": SCENES, "episodes_per_target": 6, "step_limit": 40}
     table = run_episodes(WORLD, Shade(), record=True, **settings)
     assert same(table, run_episodes(WORLD, Shade(), **settings))
     assert same(table, run_episodes(WORLD, Shade(), episodes_at_once=7, **settings))

@@ -9,7 +9,7 @@ from clearway.agents.agent import Decisions
 from clearway.agents.by_pose import RandomWalk
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.made import corridor_scene
 
 WORLD = make_world([corridor_scene(5)], {"corridor": [0, 8]})
@@ -84,7 +84,7 @@ def test_certainty_for_all_at_once_is_none() -> None:
 def test_short_integers_are_actions_too(kind: type) -> None:
     turning, short = (
         run_episodes(
-            WORLD, Wrong(lambda count, of=of: Decisions(np.ones(count, of)), 0), episodes_per_target=3, step_cap=9
+            WORLD, Wrong(lambda count, of=of: Decisions(np.ones(count, of)), 0), episodes_per_target=3, step_limit=9
         )
         for of in (np.int64, kind)
     )
@@ -92,4 +92,4 @@ def test_short_integers_are_actions_too(kind: type) -> None:
 
 
 def test_the_same_good_steps_alone_are_walked_to_the_end() -> None:
-    assert run_episodes(WORLD, Wrong(told(0.25), 2), episodes_per_target=3, step_cap=9, seed=4).steps.max() <= 9
+    assert run_episodes(WORLD, Wrong(told(0.25), 2), episodes_per_target=3, step_limit=9, seed=4).steps.max() <= 9

@@ -11,7 +11,7 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.experiments import fig5, fig6, hard_tables
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.scenes.scene import Scene
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from clearway.zones import Zone
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_setting import small_setting

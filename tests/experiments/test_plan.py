@@ -44,7 +44,7 @@ def test_a_trial_s_name_tells_it_from_others() -> None:
         Trial(((1,),)),
         Trial(((2,),)),
         Trial(((1,),), halfway=True),
-        Trial(((1,),), step_cap=9),
+        Trial(((1,),), step_limit=9),
         Trial(((1,),), seed=2),
     ]
     assert len({trial.name for trial in trials}) == len(trials)

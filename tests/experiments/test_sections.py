@@ -68,8 +68,8 @@ def test_trials_on_unseen_targets_end_when_success_is_settled(
     setting: Setting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def caps(*names: ExperimentName) -> set[int]:
-        patient = replace(setting, budget=replace(setting.budget, step_cap=10_000))
-        return {trial.step_cap for job in planned(patient, names) for trial in job.trials}
+        patient = replace(setting, budget=replace(setting.budget, step_limit=10_000))
+        return {trial.step_limit for job in planned(patient, names) for trial in job.trials}
 
     assert caps("table1", "table2", "fig4") == {10_000}
     assert caps("fig5", "fig6") == {500}

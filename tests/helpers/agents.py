@@ -11,7 +11,7 @@ from torch import Tensor
 from clearway.agents.agent import POSE, Agent, Decisions, Observation, State, joined, rows
 from clearway.agents.by_pose import PoseAgent
 from clearway.scenes.actions import ACTION_COUNT, Action
-from clearway.world.tables import World
+from clearway.world.world import World
 
 Chances = Callable[[Tensor, Tensor], Tensor]
 """history (B, K) int64 states, target (B,) int64 index of the world's -> probabilities (B, A)."""

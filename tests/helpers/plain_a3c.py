@@ -14,7 +14,7 @@ from clearway.model.network import SiameseActorCritic
 from clearway.reward import Reward
 from clearway.world.navigation import Navigation
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 ALPHA, EPSILON = 0.99, 0.1
 

@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from clearway.evaluation.run import evaluate_runs
+from clearway.evaluation.runs import evaluate_runs
 from clearway.scenes.scene import Scene
 from helpers.made import grid_scene
 from helpers.small_runs import FEATURES, small_learner
@@ -34,5 +34,5 @@ def shrink_demo(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("clearway.experiments.demo.cached_room_scene", room)
     patch.setattr("clearway.experiments.demo.encode_scenes", encode)
     patch.setattr("clearway.experiments.demo.DEFAULT", small_learner())
-    brief = partial(evaluate_runs, episodes_per_target=5, step_cap=60)
+    brief = partial(evaluate_runs, episodes_per_target=5, step_limit=60)
     patch.setattr("clearway.experiments.demo.evaluate_runs", brief)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.live.room import LiveRoom, camera_model
+from clearway.live.live_room import LiveRoom, camera_model
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape, fit_record, from_record
 from clearway.rooms.camera import first_person_view

@@ -21,7 +21,7 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
 from clearway.world.navigation import Navigation
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.made import corridor_scene, grid_scene
 
 FEATURES = 12

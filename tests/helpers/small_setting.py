@@ -15,7 +15,7 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import grid_scene
 from helpers.small_runs import FEATURES, small_learner
 
-BUDGET = replace(SMOKE, episodes_per_target=3, step_cap=60)
+BUDGET = replace(SMOKE, episodes_per_target=3, step_limit=60)
 
 
 def small_rooms() -> list[Scene]:

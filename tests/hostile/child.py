@@ -17,7 +17,7 @@ import warnings
 from pathlib import Path
 
 from clearway.errors import ClearwayError, SceneError
-from clearway.scenes.limits import MIB, memory_limit
+from clearway.scenes.memory_limits import MIB, memory_limit
 from hostile import corpus
 from hostile.cases import Case
 

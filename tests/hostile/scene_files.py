@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from clearway.scenes.export import export_thor_v1
-from clearway.scenes.pictures import BLOCK_PICTURES
+from clearway.scenes.file_pictures import BLOCK_PICTURES
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import FORMAT_VERSION, read_scene, write_scene
 from clearway.scenes.validate import SceneWarning

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.importers import limits
 from clearway.importers import miniworld as importer
+from clearway.importers import picture_limits
 from clearway.importers.miniworld import photographed, started
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
@@ -122,7 +122,7 @@ def test_what_does_not_fit_is_refused_before_any_picture(world: Any, monkeypatch
         photographed(world, "TwoRooms", step_m=5e-324, **SIZE)
     with pytest.raises(SceneError, match=r"radius of 0\.4 m fits nowhere on a grid of 10 m"):
         photographed(world, "TwoRooms", step_m=10.0, **SIZE)
-    monkeypatch.setattr(limits, "MAX_STATES", 8)
+    monkeypatch.setattr(picture_limits, "MAX_STATES", 8)
     with pytest.raises(SceneError, match=r"has 92 poses on free cells, expected at most 8\. Give a larger --step"):
         photographed(world, "TwoRooms", step_m=1.0, **SIZE)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.importers import limits
 from clearway.importers import mjcf as importer
+from clearway.importers import picture_limits
 from clearway.importers.mjcf import read_mjcf
 from clearway.importers.mjcf_floor import FloorChoice
 from clearway.rooms.obstacles import AgentShape
@@ -84,11 +84,11 @@ def test_hidden_geoms_and_limits_of_the_model_s_own_hide_nothing(path: Path) -> 
 
 def test_more_than_fits_is_refused_before_any_picture_is_taken(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importer, "sense", lambda *_, **__: pytest.fail("rendered"))
-    monkeypatch.setattr(limits, "MAX_PICTURE_BYTES", 20 << 20)
+    monkeypatch.setattr(picture_limits, "MAX_PICTURE_BYTES", 20 << 20)
     problem = r"\d+ pictures of 400 x 300 pixels take \d+ MiB of memory, expected at most 20\. .*--step"
     with pytest.raises(SceneError, match=problem):
         read_mjcf(path, FloorChoice(floor_m=2.0))
-    monkeypatch.setattr(limits, "MAX_STATES", 8)
+    monkeypatch.setattr(picture_limits, "MAX_STATES", 8)
     with pytest.raises(SceneError, match=r"has \d+ poses on free cells, expected at most 8\. .*--step"):
         read_mjcf(path, FloorChoice(floor_m=2.0), height_px=30, width_px=40)
 

@@ -13,7 +13,7 @@ from clearway.model.lookup import Activations, LookupNetwork
 from clearway.reward import BUMP, COLLISION_AWARE, Reward
 from clearway.scenes.actions import Action
 from clearway.world.navigation import Navigation, TargetChoice
-from clearway.world.tables import World
+from clearway.world.world import World
 from helpers.small_runs import corridor_world, small_learner, small_network, small_trainer
 
 FORWARD, RIGHT, LEFT, BACKWARD = Action

@@ -15,7 +15,7 @@ from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.train import RunRequest, save, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.agents import after_poses
 from helpers.small_runs import small_learner, small_request, small_scenes
 

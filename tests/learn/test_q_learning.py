@@ -9,13 +9,13 @@ import torch
 
 from clearway.errors import RunError
 from clearway.evaluation.oracle import action_values, make_task, optimal_policy
-from clearway.evaluation.run import evaluate_run
+from clearway.evaluation.runs import evaluate_run
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.load import load_agent, load_network, run_world
 from clearway.learn.q_learning import QLearning, TableTrainer, best_actions, table_rows
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.agents import after_poses
 from helpers.made import corridor_scene
 from helpers.small_runs import (
@@ -94,7 +94,7 @@ def test_a_run_evaluates_at_the_shortest_paths_and_has_no_network(tmp_path: Path
     assert set(row) >= {"episodes", "success", "value_error", "explore"}
     assert not set(row) & {"loss", "entropy", "lr", "gradient_norm"}
     agent = load_agent(tmp_path)
-    found = evaluate_run(agent, small_scenes(), episodes_per_target=20, step_cap=100)
+    found = evaluate_run(agent, small_scenes(), episodes_per_target=20, step_limit=100)
     by_name = {evaluation.agent: evaluation.to_json()["average"] for evaluation in found}
     learnt, shortest = by_name["shortest"], by_name["shortest path"]
     assert learnt["steps"] == pytest.approx(shortest["steps"], rel=0.02)

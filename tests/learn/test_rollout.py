@@ -8,7 +8,7 @@ from clearway.learn.presets import PAPER_A2C
 from clearway.learn.rollout import Rollout, as_rows, by_step, sample_actions
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from clearway.world.tables import World
+from clearway.world.world import World
 from helpers.small_runs import corridor_world, small_learner, small_trainer
 
 

@@ -9,7 +9,7 @@ from clearway.errors import RunError
 from clearway.learn.rotation import Rotation, divided_envs
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.made import corridor_scene
 from helpers.small_runs import FEATURES, equal_bits, small_learner, small_trainer
 

@@ -15,7 +15,7 @@ from clearway.learn.losses import Batch, merged
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.rollout import Rollout
-from clearway.learn.trainer import Step, Trainer
+from clearway.learn.trainer import StepFigures, Trainer
 from clearway.model import lookup
 from clearway.model.first_layer import AllStates, VisitedStates
 from clearway.model.network import SiameseActorCritic
@@ -159,7 +159,7 @@ def test_the_first_layer_moves_once_a_pass_or_with_every_minibatch(monkeypatch: 
         trainer = small_trainer(small_learner(epochs=2, minibatches=3, **settings))
         found = []
 
-        def after_step(self: Trainer, *arguments: object) -> Step:
+        def after_step(self: Trainer, *arguments: object) -> StepFigures:
             before = trainer.network.siamese_weight.clone()
             step = whole_step(self, *arguments)
             found.append(not torch.equal(trainer.network.siamese_weight, before))

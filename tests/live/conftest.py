@@ -1,6 +1,6 @@
 import pytest
 
-from clearway.live.room import LiveRoom
+from clearway.live.live_room import LiveRoom
 from helpers.small_live import walkable_live
 
 

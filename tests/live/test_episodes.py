@@ -12,19 +12,19 @@ from clearway.agents.agent import FEATURES, POSE, Agent, Decisions, Observation,
 from clearway.agents.by_pose import PoseAgent, RandomWalk, shortest_paths
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
+from clearway.live.conditions import MOST, Perturbations
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
-from clearway.live.settings import MOST, Perturbations
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder
 from clearway.rooms.camera import eye_view, first_person_shot
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.actions import Action
 from clearway.scenes.sensors import RGB
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.agents import alike, by_rule, only
 from helpers.small_live import state_at
 
-PROTOCOL = LiveProtocol(episodes_per_target=4, step_cap=15, seed=3, selection="sampled")
+PROTOCOL = LiveProtocol(episodes_per_target=4, step_limit=15, seed=3, selection="sampled")
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_without_perturbations_the_pictures_are_those_of_the_grid(live, camera):
 
 def test_without_perturbations_episodes_are_those_of_the_grid(live, world, camera):
     table = walked(live, world, camera, by_pictures(live, shortest_paths(world), world))
-    grid = run_episodes(world, shortest_paths(world), episodes_per_target=4, step_cap=15, seed=3, record=True)
+    grid = run_episodes(world, shortest_paths(world), episodes_per_target=4, step_limit=15, seed=3, record=True)
     assert table.target.tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
     assert table.steps.tolist() == grid.steps.tolist() == table.shortest_path_steps.tolist()
     assert table.start.tolist() == grid.start.tolist()
@@ -98,7 +98,7 @@ def random_walk(live, world, camera) -> LiveTable:
 
 def test_a_random_walk_is_the_grids_up_to_its_first_contact(live, world, random_walk):
     table = random_walk
-    grid = run_episodes(world, RandomWalk(), episodes_per_target=4, step_cap=15, seed=3, record=True)
+    grid = run_episodes(world, RandomWalk(), episodes_per_target=4, step_limit=15, seed=3, record=True)
     blocked = [np.flatnonzero(t.states[1:] == t.states[:-1]) for t in grid.trajectories]
     assert sum(len(steps) > 0 for steps in blocked) >= 4
     assert (table.contacts > 0).tolist() == [len(steps) > 0 for steps in blocked]
@@ -117,7 +117,7 @@ def test_clearance_is_zero_exactly_where_there_was_a_contact(random_walk):
 
 def test_argmax_takes_the_most_probable_action(live, world, camera):
     turning = by_pictures(live, by_rule(world, alike(0.3, 0.4, 0.2, 0.1)), world)
-    protocol = replace(PROTOCOL, episodes_per_target=1, step_cap=3, selection="argmax")
+    protocol = replace(PROTOCOL, episodes_per_target=1, step_limit=3, selection="argmax")
     table = walked(live, world, camera, turning, protocol)
     for walk in table.walks:
         assert (np.diff(walk[:, 2]) % 360 == 90).all()
@@ -126,7 +126,7 @@ def test_argmax_takes_the_most_probable_action(live, world, camera):
 def first_pictures(live, world, camera, **changes: float) -> np.ndarray:
     """What two episodes see at their start, (2, height, width, 3)."""
     looking = by_pictures(live, by_rule(world, alike(0.25, 0.25, 0.25, 0.25)), world)
-    protocol = replace(PROTOCOL, episodes_per_target=1, step_cap=1)
+    protocol = replace(PROTOCOL, episodes_per_target=1, step_limit=1)
     walked(live, world, camera, looking, protocol, **changes)
     return looking.seen[0].astype(int)
 
@@ -151,7 +151,7 @@ def to_the_right(live, world: World) -> Agent:
 
 
 def test_distance_noise_changes_moves_and_angle_noise_turns(live, world, camera):
-    protocol = replace(PROTOCOL, step_cap=1)
+    protocol = replace(PROTOCOL, step_limit=1)
     moved = walked(live, world, camera, forwards(live, world), protocol, distance_noise=0.05)
     lengths_m = [np.linalg.norm(walk[1, :2] - walk[0, :2]) for walk in moved.walks]
     free = np.array(lengths_m)[moved.contacts == 0]
@@ -163,7 +163,7 @@ def test_distance_noise_changes_moves_and_angle_noise_turns(live, world, camera)
 
 
 def test_furniture_moves_by_no_more_than_it_may_and_into_nothing(live, world, camera):
-    protocol = replace(PROTOCOL, step_cap=1)
+    protocol = replace(PROTOCOL, step_limit=1)
     table = walked(live, world, camera, to_the_right(live, world), protocol, move_furniture=0.3)
     assert table.changed.all()
     distances_m = [np.hypot(*offset) for layout in table.layouts for offset in layout.moved_m]
@@ -172,14 +172,14 @@ def test_furniture_moves_by_no_more_than_it_may_and_into_nothing(live, world, ca
 
 
 def test_perturbations_at_their_most_can_be_walked(live, world, camera):
-    table = walked(live, world, camera, RandomWalk(), replace(PROTOCOL, step_cap=3), **MOST)
+    table = walked(live, world, camera, RandomWalk(), replace(PROTOCOL, step_limit=3), **MOST)
     width_m, depth_m = live.room.width_m, live.room.depth_m
     for walk in table.walks:
         assert ((walk[:, :2] >= 0) & (walk[:, :2] <= (width_m, depth_m))).all()
 
 
 def test_an_episode_draws_the_same_whatever_else_is_perturbed(live, world, camera):
-    protocol = replace(PROTOCOL, step_cap=2)
+    protocol = replace(PROTOCOL, step_limit=2)
     alone = walked(live, world, camera, forwards(live, world), protocol, distance_noise=0.05)
     again = walked(live, world, camera, forwards(live, world), protocol, distance_noise=0.05)
     beside = walked(

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from clearway.rooms import pictures, textures
+from clearway.rooms import artwork, textures
 
 DARK, LIGHT = (0.4, 0.25, 0.15), (0.7, 0.5, 0.3)
 SURFACES = {
@@ -27,14 +27,14 @@ SURFACES = {
     },
 }
 PICTURES = {
-    "outdoor": lambda rng: pictures.outdoor(rng, 96, 128),
-    "painting": lambda rng: pictures.painting(rng, 96, 128),
-    "books": lambda rng: pictures.books(rng, 64, 128),
-    "clock": lambda rng: pictures.clock(rng, 64),
-    "screen": lambda rng: pictures.screen(rng, 64, 96),
+    "outdoor": lambda rng: artwork.outdoor(rng, 96, 128),
+    "painting": lambda rng: artwork.painting(rng, 96, 128),
+    "books": lambda rng: artwork.books(rng, 64, 128),
+    "clock": lambda rng: artwork.clock(rng, 64),
+    "screen": lambda rng: artwork.screen(rng, 64, 96),
     **{
-        f"{pattern} rug": lambda rng, pattern=pattern: pictures.rug(rng, 96, 128, LIGHT, DARK, pattern)
-        for pattern in pictures.RUGS
+        f"{pattern} rug": lambda rng, pattern=pattern: artwork.rug(rng, 96, 128, LIGHT, DARK, pattern)
+        for pattern in artwork.RUGS
     },
 }
 ALL = SURFACES | PICTURES
@@ -127,7 +127,7 @@ def test_strands_of_wicker_go_over_and_under_in_turn():
 
 
 def test_a_clock_has_twelve_marks_and_its_hands():
-    face = pictures.clock(np.random.default_rng(3), 192)[..., 0]
+    face = artwork.clock(np.random.default_rng(3), 192)[..., 0]
     angle = np.linspace(0, 2 * np.pi, 720, endpoint=False) + 0.01
 
     def dark(radius: float) -> np.ndarray:
@@ -171,7 +171,7 @@ def test_a_screen_is_dark_with_its_reflection_above():
     assert image.max() < 0.35 and image[:16].mean() > 1.5 * image[-16:].mean()
 
 
-@pytest.mark.parametrize("pattern", pictures.RUGS)
+@pytest.mark.parametrize("pattern", artwork.RUGS)
 def test_a_rug_has_a_dark_border_with_a_light_line(pattern):
     share = share_of_dark(made(f"{pattern} rug"))
     assert share[0].mean() > 0.8 and share[7].mean() > 0.8  # rows of 96

@@ -11,7 +11,7 @@ from clearway.scenes.feature_spread import feature_spread
 from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan, floor_plan_scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.imported import imported_by
 
 # An L seen from above; the cells' numbers by x, then z:

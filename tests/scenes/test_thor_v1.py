@@ -10,8 +10,8 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes import hdf5
+from clearway.scenes.file_pictures import FilePictures
 from clearway.scenes.graph import distances
-from clearway.scenes.pictures import FilePictures
 from clearway.scenes.thor_v1 import read_scene, step_length_m, write_scene
 from clearway.scenes.validate import SceneWarning
 from helpers.dumps import full_scene, published_dump

@@ -8,8 +8,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from clearway.serve.app import make_app
-from clearway.serve.guard import protected
 from clearway.serve.limits import Limits
+from clearway.serve.protection import protected
 from clearway.serve.service import Service
 from helpers.serving import TOKEN
 from helpers.sums import Sums

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from clearway.errors import ClearwayError, DeployError
-from clearway.serve import protocol
+from clearway.serve import connections
 from clearway.serve.client import KEEP_ALIVE_S, Client, ClientSession, ServiceError, picture_file
 from helpers.imported import imported_by
 from helpers.serving import TOKEN, grey, picture_bytes
@@ -88,7 +88,7 @@ def test_another_service_that_answers_every_request(content) -> None:
 
 def test_connections_are_given_up_before_the_service_does() -> None:
     with Client("http://127.0.0.1:9", TOKEN) as client:
-        assert client._http._transport._pool._keepalive_expiry == KEEP_ALIVE_S < protocol.KEEP_ALIVE_S
+        assert client._http._transport._pool._keepalive_expiry == KEEP_ALIVE_S < connections.KEEP_ALIVE_S
 
 
 def test_a_service_that_says_no_more_is_told_in_one_sentence() -> None:

@@ -5,8 +5,8 @@ import schemathesis
 from hypothesis import HealthCheck, Phase, settings
 
 from clearway.serve.app import make_app
-from clearway.serve.guard import protected
 from clearway.serve.limits import Limits
+from clearway.serve.protection import protected
 from clearway.serve.service import Service
 from helpers.serving import TOKEN, grey
 from helpers.sums import Sums

@@ -10,7 +10,7 @@ from clearway.evaluation.episodes import episode_seeds, run_episodes
 from clearway.reward import COLLISION_AWARE
 from clearway.view.episode import MOST_STEPS
 from clearway.view.walker import Walker
-from clearway.world.tables import World
+from clearway.world.world import World
 from helpers.small_runs import corridor_world
 
 FORWARD, RIGHT, LEFT, BACKWARD = range(4)
@@ -119,7 +119,7 @@ def test_sampled_actions_repeat_with_the_seed_and_follow_the_probabilities() -> 
 def test_by_an_episode_s_seed_it_walks_as_in_the_evaluation() -> None:
     world = corridor_world()
     agent = likes(world, FORWARD, "sampled")
-    table = run_episodes(world, agent, episodes_per_target=1, step_cap=MOST_STEPS, seed=5, record=True)
+    table = run_episodes(world, agent, episodes_per_target=1, step_limit=MOST_STEPS, seed=5, record=True)
     assert table.trajectories is not None
     for target, seed in enumerate(episode_seeds(world, 1, 5).tolist()):
         walk = Walker(world, target, int(table.start[target]), COLLISION_AWARE, seed=seed, agent=agent)

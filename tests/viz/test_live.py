@@ -7,17 +7,17 @@ from PIL import Image
 
 from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk
+from clearway.live.conditions import REFERENCE, Condition, Perturbations
 from clearway.live.episodes import LiveProtocol, run_live_episodes
-from clearway.live.report import Comparison, Figures, LiveResult, summarise
-from clearway.live.run import LiveOutcome, LiveScene
-from clearway.live.settings import REFERENCE, Condition, Perturbations
+from clearway.live.results import Comparison, Figures, LiveResult, summarise
+from clearway.live.walks import LiveOutcome, LiveScene
 from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
 from clearway.scenes.sensors import RGB
 from clearway.viz.figures import CURVES
 from clearway.viz.live import PANELS, ROW_IN, _moves_to, _view, draw_live_figures
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.made import corridor_scene
 from helpers.small_live import walkable_live
 
@@ -72,7 +72,7 @@ def test_the_view_is_what_the_agent_saw_in_that_episode() -> None:
             return super().act({}, state)
 
     world = make_world([live.scene], {live.scene.name: (8, 41)})
-    protocol = LiveProtocol(episodes_per_target=2, step_cap=1, seed=5, selection="sampled")
+    protocol = LiveProtocol(episodes_per_target=2, step_limit=1, seed=5, selection="sampled")
     with studio(live.model, eye_view(), workers=1) as camera:
         table = run_live_episodes(live, world, Looking(), camera, REFERENCE, protocol)
         result = summarise("all", REFERENCE, {"uniform": (table,)}, seed=0)

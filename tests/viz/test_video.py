@@ -24,8 +24,8 @@ def agent(tmp_path_factory: pytest.TempPathFactory) -> TrainedNetwork:
     return load_network(train(small_request(learner=small_learner(frames=160)), folder).path)
 
 
-def episode(agent: TrainedNetwork, scene: str | None = None, target: int | None = None, step_cap: int = 9):
-    return single_episode(agent, small_scenes(), scene, target, selection="sampled", step_cap=step_cap, seed=4)
+def episode(agent: TrainedNetwork, scene: str | None = None, target: int | None = None, step_limit: int = 9):
+    return single_episode(agent, small_scenes(), scene, target, selection="sampled", step_limit=step_limit, seed=4)
 
 
 def test_the_frames_follow_the_episode(agent: TrainedNetwork) -> None:
@@ -83,7 +83,7 @@ def test_an_agent_that_sees_features_tells_the_same_and_a_silent_one_nothing(age
 
 @pytest.mark.parametrize("name", ["film.mp4", "film.gif"])
 def test_a_film_can_be_read_again(agent: TrainedNetwork, tmp_path: Path, name: str) -> None:
-    world, trajectory = episode(agent, step_cap=4)
+    world, trajectory = episode(agent, step_limit=4)
     pictures = list(frames(small_scenes(), walked(world, agent.on_poses(world), 0, trajectory)))
     write_video(tmp_path / name, iter(pictures), frames_per_s=2)
     expected = len(pictures) + LAST_FRAME_TIMES
@@ -125,7 +125,7 @@ def test_a_gif_faster_than_viewers_show_is_refused(tmp_path: Path) -> None:
 
 
 def test_another_ending_is_refused_and_leaves_nothing(agent: TrainedNetwork, tmp_path: Path) -> None:
-    world, trajectory = episode(agent, step_cap=2)
+    world, trajectory = episode(agent, step_limit=2)
     pictures = frames(small_scenes(), walked(world, agent.on_poses(world), 0, trajectory))
     with pytest.raises(ClearwayError, match=r"film\.avi.*\.mp4 or \.gif"):
         write_video(tmp_path / "film.avi", pictures)

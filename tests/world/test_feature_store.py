@@ -11,7 +11,7 @@ from clearway.choices import FeatureStore
 from clearway.errors import RunError, SceneError
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.feature_store import empty_store
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.made import corridor_scene, grid_scene
 
 

@@ -7,7 +7,7 @@ import torch
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST, Reward
 from clearway.scenes.actions import Action
 from clearway.world.navigation import Navigation, TargetChoice
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.made import corridor_scene, graph_of_cells, grid_scene
 
 FORWARD, RIGHT, LEFT, BACKWARD = (int(action) for action in Action)

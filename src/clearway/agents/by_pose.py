@@ -18,7 +18,7 @@ from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.model.lookup import LookupNetwork
 from clearway.model.policy import network_critic, shortest_path_actions
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.world.tables import World
+from clearway.world.world import World
 
 Rule: TypeAlias = Callable[[Tensor, Tensor], tuple[Tensor, Tensor | None]]
 """history (B, K) int64 states, target (B,) int64 index of the world's -> probabilities (B, A), values (B,) or None.

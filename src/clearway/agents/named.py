@@ -13,7 +13,7 @@ from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.errors import AgentError, PluginError
 from clearway.plugins import find_plugin, imported, load_plugin
-from clearway.world.tables import World
+from clearway.world.world import World
 
 AgentMaker: TypeAlias = Callable[[World], Agent]
 

@@ -26,7 +26,7 @@ from clearway.errors import AgentError
 from clearway.scenes.actions import ACTION_COUNT
 
 if TYPE_CHECKING:
-    from clearway.world.tables import World
+    from clearway.world.world import World
 
 ActionSelection = Literal["sampled", "argmax", "argmax-untried"]
 _FIRST, _TRIED = "argmax-untried first", "argmax-untried tried"  # in a state, beside the names of the other agent

@@ -17,17 +17,17 @@ from clearway.api.training import TrainResult
 from clearway.deploy.card import Card
 from clearway.deploy.navigator import open_agent
 from clearway.errors import ArgumentError
-from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.evaluation.files import write_evaluations
 from clearway.evaluation.protocol import evaluate_agents
-from clearway.evaluation.report import Evaluation
-from clearway.evaluation.run import evaluate_run
+from clearway.evaluation.runs import evaluate_run
+from clearway.evaluation.summary import Evaluation
 from clearway.evaluation.tables import Level, Width, markdown_table
 from clearway.learn import load
 from clearway.learn.load import TrainedAgent
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.torch_threads import torch_threads
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 
 AGENT = "agent"  # the argument's name
 Run: TypeAlias = TrainedAgent | TrainResult | str | os.PathLike[str]
@@ -133,7 +133,7 @@ def evaluate(
     targets: Targets = None,
     beside: Mapping[str, str | AgentMaker] | Iterable[str] = (),
     episodes: int = EPISODES_PER_TARGET,
-    step_cap: int = STEP_CAP,
+    step_limit: int = STEP_LIMIT,
     seed: int = 0,
 ) -> EvaluateResult:
     """Evaluate an agent by the paper's protocol, beside exact optima, a random walk and shortest paths.
@@ -148,7 +148,7 @@ def evaluate(
         beside: further agents to compare with: names of plugins or package.module:name, or such names, or what makes an
             agent for a `World`, by what tables are to call them.
         episodes: episodes a target.
-        step_cap: steps after which an episode has failed.
+        step_limit: steps after which an episode has failed.
         seed: of starts, sampled actions and the bootstrap.
 
     Raises:
@@ -158,7 +158,7 @@ def evaluate(
     """
     settings = {
         "episodes_per_target": as_whole("episodes", episodes, 1),
-        "step_cap": as_whole("step_cap", step_cap, 1),
+        "step_limit": as_whole("step_limit", step_limit, 1),
         "seed": as_seed("seed", seed),
     }
     others = _makers(beside)

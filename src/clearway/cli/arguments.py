@@ -23,7 +23,7 @@ __all__ = [
 
 
 def check_at_least(lowest: int, **values: int | None) -> None:
-    """Check options by name, for example `step_cap=...` for --step-cap; None was not given. Raises ClearwayError."""
+    """Check options by name, `step_limit=...` for --step-limit; None was not given. Raises ClearwayError."""
     for name, value in values.items():
         if value is not None and value < lowest:
             raise ClearwayError(f"{_option(name)} is {value}, expected at least {lowest}. Give a larger number")

@@ -11,7 +11,7 @@ import tyro
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, say, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
-from clearway.cli.live import STEP_CAP as LIVE_STEP_CAP
+from clearway.cli.live import STEP_LIMIT as LIVE_STEP_LIMIT
 from clearway.cli.live import Live, evaluate_live
 from clearway.errors import ClearwayError
 
@@ -27,7 +27,7 @@ class Evaluate:
     """The run folder; or the .onnx file of an exported agent."""
     episodes: int | None = None
     """Episodes a target; by default 100, live 10."""
-    step_cap: int | None = None
+    step_limit: int | None = None
     """Steps after which an episode has failed; by default 10,000, live 100."""
     seed: int = 0
     """Of starts and sampled actions."""
@@ -61,7 +61,7 @@ class Evaluate:
             self.scenes,
             self.room,
             episodes=_or(self.episodes, LIVE_EPISODES),
-            step_cap=_or(self.step_cap, LIVE_STEP_CAP),
+            step_limit=_or(self.step_limit, LIVE_STEP_LIMIT),
             seed=self.seed,
             pictures=self.pictures,
             json=self.json,
@@ -69,16 +69,16 @@ class Evaluate:
 
     def _on_grid(self) -> None:
         from clearway.api.evaluation import evaluate, load_agent
-        from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+        from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 
-        episodes, step_cap = _or(self.episodes, EPISODES_PER_TARGET), _or(self.step_cap, STEP_CAP)
+        episodes, step_limit = _or(self.episodes, EPISODES_PER_TARGET), _or(self.step_limit, STEP_LIMIT)
         files = scene_files(self.scenes) if self.scenes else None
         exported = self.folder.suffix == ".onnx"
         if exported and (self.checkpoint or self.pictures):
             wrong = "--checkpoint" if self.checkpoint else "--pictures"
             raise ClearwayError(f"{wrong}: needs a run folder, and {self.folder} is a file. Leave it out")
         agent = self.folder if exported else load_agent(self.folder, self.checkpoint)
-        result = evaluate(agent, files, beside=self.beside, episodes=episodes, step_cap=step_cap, seed=self.seed)
+        result = evaluate(agent, files, beside=self.beside, episodes=episodes, step_limit=step_limit, seed=self.seed)
         if not exported:
             result.save(self.folder)
         if self.pictures:

@@ -38,11 +38,11 @@ class ExportAgent:
     def run(self) -> None:
         """Load the agent, write the file and say what is in it."""
         from clearway.deploy.export import export_onnx
-        from clearway.deploy.from_run import load_scene_agent
+        from clearway.deploy.from_run import load_run_in_scene
 
         check_ending(".onnx", out=self.out)
         files = scene_files(self.scenes) if self.scenes else None
-        chosen = load_scene_agent(self.folder, self.scene, checkpoint=self.checkpoint, files=files)
+        chosen = load_run_in_scene(self.folder, self.scene, checkpoint=self.checkpoint, files=files)
         try:
             export_onnx(chosen, self.out, with_encoder=self.encoder)
         except EncoderError as fault:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Literal
 from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
 from clearway.cli.console import print_json, say, stderr_console, stdout_console
 from clearway.errors import ClearwayError
-from clearway.live.settings import MOST, REFERENCE, Perturbations
+from clearway.live.conditions import MOST, REFERENCE, Perturbations
 
 if TYPE_CHECKING:
     from clearway.learn.load import TrainedNetwork
-    from clearway.live.run import LiveOutcome, LiveScene
+    from clearway.live.walks import LiveOutcome, LiveScene
 
-EPISODES, STEP_CAP = 10, 100
+EPISODES, STEP_LIMIT = 10, 100
 
 
 @dataclass(frozen=True)
@@ -71,30 +71,30 @@ def evaluate_live(
     options: Live,
     *,
     episodes: int,
-    step_cap: int,
+    step_limit: int,
     seed: int,
     pictures: Path | None,
     json: bool,
 ) -> None:
     """Walk the episodes, print, leave live.json and live.md in the run folder, and draw what is asked for."""
     from clearway.learn.load import load_network, run_scenes
-    from clearway.live.settings import Condition, label_of, sweep_settings
+    from clearway.live.conditions import Condition, label_of, sweep_settings
     from clearway.scenes.scene import encoder_names
 
-    check_at_least(1, episodes=episodes, step_cap=step_cap)
+    check_at_least(1, episodes=episodes, step_limit=step_limit)
     check_seeds(seed=seed)
     paths = [folder] if options.against is None else [folder, options.against]
     agents = _named(paths, [load_network(path, checkpoint if path == folder else None) for path in paths])
     scenes = run_scenes(next(iter(agents.values())).record, scene_files(scene_paths) if scene_paths else None)
     _check_rooms_can_be_built()
     from clearway.live.episodes import LiveProtocol
-    from clearway.live.run import check_alike, finish_live, live_json, stages, walk_setting, write_live_part
-    from clearway.live.tables import rich_tables
+    from clearway.live.result_tables import rich_tables
+    from clearway.live.walks import check_alike, finish_live, live_json, stages, walk_setting, write_live_part
 
     check_alike(agents)
     one = Condition(label_of(options.perturbations), options.perturbations)
     settings = sweep_settings(options.strengths) if options.sweep else [one]
-    protocol = LiveProtocol(episodes, step_cap, seed, options.selection)
+    protocol = LiveProtocol(episodes, step_limit, seed, options.selection)
     encoder = encoder_names(scenes)
     with stages(agents, scenes) as places:
         outcomes: list[LiveOutcome] = []

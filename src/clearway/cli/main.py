@@ -28,7 +28,7 @@ from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.serve import Serve
 from clearway.cli.train import Train
 from clearway.cli.video import Video
-from clearway.cli.view import View, ViewScene
+from clearway.cli.view import ViewRuns, ViewScene
 from clearway.errors import ArgumentError, ClearwayError
 
 DESCRIPTION = (
@@ -66,7 +66,7 @@ Command = (
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[Video, tyro.conf.subcommand("video")]
-    | Annotated[View, tyro.conf.subcommand("view")]
+    | Annotated[ViewRuns, tyro.conf.subcommand("view")]
     | Annotated[ExportAgent, tyro.conf.subcommand("export")]
     | Annotated[Serve, tyro.conf.subcommand("serve")]
     | Annotated[Plugins, tyro.conf.subcommand("plugins")]
@@ -123,7 +123,7 @@ def _run(words: Sequence[str]) -> None:
 
 
 def _as_option(told: str) -> str:
-    """What a function says of an argument, "step_cap=0: expected 1", as of an option: "--step-cap 0: expected 1"."""
+    """What a function says of an argument, "step_limit=0: too low", as of an option: "--step-limit 0: too low"."""
     name, equals, rest = told.partition("=")
     return f"--{name.replace('_', '-')} {rest}" if equals and name.isidentifier() else told
 

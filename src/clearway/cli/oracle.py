@@ -50,7 +50,7 @@ class Oracle:
         from clearway.api.targets import chosen_targets
         from clearway.evaluation.optimum import world_yardsticks
         from clearway.scenes.thor_v1 import read_scene
-        from clearway.world.tables import make_world
+        from clearway.world.world import make_world
 
         check_seeds(seed=self.seed)
         check_finite(entropy=self.entropy)

@@ -49,7 +49,7 @@ class Video:
         agent = load_agent(self.folder)
         scenes = run_scenes(agent.record, scene_files(self.scenes) if self.scenes else None)
         world, trajectory = single_episode(
-            agent, scenes, self.scene, self.target, selection=self.selection, step_cap=self.most_steps, seed=self.seed
+            agent, scenes, self.scene, self.target, selection=self.selection, step_limit=self.most_steps, seed=self.seed
         )
         shown = walked(world, agent.on_poses(world), 0, trajectory)
         write_video(self.out, frames(scenes, shown), self.frames_per_s)

@@ -20,7 +20,7 @@ MOST_RUNS = 2
 
 
 @dataclass(frozen=True)
-class View:
+class ViewRuns:
     """Watch an agent in the browser, or two side by side from the same start; drive, and race it.
 
     Example: clearway view runs/collision-aware runs/shortest
@@ -76,7 +76,7 @@ def _show(stage: Stage, port: int, episode: str, in_browser: bool) -> None:
     """Serve the viewer, and say where."""
     from clearway.view.episode import read_episode
     from clearway.view.server import make_app
-    from clearway.view.session import Session
+    from clearway.view.viewing import Viewing
     from clearway.web.browser import opened_in_browser
     from clearway.web.guard import guarded, new_token
     from clearway.web.local import listening, port_of, serve
@@ -84,7 +84,7 @@ def _show(stage: Stage, port: int, episode: str, in_browser: bool) -> None:
     fragment = ""
     if episode:
         wanted = read_episode(episode)
-        Session(stage).begin(wanted)  # refuses here what the page would refuse
+        Viewing(stage).begin(wanted)  # refuses here what the page would refuse
         fragment = f"#{wanted.query()}"
     listener, token = listening(port), new_token()
     app = guarded(make_app(stage), token, port_of(listener))

@@ -9,7 +9,7 @@ from pathlib import Path
 import clearway
 from clearway import files
 from clearway.deploy.export import export_onnx
-from clearway.deploy.from_run import SceneAgent
+from clearway.deploy.from_run import RunInScene
 from clearway.deploy.onnx_file import OnnxAgent
 from clearway.errors import DeployError
 from clearway.version import __version__
@@ -19,7 +19,7 @@ PACKAGES = Path(clearway.__file__).parent
 SHAPING = ("agents", "deploy", "model", "perception")  # packages whose code shapes the file
 
 
-def cached_agent(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxAgent:
+def cached_agent(chosen: RunInScene, tell: Callable[[str], object]) -> OnnxAgent:
     """A run's agent on onnxruntime, exported to the user's cache folder the first time; a damaged file is made again.
 
     Args:
@@ -39,7 +39,7 @@ def cached_agent(chosen: SceneAgent, tell: Callable[[str], object]) -> OnnxAgent
     return OnnxAgent(path)
 
 
-def _key(chosen: SceneAgent) -> str:
+def _key(chosen: RunInScene) -> str:
     """Hash of all that shapes the file: parameters, scene, encoder, the code of all three and clearway's version."""
     agent, digest = chosen.trained, hashlib.sha256()
     for tensors in (agent.network.state_dict(), agent.feature_map.tensors()):

@@ -11,9 +11,9 @@ from typing import Any
 
 import torch
 
-from clearway.deploy.from_run import SceneAgent, exportable_encoder
-from clearway.deploy.graph import AgentGraph
+from clearway.deploy.from_run import RunInScene, exportable_encoder
 from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
+from clearway.deploy.onnx_graph import AgentGraph
 from clearway.errors import DeployError
 from clearway.files import written_whole
 from clearway.version import __version__
@@ -22,7 +22,7 @@ OPSET = 18
 EXAMPLE_SIDES = (48, 64)  # of the pictures that the graph is traced with; it takes any
 
 
-def export_onnx(chosen: SceneAgent, path: Path, *, with_encoder: bool = True) -> None:
+def export_onnx(chosen: RunInScene, path: Path, *, with_encoder: bool = True) -> None:
     """Write an agent for one scene.
 
     With the encoder, the graph's inputs are picture (B, height, width, 3) uint8, start (B,) bool, history (B, K, F)

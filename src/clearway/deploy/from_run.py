@@ -20,7 +20,7 @@ from clearway.scenes.sensors import RGB
 
 
 @dataclass(frozen=True)
-class SceneAgent:
+class RunInScene:
     """A trained agent in one of its scenes.
 
     Attributes:
@@ -86,9 +86,9 @@ class SceneAgent:
         }
 
 
-def load_scene_agent(
+def load_run_in_scene(
     folder: Path, scene: str | None = None, *, checkpoint: Path | None = None, files: Sequence[Path] | None = None
-) -> SceneAgent:
+) -> RunInScene:
     """The agent of a run in one of its scenes.
 
     Args:
@@ -106,10 +106,10 @@ def load_scene_agent(
     if scene is not None and scene not in names:
         raise DeployError(f"{folder}: was not trained on a scene {scene}. Name one of {', '.join(names)}")
     index = 0 if scene is None else names.index(scene)
-    return SceneAgent(trained, run_scenes(trained.record, files)[index], index, names)
+    return RunInScene(trained, run_scenes(trained.record, files)[index], index, names)
 
 
-def picture_encoder(chosen: SceneAgent) -> Encoder:
+def picture_encoder(chosen: RunInScene) -> Encoder:
     """The encoder that made the features of an agent's scene.
 
     Raises:
@@ -122,7 +122,7 @@ def picture_encoder(chosen: SceneAgent) -> Encoder:
     return encoder_from_record(chosen.encoder_record)
 
 
-def exportable_encoder(chosen: SceneAgent) -> NetworkEncoder:
+def exportable_encoder(chosen: RunInScene) -> NetworkEncoder:
     """The encoder that made the features of an agent's scene, as a network.
 
     Raises:
@@ -145,7 +145,7 @@ class RunAgent(FeatureAgent):
         EncoderError: the encoder that made the scene's features cannot be had.
     """
 
-    def __init__(self, chosen: SceneAgent) -> None:
+    def __init__(self, chosen: RunInScene) -> None:
         encoder = picture_encoder(chosen)
         super().__init__(chosen.policy, encoder)
         self.card: Card = chosen.card(encoder)

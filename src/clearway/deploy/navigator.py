@@ -44,9 +44,9 @@ def open_agent(source: str | Path, scene: str | None = None) -> DeployedAgent:
     """
     path = Path(source)
     if path.is_dir():
-        from clearway.deploy.from_run import RunAgent, load_scene_agent
+        from clearway.deploy.from_run import RunAgent, load_run_in_scene
 
-        return RunAgent(load_scene_agent(path, scene))
+        return RunAgent(load_run_in_scene(path, scene))
     from clearway.deploy.onnx_file import OnnxAgent
 
     agent = OnnxAgent(path)

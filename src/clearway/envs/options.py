@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from clearway.errors import EnvError
-from clearway.world.tables import DistanceTable, World
+from clearway.world.world import DistanceTable, World
 
 RESET_MASK = "reset_mask"
 EPISODE_OPTIONS = ("scene", "target", "start")

@@ -12,7 +12,7 @@ from clearway.envs.floor_map import FloorMap
 from clearway.envs.marks import FINENESS, draw_agent, draw_bump, draw_target, paint_zone
 from clearway.envs.record import EpisodeSoFar
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 from clearway.zones import ZONE_NAMES, Zone
 
 RENDER_MODES = ("rgb_array", "ansi")

@@ -14,7 +14,7 @@ from gymnasium import spaces
 from clearway.errors import EnvError, SceneError
 from clearway.scenes.scene import Observations, Scene
 from clearway.scenes.sensors import RGB, Sensor
-from clearway.world.tables import World
+from clearway.world.world import World
 
 ObservationKind = Literal["features", "pictures"]
 OBSERVATION_KINDS = ("features", "pictures")

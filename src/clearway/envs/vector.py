@@ -34,7 +34,7 @@ from clearway.reward import Reward, reward_named
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.sensors import RGB
 from clearway.world.navigation import HISTORY_LENGTH, Navigation, TargetChoice
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]

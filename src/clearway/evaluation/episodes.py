@@ -1,4 +1,4 @@
-"""Episodes by the paper's protocol, walked side by side: random starts, a cap on the steps.
+"""Episodes by the paper's protocol, walked side by side: random starts, a limit of steps.
 
 Axis letters: N episodes, B of them still walking, A actions, M targets, Z zones, T steps.
 """
@@ -24,10 +24,10 @@ from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
 from clearway.world.navigation import Navigation, Transition
 from clearway.world.randomness import stream_keys
-from clearway.world.tables import World
+from clearway.world.world import World
 
 EPISODES_PER_TARGET = 100
-STEP_CAP = 10_000
+STEP_LIMIT = 10_000
 EPISODES_AT_ONCE = 4096
 TARGET_STREAM = 11
 
@@ -47,12 +47,12 @@ class EpisodeTable:
     Attributes:
         target: (N,) int64, index of the world's target, ascending.
         start: (N,) int64, first state in the world's numbering.
-        steps: (N,) int64, steps taken; the cap where the target was not reached.
+        steps: (N,) int64, steps taken; the limit where the target was not reached.
         collisions: (N,) int64, blocked moves.
-        reached: (N,) bool, the target was reached before the cap.
+        reached: (N,) bool, the target was reached before the limit.
         shortest_path_steps: (N,) int64, fewest steps from the start to the target.
         zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
-        looped: (N,) bool, found before the cap to be in a circle of actions without choice, so never to arrive.
+        looped: (N,) bool, found before the limit to be in a circle of actions without choice, so never to arrive.
         trajectories: the walks, one an episode; None unless asked for.
     """
 
@@ -78,7 +78,7 @@ def run_episodes(
     scenes: Sequence[Scene] = (),
     selection: ActionSelection = "sampled",
     episodes_per_target: int = EPISODES_PER_TARGET,
-    step_cap: int = STEP_CAP,
+    step_limit: int = STEP_LIMIT,
     seed: int = 0,
     record: bool = False,
     episodes_at_once: int = EPISODES_AT_ONCE,
@@ -92,19 +92,19 @@ def run_episodes(
     Args:
         world: the tables; the walk happens on their device.
         agent: who walks. A walk in a circle of actions that it is certain of is completed by arithmetic instead of
-            walked to the cap; the counts are the same.
+            walked to the limit; the counts are the same.
         scenes: the world's, in its order, for an agent that sees pictures.
         selection: how actions are chosen by the agent's probabilities.
         episodes_per_target: how many.
-        step_cap: steps after which an episode has failed.
+        step_limit: steps after which an episode has failed.
         seed: another seed gives other starts and other chances.
-        record: keep the trajectories too (then circles are walked to the cap).
+        record: keep the trajectories too (then circles are walked to the limit).
         episodes_at_once: most episodes to walk side by side; changes memory and speed, not the result.
 
     Raises:
         AgentError: the agent sees what is not there, or does what no agent may.
     """
-    assert episodes_per_target > 0 and step_cap > 0 and episodes_at_once > 0
+    assert episodes_per_target > 0 and step_limit > 0 and episodes_at_once > 0
     target = torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target)
     seeds = episode_seeds(world, episodes_per_target, seed)
     agent = selecting(agent, selection, world)
@@ -112,7 +112,7 @@ def run_episodes(
     parts = []
     with torch.no_grad():
         for chosen in torch.arange(len(target), device=world.device).split(episodes_at_once):
-            walk = _Walk(world, agent, sight, seeds[chosen], target[chosen], step_cap, record)
+            walk = _Walk(world, agent, sight, seeds[chosen], target[chosen], step_limit, record)
             parts.append(walk.to_the_end())
     return _joined(parts)
 
@@ -137,10 +137,10 @@ class _Walk:
     """A batch of episodes on the way. Episodes that end are written down and dropped from the batch."""
 
     def __init__(
-        self, world: World, agent: Agent, sight: Sight, seeds: Tensor, target: Tensor, step_cap: int, record: bool
+        self, world: World, agent: Agent, sight: Sight, seeds: Tensor, target: Tensor, step_limit: int, record: bool
     ) -> None:
         count = len(seeds)
-        self.world, self.agent, self.sight, self.step_cap = world, agent, sight, step_cap
+        self.world, self.agent, self.sight, self.step_limit = world, agent, sight, step_limit
         # No number here rests on the reward; the environment wants one.
         self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
         self.env.reset(target=target)
@@ -169,19 +169,19 @@ class _Walk:
         return self._table()
 
     def _close_circles(self, certain: np.ndarray | None) -> None:
-        """Note who walks in a circle for ever, and add its rounds up to the cap, unless every step is recorded."""
+        """Note who walks in a circle for ever, and add its rounds up to the limit, unless every step is recorded."""
         if certain is None:
             return
         known = {name: values for name, values in self.memory.items() if name != CHANCE}
         where = {**known, "standing in": self.env.state.cpu().numpy()}
         sure = torch.from_numpy(certain).to(self.world.device)
-        tally, closed = self.loops.skip(where, self.tally, sure, self.step_cap)
+        tally, closed = self.loops.skip(where, self.tally, sure, self.step_limit)
         self.looped[self.walking[closed]] = True
         if self.diary is None:
             self.tally = tally
 
     def _drop_ended(self, happened: Transition) -> None:
-        ended = happened.reached | (self.tally.steps >= self.step_cap)
+        ended = happened.reached | (self.tally.steps >= self.step_limit)
         if not bool(ended.any()):
             return
         episode = self.walking[ended]

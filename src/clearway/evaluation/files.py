@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from clearway.evaluation.report import Evaluation
+from clearway.evaluation.summary import Evaluation
 from clearway.evaluation.tables import markdown_table
 from clearway.files import json_text, written_whole
 

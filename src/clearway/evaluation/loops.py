@@ -2,7 +2,7 @@
 
 An agent that is certain of every action repeats itself for ever once it stands in the same pose with the same memory.
 `LoopSkipper` finds that by Brent's method (a snapshot, renewed at the powers of two, is compared with all that follows)
-and adds as many whole rounds as fit below the cap; the rest is walked. The counts are exactly those of walking on.
+and adds as many whole rounds as fit below the limit; the rest is walked. The counts are exactly those of walking on.
 """
 
 from __future__ import annotations
@@ -71,22 +71,22 @@ class LoopSkipper:
         self.certain = torch.zeros(count, dtype=torch.bool, device=tally.steps.device)
 
     def skip(
-        self, where: Mapping[str, np.ndarray], tally: Tally, certain: Tensor, step_cap: int
+        self, where: Mapping[str, np.ndarray], tally: Tally, certain: Tensor, step_limit: int
     ) -> tuple[Tally, Tensor]:
-        """The counts after one more step, with all whole rounds below the cap where a circle has closed; where, (B,).
+        """The counts after one more step, with all whole rounds below the limit where a circle has closed; where, (B,).
 
         Args:
             where: all that the further walk follows from but for chance, each (B, ...), after the step.
             tally: the counts after the step.
             certain: (B,) bool, the step's action was the only one possible.
-            step_cap: the episodes' last step.
+            step_limit: the episodes' last step.
         """
         self.walked += 1
         self.certain = self.certain & certain
         closed = self.certain
         if bool(closed.any()):
             closed = closed & torch.from_numpy(_same(where, self.snapshot)).to(closed.device)
-            tally = self._rounds_added(tally, closed, step_cap)
+            tally = self._rounds_added(tally, closed, step_limit)
         if self.walked == self.renew_at:
             self.snapshot, self.tally, self.renew_at = where, tally, 2 * self.renew_at
             self.certain = torch.ones_like(self.certain)
@@ -98,10 +98,10 @@ class LoopSkipper:
         self.snapshot = {name: values[still] for name, values in self.snapshot.items()}
         self.tally, self.certain = self.tally.at(kept), self.certain[kept]
 
-    def _rounds_added(self, tally: Tally, closed: Tensor, step_cap: int) -> Tally:
+    def _rounds_added(self, tally: Tally, closed: Tensor, step_limit: int) -> Tally:
         """Whole rounds added where closed; those episodes are not watched until the snapshot is renewed."""
         length = (tally.steps - self.tally.steps).clamp(min=1)
-        rounds = torch.where(closed, (step_cap - tally.steps) // length, 0)
+        rounds = torch.where(closed, (step_limit - tally.steps) // length, 0)
         self.certain = self.certain & ~closed
         return tally.plus_rounds(rounds, self.tally)
 

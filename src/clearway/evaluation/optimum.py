@@ -11,7 +11,7 @@ from clearway.agents.agent import Agent
 from clearway.agents.by_pose import by_table
 from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, make_task, yardstick
 from clearway.reward import Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 OPTIMUM, SOFT_FIXED_POINT = "optimum", "soft fixed point"  # names of the two policies in tables
 

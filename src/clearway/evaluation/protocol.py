@@ -9,10 +9,10 @@ from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.agents.selection import ActionSelection
 from clearway.errors import AgentError
-from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP, run_episodes
-from clearway.evaluation.report import Evaluation, Protocol, summarise
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT, run_episodes
+from clearway.evaluation.summary import Evaluation, Protocol, summarise
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 RANDOM, SHORTEST_PATH = "random", "shortest path"
 
@@ -26,7 +26,7 @@ def evaluate_agents(
     selections: Sequence[ActionSelection] = get_args(ActionSelection),
     encoder: str,
     episodes_per_target: int = EPISODES_PER_TARGET,
-    step_cap: int = STEP_CAP,
+    step_limit: int = STEP_LIMIT,
     seed: int = 0,
 ) -> list[Evaluation]:
     """Every agent with each way of choosing actions, then the references, random and shortest-path agent.
@@ -42,7 +42,7 @@ def evaluate_agents(
         selections: ways of choosing actions that the agents are tried with.
         encoder: name of the encoder whose features the agents see.
         episodes_per_target: how many each.
-        step_cap: steps after which an episode has failed.
+        step_limit: steps after which an episode has failed.
         seed: of starts, chances and bootstrap.
 
     Raises:
@@ -60,11 +60,11 @@ def evaluate_agents(
                 scenes=scenes,
                 selection=selection,
                 episodes_per_target=episodes_per_target,
-                step_cap=step_cap,
+                step_limit=step_limit,
                 seed=seed,
             )
         except AgentError as fault:
             raise AgentError(f"{name}: {fault}") from fault
-        protocol = Protocol(episodes_per_target, step_cap, seed, selection)
+        protocol = Protocol(episodes_per_target, step_limit, seed, selection)
         evaluations.append(summarise(world, table, name, encoder, protocol))
     return evaluations

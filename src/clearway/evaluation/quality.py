@@ -11,7 +11,7 @@ import numpy as np
 
 from clearway.evaluation import metrics
 from clearway.evaluation.episodes import EpisodeTable
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 
 from clearway.agents.agent import Agent
 from clearway.evaluation.episodes import Trajectory, run_episodes
-from clearway.world.tables import World
+from clearway.world.world import World
 
 EPISODES = 20  # a target, to choose from
-STEP_CAP = 500
+STEP_LIMIT = 500
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def showcases(world: World, agents: Mapping[str, Agent], *, seed: int = 0) -> li
             world,
             agent,
             episodes_per_target=EPISODES,
-            step_cap=STEP_CAP,
+            step_limit=STEP_LIMIT,
             seed=seed,
             record=True,
         )

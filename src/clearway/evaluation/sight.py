@@ -10,7 +10,7 @@ from torch import Tensor
 from clearway.agents.agent import FEATURES, POSE, Agent, Observation
 from clearway.errors import AgentError
 from clearway.scenes.scene import Observations, Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 class Sight:

@@ -9,7 +9,7 @@ from clearway.errors import RunError
 from clearway.evaluation.episodes import Trajectory, run_episodes
 from clearway.learn.load import TrainedAgent, run_tables
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 def single_episode(
@@ -19,7 +19,7 @@ def single_episode(
     target: int | None,
     *,
     selection: ActionSelection,
-    step_cap: int,
+    step_limit: int,
     seed: int,
 ) -> tuple[World, Trajectory]:
     """The episode, with the world it was walked in, which has its target alone.
@@ -30,7 +30,7 @@ def single_episode(
         scene: name of the scene; None: the first.
         target: state in the scene's numbering, trained on or not; None: the first one trained on.
         selection: how actions are chosen.
-        step_cap: the episode ends after so many steps.
+        step_limit: the episode ends after so many steps.
         seed: of start and actions.
 
     Raises:
@@ -48,7 +48,7 @@ def single_episode(
         agent.on_poses(world),
         selection=selection,
         episodes_per_target=1,
-        step_cap=step_cap,
+        step_limit=step_limit,
         seed=seed,
         record=True,
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT
-from clearway.evaluation.report import Evaluation, Result
+from clearway.evaluation.summary import Evaluation, Result
 from clearway.markdown import table_lines
 from clearway.terminal import noted
 
@@ -184,7 +184,7 @@ def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
     notes = [
         f"Encoder: {encoders}.",
         *dict.fromkeys(f"{found.agent}: {found.trained}." for found in evaluations if found.trained),
-        f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_cap:,} "
+        f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_limit:,} "
         f"steps, seed {protocol.seed}. Ranges: 95 % bootstrap intervals over episodes.",
     ]
     for name, meaning in REFERENCES.items():
@@ -193,7 +193,7 @@ def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
     if any(evaluation.average.failed_targets for evaluation in evaluations):
         notes.append(
             f"{MARK} Not every episode reached its target; a failed episode counts with all its "
-            f"{protocol.step_cap:,} steps in every mean it is part of."
+            f"{protocol.step_limit:,} steps in every mean it is part of."
         )
     return notes
 

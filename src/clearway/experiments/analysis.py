@@ -23,7 +23,7 @@ from clearway.experiments.plan import Job
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE, Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 FILE = "analysis.json"
 BETAS = (-0.01, -0.02, -0.05, -0.1, -0.2)

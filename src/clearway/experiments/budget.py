@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from clearway.choices import BudgetName, RoomName
-from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.rooms import ROOM_NAMES
 
 
@@ -20,7 +20,7 @@ class Budget:
         frames: of a run under the published settings in the main experiment (the paper: 10 M).
         default_frames: of a run of the default recipe there; None: as many as the recipe says.
         seeds: agents of each kind.
-        episodes_per_target, step_cap: of every evaluation.
+        episodes_per_target, step_limit: of every evaluation.
         unseen_targets: tried at each distance in a scene, at most.
         most_scenes: scenes taken of a folder of dumps; None: all.
         whole_grid: solve all settings of the analysis, not a few of them.
@@ -33,7 +33,7 @@ class Budget:
     default_frames: int | None
     seeds: int
     episodes_per_target: int
-    step_cap: int
+    step_limit: int
     unseen_targets: int
     most_scenes: int | None = None
     whole_grid: bool = True
@@ -59,7 +59,7 @@ class Budget:
         return f"Less than the paper's budget: {'; '.join(found)}." if found else ""
 
 
-PAPER = Budget("paper", ROOM_NAMES, 10_000_000, None, 5, EPISODES_PER_TARGET, STEP_CAP, 20)
+PAPER = Budget("paper", ROOM_NAMES, 10_000_000, None, 5, EPISODES_PER_TARGET, STEP_LIMIT, 20)
 """The paper's frames, with five seeds instead of one."""
 
 SMOKE = Budget(

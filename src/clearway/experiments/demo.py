@@ -9,9 +9,9 @@ from pathlib import Path
 
 from clearway.errors import ClearwayError
 from clearway.evaluation.files import write_evaluations
-from clearway.evaluation.report import Evaluation
-from clearway.evaluation.run import evaluate_runs
+from clearway.evaluation.runs import evaluate_runs
 from clearway.evaluation.showcase import Showcase, showcases
+from clearway.evaluation.summary import Evaluation
 from clearway.learn.load import TrainedAgent, load_agent, run_world
 from clearway.learn.presets import DEFAULT
 from clearway.learn.run_folder import RunFolder

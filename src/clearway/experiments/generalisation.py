@@ -14,7 +14,7 @@ from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import Series, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 METRICS = ("sc", "sc_4x", "spl")
 HEADINGS = ("sc", "95 % of sc", "sc within 4 x shortest", "95 % of that", "SPL", "95 % of SPL")
@@ -67,8 +67,8 @@ def tried(
     farthest = max(
         int(scene.distances_to(np.array(own)).max()) for scene, own in zip(setting.scenes, targets, strict=True) if own
     )
-    step_cap = max(SC_STEPS, SC_DETOUR * farthest)
-    return compared(setting, rewards, targets=trained, tried_on=targets, step_cap=step_cap)
+    step_limit = max(SC_STEPS, SC_DETOUR * farthest)
+    return compared(setting, rewards, targets=trained, tried_on=targets, step_limit=step_limit)
 
 
 def together(parts: Sequence[Tried]) -> Tried:

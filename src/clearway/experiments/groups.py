@@ -15,7 +15,7 @@ from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
 from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
@@ -86,7 +86,7 @@ def random_walk(world: World, trial: Trial) -> Scores:
         world,
         RandomWalk(),
         episodes_per_target=trial.episodes_per_target,
-        step_cap=trial.step_cap,
+        step_limit=trial.step_limit,
         seed=trial.seed,
     )
     return scores({0: table}, world.target_count)
@@ -100,7 +100,7 @@ def compared(
     tried_on: TargetSets | None = None,
     frames_factor: float = 1,
     halfway: bool = False,
-    step_cap: int | None = None,
+    step_limit: int | None = None,
 ) -> list[Group]:
     """A group for each learner and reward.
 
@@ -111,13 +111,13 @@ def compared(
         tried_on: to be tried on; None: those trained on.
         frames_factor: multiplies the learners' frames.
         halfway: try the agents halfway through their training, not in the end.
-        step_cap: end the trial's episodes sooner than the budget does.
+        step_limit: end the trial's episodes sooner than the budget does.
     """
     found = []
     for name, learner in setting.learners.items():
         for reward in rewards:
             runs = setting.runs(learner, reward, targets, frames_factor)
-            trial = setting.trial(targets if tried_on is None else tried_on, halfway=halfway, step_cap=step_cap)
+            trial = setting.trial(targets if tried_on is None else tried_on, halfway=halfway, step_limit=step_limit)
             found.append(Group(name, reward.name, runs, trial))
     return found
 

@@ -19,7 +19,7 @@ from clearway.learn.run_folder import RunFolder, scene_digest
 from clearway.learn.train import RunRequest, set_threads, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 
 RUNS, TRIALS = "runs", "trials"
 
@@ -66,7 +66,7 @@ def do(out: Path, job: Job, threads: int) -> None:
                 "targets": targets,
                 "halfway": trial.halfway,
                 "seed": trial.seed,
-                "step_cap": trial.step_cap,
+                "step_limit": trial.step_limit,
             }
             write_episodes(path, _walk(folder, scenes, run, trial), about)
 
@@ -95,6 +95,6 @@ def _walk(folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Tr
         world,
         agent.on_poses(world),
         episodes_per_target=trial.episodes_per_target,
-        step_cap=trial.step_cap,
+        step_limit=trial.step_limit,
         seed=trial.seed,
     )

@@ -16,7 +16,7 @@ from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import ReportTable, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 METRICS = ("steps", "collisions")
 TARGET_METRICS = ("steps", "shortest_path_steps", "collisions", "success", "sc", "sc_4x", "spl")

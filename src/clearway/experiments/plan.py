@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.learn.learner import Learner
 from clearway.reward import Reward
 
@@ -67,14 +67,14 @@ class Trial:
     Attributes:
         targets: of each scene.
         halfway: try the agent as it was halfway through its training, not the trained one.
-        episodes_per_target, step_cap: of the protocol.
+        episodes_per_target, step_limit: of the protocol.
         seed: of starts and sampled actions.
     """
 
     targets: TargetSets
     halfway: bool = False
     episodes_per_target: int = EPISODES_PER_TARGET
-    step_cap: int = STEP_CAP
+    step_limit: int = STEP_LIMIT
     seed: int = 0
 
     @property

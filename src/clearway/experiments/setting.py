@@ -20,7 +20,7 @@ from clearway.rooms.library import cached_room_scene
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, is_published
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 
 SCENES = "scenes"
 LEARNERS: dict[LearnerName, Learner] = {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}
@@ -76,13 +76,17 @@ class Setting:
         own = self.targets if targets is None else targets
         return tuple(PlannedRun(self.files, own, reward, longer, seed) for seed in self.seeds)
 
-    def trial(self, targets: TargetSets | None = None, *, halfway: bool = False, step_cap: int | None = None) -> Trial:
+    def trial(
+        self, targets: TargetSets | None = None, *, halfway: bool = False, step_limit: int | None = None
+    ) -> Trial:
         """The protocol on some targets, the paper's by default; of the agent halfway, or in the end.
 
-        `step_cap` ends episodes sooner than the budget does.
+        `step_limit` ends episodes sooner than the budget does.
         """
-        own, cap = self.targets if targets is None else targets, self.budget.step_cap
-        return Trial(own, halfway, self.budget.episodes_per_target, cap if step_cap is None else min(cap, step_cap))
+        own, limit = self.targets if targets is None else targets, self.budget.step_limit
+        return Trial(
+            own, halfway, self.budget.episodes_per_target, limit if step_limit is None else min(limit, step_limit)
+        )
 
 
 def prepare(

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.importers.limits import check_picture_count, check_picture_size
+from clearway.importers.picture_limits import check_picture_count, check_picture_size
 from clearway.importers.pose_graph import recorded_pose_graph
 from clearway.progress import picture_progress
 from clearway.scenes.scene import Provenance, Scene

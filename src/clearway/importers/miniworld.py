@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.importers.limits import check_picture_count, check_picture_size
+from clearway.importers.picture_limits import check_picture_count, check_picture_size
 from clearway.progress import picture_progress
 from clearway.scenes.grid import HEADING_COUNT, connected_parts, edges_among, neighbour_pairs, pose_graph
 from clearway.scenes.scene import Provenance, Scene, TopView

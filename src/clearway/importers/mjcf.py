@@ -14,9 +14,9 @@ import mujoco
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.importers.limits import check_picture_count, check_picture_size
 from clearway.importers.mjcf_compile import compiled
 from clearway.importers.mjcf_floor import FloorChoice, find_cells, floor_of, span_of
+from clearway.importers.picture_limits import check_picture_count, check_picture_size
 from clearway.rooms.build import shaping_versions
 from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, first_person_view
 from clearway.rooms.navigation import Floor

@@ -13,9 +13,9 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from clearway.errors import SceneError
-from clearway.importers.limits import check_picture_size
-from clearway.scenes.limits import array_limit
-from clearway.scenes.pictures import file_stamp
+from clearway.importers.picture_limits import check_picture_size
+from clearway.scenes.file_pictures import file_stamp
+from clearway.scenes.memory_limits import array_limit
 
 MAX_PICTURE_PIXELS = 80_000_000  # a photograph that unpacks to more is refused before it is unpacked
 PIXEL_BYTES = 4  # in memory

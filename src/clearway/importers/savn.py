@@ -24,9 +24,9 @@ from clearway.errors import SceneError
 from clearway.importers.json_files import read_json
 from clearway.scenes import hdf5
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
+from clearway.scenes.file_pictures import file_stamp
 from clearway.scenes.grid import HEADING_COUNT, HEADING_STEPS
-from clearway.scenes.limits import array_limit
-from clearway.scenes.pictures import file_stamp
+from clearway.scenes.memory_limits import array_limit
 from clearway.scenes.scene import EncoderRecord, Observations, Provenance, Scene
 from clearway.scenes.validate import MAX_COORDINATE_M, MAX_FEATURES, MAX_STATES, check_scene
 from clearway.version import __version__

@@ -33,7 +33,7 @@ from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.navigation import Navigation, TargetChoice
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 @dataclass(frozen=True)

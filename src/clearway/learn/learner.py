@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from clearway.learn.run_folder import RunRecord
     from clearway.learn.train import Learning
     from clearway.reward import Reward
-    from clearway.world.tables import World
+    from clearway.world.world import World
 
 AT_LEAST_ONE = {"frames", "envs", "rollout_steps", "step_limit", "epochs", "minibatches", "width"}
 AT_LEAST_ONE |= {"scene_updates", "history_length"}

@@ -22,7 +22,7 @@ from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import ScenePolicy
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
-from clearway.world.tables import World, make_world, scene_tables
+from clearway.world.world import World, make_world, scene_tables
 
 
 @runtime_checkable

@@ -19,7 +19,7 @@ from torch import Tensor
 from clearway.model.lookup import LookupNetwork
 from clearway.model.sums import counted
 from clearway.world.navigation import Navigation
-from clearway.world.tables import World
+from clearway.world.world import World
 
 UNKNOWN = -1
 

@@ -12,7 +12,7 @@ from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 if TYPE_CHECKING:
     from clearway.learn.trainer import Trainer
     from clearway.reward import Reward
-    from clearway.world.tables import World
+    from clearway.world.world import World
 
 
 @dataclass(frozen=True)

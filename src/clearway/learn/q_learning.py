@@ -32,7 +32,7 @@ from clearway.reward import Reward
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.navigation import Navigation
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 if TYPE_CHECKING:
     from clearway.learn.run_folder import RunRecord
@@ -120,7 +120,7 @@ class TableTrainer:
             errors.append(self._learn(row * ACTION_COUNT + action, step.reward + learner.discount * onward))
             walked.append((target, step.reached, step.truncated, step.blocked))
             nav.restart(step.ended)
-        self.statistics.add(Walked(*(torch.stack(column) for column in zip(*walked, strict=True))))
+        self.statistics.add(WalkedSteps(*(torch.stack(column) for column in zip(*walked, strict=True))))
         self.frames += learner.envs * learner.rollout_steps
         self.updates += 1
         result = {"value_error": float(torch.stack(errors).mean()), "explore": explore}
@@ -164,7 +164,7 @@ class TableTrainer:
 
 
 @dataclass(frozen=True)
-class Walked:
+class WalkedSteps:
     """What `EpisodeStatistics` counts of T steps of N environments: target (T, N) int64, the others (T, N) bool."""
 
     target: Tensor

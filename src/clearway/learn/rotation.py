@@ -13,7 +13,7 @@ from torch import Tensor
 
 from clearway.errors import RunError
 from clearway.learn.on_policy import OnPolicy
-from clearway.world.tables import World
+from clearway.world.world import World
 
 ROTATION_SALT = 1_000_033
 

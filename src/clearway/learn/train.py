@@ -35,7 +35,7 @@ from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 
 ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 SECONDS_BETWEEN_CHECKPOINTS = 60.0

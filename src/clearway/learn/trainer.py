@@ -31,13 +31,13 @@ from clearway.model.sums import counted
 from clearway.reward import Reward
 from clearway.world.navigation import Navigation, TargetChoice
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 SHUFFLE_SALT = 1_000_003
 
 
 @dataclass(frozen=True)
-class Step:
+class StepFigures:
     """What came of a minibatch: its loss, the gradient's norm before clipping, and how much it was."""
 
     loss: LossTerms
@@ -225,7 +225,7 @@ class Trainer:
         )
         return batch if told is None else merged(batch, told)
 
-    def _learn(self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings) -> list[Step]:
+    def _learn(self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings) -> list[StepFigures]:
         """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
         learner, world = self.learner, self.world
         generator = torch.Generator(world.device).manual_seed(self.seed * SHUFFLE_SALT + self.updates)
@@ -238,7 +238,7 @@ class Trainer:
             row_step=self.lookup.row_step,
             generator=generator,
         )
-        steps: list[Step] = []
+        steps: list[StepFigures] = []
         siamese_moved = False
         for minibatches in epochs:
             for number, part in enumerate(minibatches, start=1):
@@ -250,7 +250,7 @@ class Trainer:
 
     def _step(
         self, part: Minibatch, kept: Activations | None, lr: float, settings: LossSettings, siamese_moves: bool
-    ) -> Step:
+    ) -> StepFigures:
         """One step of the optimisers, of the first layer's weight where it moves."""
         learner = self.learner
         known = part.history, part.target, part.pairs_per_scene
@@ -264,9 +264,9 @@ class Trainer:
         self.optimiser.step(lr)
         if siamese_moves:
             self.siamese_optimiser.step(lr * learner.siamese_lr)
-        return Step(loss, norm, len(part.rows), part.pair_count, part.history_count)
+        return StepFigures(loss, norm, len(part.rows), part.pair_count, part.history_count)
 
-    def _loss_figures(self, steps: list[Step], explained: Tensor) -> Figures:
+    def _loss_figures(self, steps: list[StepFigures], explained: Tensor) -> Figures:
         """Figures of the loss, read from the device at once: means over steps, and the explained variance."""
         names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
         told = [

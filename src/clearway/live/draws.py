@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from clearway.live.settings import Perturbations
+from clearway.live.conditions import Perturbations
 
 FURNITURE, OBSTACLE, MOVES, TURNS, HEIGHTS, PITCHES, LIGHT, PIXELS = range(8)
 

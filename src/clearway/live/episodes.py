@@ -20,18 +20,18 @@ from clearway.agents.agent import FEATURES, Agent, Observation, rows
 from clearway.agents.selection import Argmax
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds
+from clearway.live.arrangement import Arrangement, arranged, as_built, furniture_moved, with_obstacle_on_path
 from clearway.live.body import SAMPLES, Body, Motion
+from clearway.live.conditions import Perturbations
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
-from clearway.live.layout import Arrangement, arranged, as_built, furniture_moved, with_obstacle_on_path
-from clearway.live.room import LiveRoom
-from clearway.live.settings import Perturbations
+from clearway.live.live_room import LiveRoom
 from clearway.reward import COLLISION_AWARE
 from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
 from clearway.rooms.render import Camera
 from clearway.scenes.actions import Action
 from clearway.scenes.sensors import RGB
 from clearway.world.navigation import Navigation
-from clearway.world.tables import World
+from clearway.world.world import World
 
 LiveSelection = Literal["sampled", "argmax"]
 SUCCESS_M, SUCCESS_DEG = 0.25, 45.0
@@ -48,9 +48,9 @@ class LiveTable:
         target: (N,) int64, index of the world's target, ascending.
         start: (N,) int64, first state in the scene's numbering.
         seed: (N,) int64, of the episode's `Draws`.
-        steps: (N,) int64, steps taken; the cap where the target was not reached.
+        steps: (N,) int64, steps taken; the limit where the target was not reached.
         contacts: (N,) int64, moves that ended at an obstacle.
-        reached: (N,) bool, the target was reached before the cap.
+        reached: (N,) bool, the target was reached before the limit.
         shortest_path_steps: (N,) int64, fewest steps on the grid as it was built.
         least_gap_m: (N,) float64, smallest distance between the body and an obstacle.
         mean_gap_m: (N,) float64, its mean over time, every distance counted up to `body.REACH_M`.
@@ -86,13 +86,13 @@ class LiveProtocol:
 
     Attributes:
         episodes_per_target: how many.
-        step_cap: steps after which an episode has failed.
+        step_limit: steps after which an episode has failed.
         seed: of starts, actions and perturbations.
         selection: how actions are chosen by the agent's probabilities.
     """
 
     episodes_per_target: int
-    step_cap: int
+    step_limit: int
     seed: int
     selection: LiveSelection
 
@@ -132,7 +132,7 @@ def run_live_episodes(
     agent = Argmax(agent) if protocol.selection == "argmax" else agent
     walking = np.arange(len(walkers))
     memory = agent.reset(_wanted(live, world, target), seeds.numpy())
-    for _ in range(protocol.step_cap):
+    for _ in range(protocol.step_limit):
         seen = {RGB: _seen([walkers[episode] for episode in walking], camera)} if RGB in agent.sees else {}
         decisions, memory = agent.act(seen, memory)
         for episode, action in zip(walking, decisions.action.tolist(), strict=True):

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from clearway.errors import RunError
 from clearway.world.feature_store import BLOCK_ROWS, FEW_STATES, empty_store
-from clearway.world.tables import World
+from clearway.world.world import World
 
 FITTED_STATES = 32_768  # states that a feature map is fitted to: evenly spaced ones, where there are more
 SPANNED = 1e-5  # a direction counts where its singular value is at least this share of the largest

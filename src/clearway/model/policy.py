@@ -16,7 +16,7 @@ from clearway.model.lookup import LookupNetwork
 from clearway.model.network import SiameseActorCritic
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.randomness import drawn_by
-from clearway.world.tables import DistanceTable, World
+from clearway.world.world import DistanceTable, World
 
 Critic: TypeAlias = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
 """history (B, K) int64 states in the world's numbering, target (B,) int64 -> probabilities (B, A), values (B,)."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from clearway.errors import EncoderError
 from clearway.files import cache_dir, locked, written_whole
-from clearway.scenes.pictures import BLOCK_PICTURES
+from clearway.scenes.file_pictures import BLOCK_PICTURES
 from clearway.scenes.scene import Observations
 
 

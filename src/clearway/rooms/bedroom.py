@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from clearway.rooms import finishes, textures
 from clearway.rooms.frame import Frame
-from clearway.rooms.furniture import beds, decor, lamps, openings, seating, storage, tables
+from clearway.rooms.furniture import beds, decor, lamps, openings, seating, storage, tables_and_desks
 from clearway.rooms.furniture.small import any_small_piece
 from clearway.rooms.materials import varied
 from clearway.rooms.room import Room
@@ -67,7 +67,7 @@ def _place_bed(room: Room) -> None:
 
 def _place_study(room: Room) -> None:
     """Desk and chair by the east window, bookcase, chest of drawers, armchair."""
-    tables.desk(room, room.wall("east", 2.25, gap_m=0.31), 1.3)
+    tables_and_desks.desk(room, room.wall("east", 2.25, gap_m=0.31), 1.3)
     seating.office_chair(room, Frame(5.65, 2.25, -90.0))
     storage.bookcase(room, STUDY_WALL.face("east", 2.75).moved(0, 0.165), 0.9)
     storage.drawers(room, room.wall("east", 3.525, gap_m=0.23), 0.95)

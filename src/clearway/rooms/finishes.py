@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.rooms import pictures, textures
+from clearway.rooms import artwork, textures
 from clearway.rooms.materials import varied
 from clearway.rooms.room import Room
 from clearway.rooms.shell import wall_size_m
@@ -90,9 +90,9 @@ def with_rug(
     round_edge: bool = False,
 ) -> np.ndarray:
     """A floor with a rug in the scheme's colours; without a name the seed chooses the pattern."""
-    chosen = pattern or pictures.RUGS[int(room.rng.integers(len(pictures.RUGS)))]
+    chosen = pattern or artwork.RUGS[int(room.rng.integers(len(artwork.RUGS)))]
     ground, second = varied(room.rng, room.colours.rug, 0.04), varied(room.rng, room.colours.rug_second, 0.04)
-    image = pictures.rug(room.rng, pixels(size_m[1]), pixels(size_m[0]), ground, second, chosen)
+    image = artwork.rug(room.rng, pixels(size_m[1]), pixels(size_m[0]), ground, second, chosen)
     return pasted(floor, image, centre_m, round_edge)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from clearway.rooms import finishes, textures
 from clearway.rooms.finishes import WHITE
 from clearway.rooms.frame import Frame
-from clearway.rooms.furniture import decor, kitchen, lamps, openings, seating, storage, tables
+from clearway.rooms.furniture import decor, kitchen, lamps, openings, seating, storage, tables_and_desks
 from clearway.rooms.furniture.small import any_small_piece
 from clearway.rooms.materials import varied
 from clearway.rooms.room import Room
@@ -93,11 +93,11 @@ def _place_south_counter(room: Room) -> None:
 
 def _place_dining_room(room: Room) -> None:
     """Table with eight chairs, sideboard, sofa, cabinet."""
-    tables.dining_table(room, Frame(6.75, 3.5, 90.0), 2.0, 1.0)
+    tables_and_desks.dining_table(room, Frame(6.75, 3.5, 90.0), 2.0, 1.0)
     for side in (-1, 1):
         for y in (2.85, 3.5, 4.15):
             seating.dining_chair(room, Frame(6.75 + side * 0.7, y, side * 90.0))
-            tables.place_setting(room, Frame(6.75 + side * 0.32, y, side * 90.0))
+            tables_and_desks.place_setting(room, Frame(6.75 + side * 0.32, y, side * 90.0))
         seating.dining_chair(room, Frame(6.75, 3.5 + side * 1.2, 90.0 + side * 90.0))
     storage.sideboard(room, room.wall("east", 3.5, gap_m=0.22), 1.4)
     seating.sofa(room, room.wall("north", 7.5, gap_m=0.47), 1.5, 0.9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from clearway.rooms import finishes
 from clearway.rooms.finishes import WHITE
 from clearway.rooms.frame import Frame
-from clearway.rooms.furniture import decor, lamps, openings, seating, storage, tables
+from clearway.rooms.furniture import decor, lamps, openings, seating, storage, tables_and_desks
 from clearway.rooms.furniture.small import any_small_piece
 from clearway.rooms.materials import varied
 from clearway.rooms.room import Room
@@ -54,9 +54,9 @@ def _place_sofas(room: Room) -> None:
     storage.television(room, room.wall("west", 2.5, gap_m=0.22), 1.8)
     seating.sofa(room, Frame(2.8, 2.5, 90.0), 2.0, 0.9)
     seating.sofa(room, Frame(2.0, 4.0, 180.0), 0.95, 0.85, "second accent")
-    tables.coffee_table(room, Frame(1.75, 2.5, 90.0), 1.2, 0.5)
+    tables_and_desks.coffee_table(room, Frame(1.75, 2.5, 90.0), 1.2, 0.5)
     corner = Frame(3.0, 3.75)
-    tables.side_table(room, corner)
+    tables_and_desks.side_table(room, corner)
     lamps.table_lamp(room, corner, 0.55)
     any_small_piece(room, Frame(0.26, 3.75))
     lamps.floor_lamp(room, Frame(0.25, 1.25))
@@ -75,11 +75,11 @@ def _place_sofas(room: Room) -> None:
 def _place_dining_room(room: Room) -> None:
     """Table with six chairs, sideboard, fireplace."""
     middle = Frame(6.5, 3.5)
-    tables.dining_table(room, Frame(6.5, 3.5, 90.0), 1.6, 0.9)
+    tables_and_desks.dining_table(room, Frame(6.5, 3.5, 90.0), 1.6, 0.9)
     for side in (-1, 1):
         for y in (3.05, 3.95):
             seating.dining_chair(room, Frame(6.5 + side * 0.65, y, side * 90.0))
-            tables.place_setting(room, Frame(6.5 + side * 0.27, y, side * 90.0))
+            tables_and_desks.place_setting(room, Frame(6.5 + side * 0.27, y, side * 90.0))
         seating.dining_chair(room, Frame(6.5, 3.5 + side * 1.02, 90.0 + side * 90.0))
     storage.sideboard(room, room.wall("north", 6.3, gap_m=0.22), 1.4)
     storage.fireplace(room, room.wall("east", 1.0, gap_m=0.21))
@@ -102,7 +102,7 @@ def _place_library(room: Room) -> None:
     for x in (2.2, 3.1, 4.0):
         storage.bookcase(room, room.wall("north", x, gap_m=0.17))
     seating.sofa(room, Frame(4.12, 5.27, 90.0), 0.95, 0.85)
-    tables.desk(room, LIBRARY_WALL.face("north", 2.46).moved(0, 0.31), 1.3)
+    tables_and_desks.desk(room, LIBRARY_WALL.face("north", 2.46).moved(0, 0.31), 1.3)
     decor.plant(room, Frame(0.26, DEPTH_M - 0.26), 1.3, "cream")
     openings.window(room, room.wall("west", 5.4, 0.95), 1.1, 1.2)
     decor.painting(room, LIBRARY_WALL.face("north", 2.3, 1.55), 0.6, 0.8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.files import written_whole
-from clearway.scenes.pictures import BLOCK_PICTURES
+from clearway.scenes.file_pictures import BLOCK_PICTURES
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import DISTANCE_TABLE_STATES
 from clearway.scenes.validate import check_scene

@@ -10,7 +10,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes import hdf5
-from clearway.scenes.pictures import file_stamp
+from clearway.scenes.file_pictures import file_stamp
 from clearway.scenes.validate import MAX_FEATURES, check_features
 
 DATASET = "resnet_feature"

@@ -18,7 +18,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.files import parse_json
-from clearway.scenes.limits import COPIES, MOST_BYTES, array_limit
+from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
 MAX_ARRAY_BYTES = MOST_BYTES // COPIES  # of the largest array, in the largest file

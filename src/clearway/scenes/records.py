@@ -15,7 +15,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes import hdf5
-from clearway.scenes.pictures import BLOCK_PICTURES, FilePictures, file_stamp
+from clearway.scenes.file_pictures import BLOCK_PICTURES, FilePictures, file_stamp
 from clearway.scenes.scene import EncoderRecord, Provenance, TopView
 from clearway.scenes.sensors import Readings, Sensor
 from clearway.scenes.validate import MAX_COORDINATE_M, MAX_PICTURE_SIDE, check_sensor

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.scenes.limits import MIB
+from clearway.scenes.memory_limits import MIB
 
 MAX_CHUNK_BYTES = 64 * MIB  # what the library unpacks to reach one element
 CHECKSUM_BYTES = 4

@@ -21,7 +21,7 @@ from clearway.scenes import hdf5
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 from clearway.scenes.features import DATASET as FEATURES
 from clearway.scenes.features import FileFeatures, find_features, read_features
-from clearway.scenes.pictures import BLOCK_PICTURES, FilePictures, file_stamp
+from clearway.scenes.file_pictures import BLOCK_PICTURES, FilePictures, file_stamp
 from clearway.scenes.records import (
     read_encoder,
     read_provenance,

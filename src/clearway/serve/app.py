@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 from clearway.deploy.navigator import Selection
 from clearway.errors import ClearwayError
+from clearway.serve.decoding import CONTENT_TYPES
 from clearway.serve.faults import STATUS, Code, Fault, FaultBody
-from clearway.serve.pictures import CONTENT_TYPES
 from clearway.serve.service import Answer, Service
 from clearway.version import __version__
 

@@ -13,9 +13,9 @@ from PIL import Image
 from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import open_agent
 from clearway.serve.app import make_app
-from clearway.serve.guard import protected
+from clearway.serve.connections import impatient
 from clearway.serve.limits import Limits
-from clearway.serve.protocol import impatient
+from clearway.serve.protection import protected
 from clearway.serve.service import Service
 from clearway.web.local import serve
 
@@ -37,9 +37,9 @@ def servable_agent(source: Path, scene: str | None, tell: Callable[[str], object
     if not source.is_dir():
         return open_agent(source, scene)
     from clearway.deploy.cached import cached_agent
-    from clearway.deploy.from_run import load_scene_agent
+    from clearway.deploy.from_run import load_run_in_scene
 
-    return cached_agent(load_scene_agent(source, scene), tell)
+    return cached_agent(load_run_in_scene(source, scene), tell)
 
 
 def allowed_connections(wanted: int) -> int:

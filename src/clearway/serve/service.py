@@ -14,10 +14,10 @@ from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import Decision, decision_of
 from clearway.errors import DeployError
 from clearway.serve.batching import Batcher
+from clearway.serve.decoding import decoded
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import Metrics
-from clearway.serve.pictures import decoded
 from clearway.serve.sessions import Session, Sessions
 
 

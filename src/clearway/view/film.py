@@ -13,8 +13,8 @@ from clearway import colours
 from clearway.errors import ClearwayError
 from clearway.evaluation.episodes import Trajectory
 from clearway.view.episode import Episode
-from clearway.view.session import Session
 from clearway.view.stage import Stage
+from clearway.view.viewing import Viewing
 from clearway.view.walker import Walker
 from clearway.viz.video import Walked, frames, write_video
 
@@ -30,7 +30,7 @@ def write_film(stage: Stage, episode: Episode, path: Path, frames_per_s: int) ->
     """
     if max(map(len, episode.walks), default=0) > MOST_FILM_STEPS:
         raise ClearwayError(f"a film shows at most {MOST_FILM_STEPS} steps. Save a shorter episode, or its link")
-    session = Session(stage)
+    session = Viewing(stage)
     session.begin(episode)
     for walker in session.walkers:
         while walker.recorded:
@@ -40,7 +40,7 @@ def write_film(stage: Stage, episode: Episode, path: Path, frames_per_s: int) ->
     write_video(path, stacked(shown, session.names(session.episode)), frames_per_s)
 
 
-def _frames(stage: Stage, session: Session, index: int) -> Iterator[np.ndarray]:
+def _frames(stage: Stage, session: Viewing, index: int) -> Iterator[np.ndarray]:
     walker = session.walkers[index]
     agents = stage.agents
     scenes = agents[index].scenes if index < len(agents) else stage.scenes

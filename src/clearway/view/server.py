@@ -23,8 +23,8 @@ from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import Sensor
 from clearway.view.episode import read_episode
 from clearway.view.film import write_film
-from clearway.view.session import Session
 from clearway.view.stage import Stage
+from clearway.view.viewing import Viewing
 from clearway.viz.maps import map_extent
 from clearway.zones import scene_zones
 
@@ -111,7 +111,7 @@ def make_app(stage: Stage) -> FastAPI:
             return await socket.close(TOO_MANY_PAGES, reason)
         async with pages:
             await socket.accept()
-            session = Session(stage)
+            session = Viewing(stage)
             try:
                 while True:
                     message = _parsed(await socket.receive_text())

@@ -18,7 +18,7 @@ from clearway.model.lookup import LookupNetwork
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
-from clearway.world.tables import World, scene_tables
+from clearway.world.world import World, scene_tables
 
 
 @dataclass(frozen=True)

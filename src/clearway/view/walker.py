@@ -12,11 +12,11 @@ from clearway.agents.agent import POSE, Agent, Decisions
 from clearway.reward import Reward
 from clearway.view.episode import MOST_STEPS
 from clearway.world.navigation import Navigation
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 @dataclass(frozen=True)
-class Step:
+class Standing:
     """Where a walker stands after a step, or at the start.
 
     Attributes:
@@ -96,7 +96,7 @@ class Walker:
         """The target is reached, or the walk is as long as a walk may be."""
         return self.steps[-1].reached or len(self.steps) > MOST_STEPS
 
-    def step(self, action: int | None = None) -> Step | None:
+    def step(self, action: int | None = None) -> Standing | None:
         """Take the recorded action, else the one given, else the one that the agent has chosen.
 
         Gives back None, and nothing happens, where the walk has ended or there is no action: the user's turn.
@@ -129,7 +129,7 @@ class Walker:
         decisions, _ = self.agent.act({POSE: poses}, self.agent.reset({POSE: target}, np.zeros_like(poses)))
         return decisions
 
-    def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Step:
+    def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Standing:
         before = self.steps[-1] if action is not None else None
         probabilities = value = following = None
         if self.agent is not None:
@@ -139,7 +139,7 @@ class Walker:
                 told = decisions.probabilities
                 probabilities = None if told is None else tuple(told[0].tolist())
                 following = self.recorded[0] if self.recorded else int(decisions.action[0])
-        return Step(
+        return Standing(
             state=int(self.env.state) - self.offset,
             action=action,
             blocked=blocked,

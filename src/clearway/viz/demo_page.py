@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.evaluation.report import Evaluation
+from clearway.evaluation.summary import Evaluation
 from clearway.evaluation.tables import table_text
 from clearway.experiments.demo import DemoResult
 from clearway.learn.provenance import facts_text, hardware, package_versions
@@ -47,7 +47,7 @@ def make_demo_page(result: DemoResult, command: str) -> Path:
             "room": f"{result.scene.name}, {result.scene.cell_count} cells, {result.scene.state_count} poses",
             "training": _training(result),
             "evaluation": f"{first.protocol.episodes_per_target} episodes a target from random starts, at most "
-            f"{first.protocol.step_cap:,} steps; intervals are 95 % bootstrap",
+            f"{first.protocol.step_limit:,} steps; intervals are 95 % bootstrap",
             "seconds": ", ".join(f"{name} {seconds:.0f}" for name, seconds in result.seconds.items()),
             "versions": facts_text(package_versions()),
             "hardware": facts_text(hardware()),

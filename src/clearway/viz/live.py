@@ -10,8 +10,8 @@ import numpy as np
 
 from clearway import colours
 from clearway.live.draws import Draws
-from clearway.live.report import LiveResult
-from clearway.live.run import LiveOutcome, LiveScene
+from clearway.live.results import LiveResult
+from clearway.live.walks import LiveOutcome, LiveScene
 from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
 from clearway.rooms.topview import render_top_view
 from clearway.scenes.actions import BLOCKED, Action

@@ -21,7 +21,7 @@ from clearway.evaluation.sight import Sight
 from clearway.files import written_whole
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
-from clearway.world.tables import World
+from clearway.world.world import World
 
 STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
 FRAMES_PER_S = 3

@@ -16,7 +16,7 @@ from torch import Tensor
 
 from clearway.reward import Reward
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 HISTORY_LENGTH = 4
 START_STREAM, TARGET_STREAM = 1, 2

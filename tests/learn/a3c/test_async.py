@@ -16,9 +16,9 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn import statistics, train
+from clearway.learn.a3c.parent import AsyncTrainer
 from clearway.learn.a3c.process import world_tensors
 from clearway.learn.a3c.shared import SharedTensors
-from clearway.learn.a3c.trainer import AsyncTrainer
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.figures import Figures
 from clearway.learn.load import load_agent

@@ -9,7 +9,7 @@ from clearway.learn.a3c import rmsprop
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.gradients import clip_scales, squared_norms
 from clearway.learn.a3c.group import WorkerGroup
-from clearway.learn.a3c.local import Factors
+from clearway.learn.a3c.own_copy import Factors
 from clearway.learn.optimiser import EPSILON
 from clearway.learn.presets import PAPER_A3C
 from clearway.reward import COLLISION_AWARE

@@ -99,7 +99,7 @@ def test_plans_that_are_no_rooms(plan: FloorPlan, seed: int, message: str) -> No
 
 
 def test_limits_need_no_simulator() -> None:
-    assert "mujoco" not in imported_by("import clearway.rooms.plans.limits")
+    assert "mujoco" not in imported_by("import clearway.rooms.plans.buildable")
 
 
 @dataclass(frozen=True)

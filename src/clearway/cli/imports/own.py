@@ -63,7 +63,7 @@ class ImportFloorPlan:
         """Make rooms, encode their pictures and write."""
         from clearway.perception import check_sees
         from clearway.rooms.library import cached_plan_scene
-        from clearway.rooms.plans.limits import check_can_be_rendered
+        from clearway.rooms.plans.buildable import check_can_be_rendered
         from clearway.scenes.sensors import check_names
 
         self.encoding.check()

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 
 if TYPE_CHECKING:
-    from clearway.learn.a3c.trainer import AsyncTrainer
+    from clearway.learn.a3c.parent import AsyncTrainer
     from clearway.reward import Reward
-    from clearway.world.tables import World
+    from clearway.world.world import World
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,6 @@ class A3C(OnFeatures, Learner):
         """A trainer at its first frame, of as many processes as torch has threads."""
         import torch
 
-        from clearway.learn.a3c.trainer import AsyncTrainer
+        from clearway.learn.a3c.parent import AsyncTrainer
 
         return AsyncTrainer(world, self, reward, seed, torch.get_num_threads())

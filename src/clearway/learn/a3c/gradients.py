@@ -16,7 +16,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from clearway.learn.a3c.local import Factors
+from clearway.learn.a3c.own_copy import Factors
 from clearway.scenes.actions import ACTION_COUNT
 
 POLICY, VALUE = slice(0, ACTION_COUNT), slice(ACTION_COUNT, ACTION_COUNT + 1)

@@ -18,7 +18,7 @@ from torch import Tensor
 
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.gradients import clip_scales, clipped, squared_norms, window_rows
-from clearway.learn.a3c.local import LocalNetwork
+from clearway.learn.a3c.own_copy import LocalNetwork
 from clearway.learn.a3c.rmsprop import SharedRMSPropUpdate
 from clearway.learn.figures import Figures
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient
@@ -30,7 +30,7 @@ from clearway.model.network import NetworkShape
 from clearway.reward import Reward
 from clearway.world.navigation import Navigation, Transition
 from clearway.world.streams import Streams
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 @dataclass(frozen=True)

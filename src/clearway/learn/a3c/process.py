@@ -1,6 +1,6 @@
 """A worker process: rounds of its workers, until its parent says otherwise, closes the connection or dies.
 
-The parent sends PAUSE and GO; the process sends `Report`s and PAUSED. It never outlives its parent: a report or a
+The parent sends PAUSE and GO; the process sends `WorkerReport`s and PAUSED. It never outlives its parent: a report or a
 command finds the connection closed.
 """
 
@@ -21,7 +21,7 @@ from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.figures import Figures
 from clearway.learn.named_tensors import part_of
 from clearway.reward import Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 class Message(Enum):
@@ -33,7 +33,7 @@ class Message(Enum):
 
 
 @dataclass(frozen=True)
-class Report:
+class WorkerReport:
     """A `Round`, or what it came to; NumPy, because tensors sent between processes would become shared memory."""
 
     frames: int
@@ -111,8 +111,8 @@ def _leave_state(assignment: Assignment, group: WorkerGroup) -> None:
         assignment.shared[f"workers.{name}"][rows] = tensor
 
 
-def _sendable(report: Round) -> Report:
-    return Report(report.frames, report.updates, report.totals.numpy(), report.figures)
+def _sendable(report: Round) -> WorkerReport:
+    return WorkerReport(report.frames, report.updates, report.totals.numpy(), report.figures)
 
 
 def world_tensors(world: World) -> dict[str, Tensor]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.rooms import pictures
+from clearway.rooms import artwork
 from clearway.rooms.frame import Frame
 from clearway.rooms.parts import Window
 from clearway.rooms.room import Room
@@ -21,7 +21,7 @@ def window(room: Room, at: Frame, width_m: float, height_m: float, curtains: boo
         at,
         (0, 0.012, height_m / 2),
         (width_m, height_m),
-        lambda rng: pictures.outdoor(rng, 256, round(256 * width_m / height_m)),
+        lambda rng: artwork.outdoor(rng, 256, round(256 * width_m / height_m)),
         emission=0.95,
         specular=0.0,
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from clearway.rooms.camera import CAMERA_HEIGHT_M, VERTICAL_FOV_DEG
 from clearway.rooms.frame import Frame
-from clearway.rooms.furniture import beds, decor, kitchen, lamps, seating, storage, tables
+from clearway.rooms.furniture import beds, decor, kitchen, lamps, seating, storage, tables_and_desks
 from clearway.rooms.plans.layout import Piece
 from clearway.rooms.room import Room
 
@@ -90,11 +90,11 @@ def _television(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
 
 
 def _table(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
-    tables.dining_table(room, at, width_m, depth_m)
+    tables_and_desks.dining_table(room, at, width_m, depth_m)
     if width_m > 1.0 and depth_m > 0.7:
         for side in (-1, 1):
             for x_m in (-width_m / 3, width_m / 3):
-                tables.place_setting(room, at.moved(x_m, side * (depth_m / 2 - 0.17), 0, 90.0 + side * 90.0))
+                tables_and_desks.place_setting(room, at.moved(x_m, side * (depth_m / 2 - 0.17), 0, 90.0 + side * 90.0))
 
 
 def _sofa(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
@@ -166,7 +166,7 @@ BEDROOM: tuple[Kind, ...] = (
     Kind(_wardrobe, (0.5, 2.2), (0.35, 1.0), 2.1, at_wall=True),
     Kind(_chest, (0.35, 1.8), (0.2, 0.8), 1.05),
     Kind(_white_chest, (0.35, 1.8), (0.25, 0.8), 0.95),
-    Kind(tables.desk, (1.0, 2.0), (0.5, 0.9), 0.74, at_wall=True),
+    Kind(tables_and_desks.desk, (1.0, 2.0), (0.5, 0.9), 0.74, at_wall=True),
     Kind(_bed, (1.2, 2.3), (1.4, 2.3), 0.6, once=True),
     Kind(_sofa, (0.7, 2.4), (0.7, 1.4), 0.76),
 )

@@ -8,10 +8,10 @@ import numpy as np
 
 from clearway.rooms.light import bake
 from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
+from clearway.rooms.plans.buildable import check_can_be_rendered
 from clearway.rooms.plans.decoration import decorate
 from clearway.rooms.plans.finish import finish_of
 from clearway.rooms.plans.layout import GAP, Layout, lay_out
-from clearway.rooms.plans.limits import check_can_be_rendered
 from clearway.rooms.plans.pieces import furnish
 from clearway.rooms.room import Room
 from clearway.rooms.shell import add_surfaces, add_walls

@@ -10,15 +10,15 @@ from typing import Any
 from clearway.agents.agent import Agent
 from clearway.agents.named import AgentMaker
 from clearway.errors import RunError
-from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_CAP
+from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_agents, world_yardsticks
 from clearway.evaluation.protocol import evaluate_agents
-from clearway.evaluation.report import Evaluation, Trained
+from clearway.evaluation.summary import Evaluation, Trained
 from clearway.learn.load import TrainedAgent, run_world
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.torch_threads import torch_threads
-from clearway.world.tables import World
+from clearway.world.world import World
 
 
 def evaluate_run(agent: TrainedAgent, scenes: Sequence[Scene], **how: Any) -> list[Evaluation]:
@@ -32,7 +32,7 @@ def evaluate_runs(
     *,
     beside: Mapping[str, AgentMaker] = MappingProxyType({}),
     episodes_per_target: int = EPISODES_PER_TARGET,
-    step_cap: int = STEP_CAP,
+    step_limit: int = STEP_LIMIT,
     seed: int = 0,
 ) -> list[Evaluation]:
     """Agents of several runs on the same scenes and targets, by each way of choosing actions.
@@ -61,7 +61,7 @@ def evaluate_runs(
             scenes=scenes,
             encoder=encoder_names(scenes),
             episodes_per_target=episodes_per_target,
-            step_cap=step_cap,
+            step_limit=step_limit,
             seed=seed,
         )
     trained = {name: _trained(agent) for name, agent in agents.items()}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.live.room import live_room
+from clearway.live.live_room import live_room
 from clearway.scenes.scene import Provenance
 from helpers.made import corridor_scene
 

@@ -15,7 +15,7 @@ from clearway.choices import ZoneLevel
 from clearway.evaluation import bootstrap, metrics
 from clearway.evaluation.episodes import EpisodeTable
 from clearway.reward import Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 Interval = tuple[float, float]
 
@@ -25,7 +25,7 @@ class Protocol:
     """How the episodes were walked."""
 
     episodes_per_target: int
-    step_cap: int
+    step_limit: int
     seed: int
     action_selection: ActionSelection
 
@@ -127,7 +127,7 @@ class Evaluation:
             "encoder": self.encoder,
             **({"trained": self.trained.to_json()} if self.trained else {}),
             "episodes_per_target": self.protocol.episodes_per_target,
-            "step_cap": self.protocol.step_cap,
+            "step_limit": self.protocol.step_limit,
             "seed": self.protocol.seed,
             "action_selection": self.protocol.action_selection,
             "targets": [result.target_json() for result in self.targets],

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clearway.live.conditions import MOST, REFERENCE, Perturbations, label_of, sweep_settings
 from clearway.live.draws import Draws
-from clearway.live.settings import MOST, REFERENCE, Perturbations, label_of, sweep_settings
 
 GREY = np.full((20, 30, 3), 100, np.uint8)
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from clearway.evaluation import bootstrap
 from clearway.evaluation.metrics import Metric, average, by_scene, columns, quotients
+from clearway.live.conditions import Perturbations
 from clearway.live.episodes import STEP_S, LiveTable
-from clearway.live.settings import Perturbations
 
 Interval = tuple[float, float]
 TIE_M = 0.001  # the body draws back a millimetre from what it touches

@@ -66,7 +66,7 @@ def live_room(scene: Scene) -> LiveRoom:
 
 def camera_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The compiled room with the new obstacle on a body of its own, out of sight."""
-    from clearway.live.layout import OUT_OF_SIGHT_M, add_new_obstacle
+    from clearway.live.arrangement import OUT_OF_SIGHT_M, add_new_obstacle
     from clearway.rooms.groups import SEEN_GROUP
 
     body = spec.worldbody.add_body(name="new obstacle", mocap=True, pos=OUT_OF_SIGHT_M)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from clearway.deploy.agent import MAX_PICTURE_SIDE
+from clearway.serve.decoding import decoded
 from clearway.serve.faults import Fault
-from clearway.serve.pictures import decoded
 from helpers.serving import picture_bytes
 
 NOISE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from clearway.live.episodes import SUCCESS_DEG, SUCCESS_M, LiveProtocol
-from clearway.live.report import Figures, LiveResult
+from clearway.live.results import Figures, LiveResult
 from clearway.markdown import table_lines
 from clearway.terminal import noted
 
@@ -82,7 +82,7 @@ def notes(protocol: LiveProtocol, encoder: str) -> list[str]:
     """What belongs under the tables."""
     return [
         f"Encoder: {encoder}. Actions {protocol.selection}. {protocol.episodes_per_target} episodes a target from the "
-        f"starts of the grid's evaluation, at most {protocol.step_cap:,} steps, seed {protocol.seed}.",
+        f"starts of the grid's evaluation, at most {protocol.step_limit:,} steps, seed {protocol.seed}.",
         f"Success: within {100 * SUCCESS_M:g} cm and {SUCCESS_DEG:g}° of the target's pose. Ranges: 95 % bootstrap "
         "intervals over episodes; differences are paired by episode.",
     ]

@@ -12,13 +12,13 @@ from clearway.agents.selection import Argmax
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import METRIC_NAMES
 from clearway.evaluation.protocol import evaluate_agents
-from clearway.evaluation.report import Evaluation, Protocol, summarise
+from clearway.evaluation.summary import Evaluation, Protocol, summarise
 from clearway.evaluation.tables import MARK, markdown_table, rich_tables, table_text
-from clearway.world.tables import make_world
+from clearway.world.world import make_world
 from helpers.made import corridor_scene, grid_scene
 
 TARGET_KEYS = {"scene", "target", "steps", "collisions", "success", "sc", "spl", "shortest_path_steps"}
-TOP_KEYS = {"agent", "encoder", "episodes_per_target", "step_cap", "seed", "action_selection"}
+TOP_KEYS = {"agent", "encoder", "episodes_per_target", "step_limit", "seed", "action_selection"}
 TARGETS = {"grid": [3, 17, 40], "corridor": [0, 19]}
 
 
@@ -27,7 +27,7 @@ def evaluations() -> list[Evaluation]:
     scenes = [grid_scene(2), corridor_scene(5, feature_count=32)]
     world = make_world(scenes, TARGETS)
     agents = {"first": RandomWalk(), "second": Argmax(RandomWalk())}
-    return evaluate_agents(world, agents, encoder="made-up", episodes_per_target=40, step_cap=400)
+    return evaluate_agents(world, agents, encoder="made-up", episodes_per_target=40, step_limit=400)
 
 
 def test_every_agent_is_shown_in_all_ways_and_the_references_are_there(evaluations):
@@ -170,7 +170,7 @@ def test_every_column_shows_its_own_figure(evaluations):
 def test_the_seed_is_that_of_the_bootstrap_too():
     scene = grid_scene(2)
     world = make_world([scene], {scene.name: [3, 17]})
-    table = run_episodes(world, RandomWalk(), episodes_per_target=30, step_cap=400)
+    table = run_episodes(world, RandomWalk(), episodes_per_target=30, step_limit=400)
     first, again, other = (summarise(world, table, "a", "e", Protocol(30, 400, seed, "sampled")) for seed in (0, 0, 1))
     assert first.average.values == other.average.values
     assert first.average.intervals == again.average.intervals != other.average.intervals

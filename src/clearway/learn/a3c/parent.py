@@ -21,7 +21,7 @@ from clearway.children import signals_held
 from clearway.errors import RunError
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import WorkerGroup
-from clearway.learn.a3c.process import Assignment, Message, Report, work, world_tensors
+from clearway.learn.a3c.process import Assignment, Message, WorkerReport, work, world_tensors
 from clearway.learn.a3c.shared import SharedTensors
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.named_tensors import joined, part_of
@@ -30,7 +30,7 @@ from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.feature_map import network_input
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.reward import Reward
-from clearway.world.tables import World
+from clearway.world.world import World
 
 PLACES = {"parameters": "network", "squares": "optimiser.square_plus_epsilon", "workers": "workers"}
 """Parts of the shared memory, and what they are called in a checkpoint."""
@@ -113,7 +113,7 @@ class AsyncTrainer:
         until = min(self.frames + self.frames_per_update, self.learner.frames)
         while self.frames < until:
             for message in self._messages():
-                assert isinstance(message, Report)
+                assert isinstance(message, WorkerReport)
                 self._add(message)
         result, self._figures = _mean(self._figures), []
         return result
@@ -132,7 +132,7 @@ class AsyncTrainer:
                     if message is Message.PAUSED:
                         waiting -= 1
                     else:
-                        assert isinstance(message, Report)
+                        assert isinstance(message, WorkerReport)
                         self._add(message)
             self._paused = True
         shared = {name: part_of(self.shared, part) for part, name in PLACES.items()}
@@ -201,7 +201,7 @@ class AsyncTrainer:
             except ConnectionError:
                 raise self._death(number) from None
 
-    def _messages(self) -> Iterator[Report | Message]:
+    def _messages(self) -> Iterator[WorkerReport | Message]:
         """At least one message of the processes."""
         ready = wait(self._connections)
         for number, connection in enumerate(self._connections):
@@ -222,7 +222,7 @@ class AsyncTrainer:
             "the others were stopped. Give --resume to go on from the last checkpoint"
         )
 
-    def _add(self, report: Report) -> None:
+    def _add(self, report: WorkerReport) -> None:
         """Count a report in.
 
         Raises:

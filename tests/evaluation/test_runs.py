@@ -5,7 +5,7 @@ from pathlib import Path
 import torch
 
 from clearway.evaluation.optimum import world_yardsticks
-from clearway.evaluation.run import _optima, evaluate_run
+from clearway.evaluation.runs import _optima, evaluate_run
 from clearway.evaluation.tables import markdown_table
 from clearway.learn.load import load_agent
 from clearway.learn.run_folder import record_of
@@ -26,7 +26,7 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
         zone_level="cell",
     )
     agent = load_agent(train(request, tmp_path / "run").path)
-    sampled, *others = evaluate_run(agent, request.scenes, episodes_per_target=1, step_cap=10)
+    sampled, *others = evaluate_run(agent, request.scenes, episodes_per_target=1, step_limit=10)
     found = sampled.to_json()["trained"]
     assert found["frames"] == 160 and found["seed"] == 3 and found["zone_level"] == "cell"
     assert found["reward"]["beta"] == -0.5 and found["reward"]["clip"]

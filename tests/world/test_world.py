@@ -7,8 +7,8 @@ import torch
 from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import EncoderRecord, Scene
-from clearway.world import tables
-from clearway.world.tables import World, make_world
+from clearway.world import world
+from clearway.world.world import World, make_world
 from clearway.zones import scene_zones
 from helpers.made import corridor_scene, grid_scene
 
@@ -144,7 +144,7 @@ def test_a_target_that_is_no_whole_number_is_refused() -> None:
 
 def test_targets_are_refused_before_features_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     read = []
-    monkeypatch.setattr(tables, "joined_features", lambda *arguments: read.append(arguments))
+    monkeypatch.setattr(world, "joined_features", lambda *arguments: read.append(arguments))
     with pytest.raises(SceneError, match="out of range"):
         make_world([corridor_scene()], {"corridor": [99]})
     assert not read

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clearway.rooms import pictures
+from clearway.rooms import artwork
 from clearway.rooms.frame import Frame
 from clearway.rooms.furniture import decor
 from clearway.rooms.room import Room
@@ -104,4 +104,4 @@ def monitor(room: Room, at: Frame, z_m: float) -> None:
     room.box(at, (0, 0, z_m), (0.25, 0.18, 0.012), "black", 0.005)
     room.box(at, (0, -0.03, z_m), (0.05, 0.03, 0.2), "black", 0.005)
     room.box(at, (0, 0, z_m + 0.12), (0.58, 0.035, 0.36), "black", 0.007)
-    room.picture(at, (0, 0.019, z_m + 0.3), (0.55, 0.33), pictures.screen, specular=0.7, shininess=0.8)
+    room.picture(at, (0, 0.019, z_m + 0.3), (0.55, 0.33), artwork.screen, specular=0.7, shininess=0.8)

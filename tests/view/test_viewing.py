@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.view.session import Session
 from clearway.view.stage import Stage, scene_stage
+from clearway.view.viewing import Viewing
 
 CORRIDOR = "scene=corridor&start=0&target=8"
 
 
-def begun(stage: Stage, query: str = CORRIDOR) -> tuple[Session, dict]:
-    session = Session(stage)
+def begun(stage: Stage, query: str = CORRIDOR) -> tuple[Viewing, dict]:
+    session = Viewing(stage)
     answer = session.answer({"do": "begin", "episode": query})
     assert answer["kind"] == "episode", answer
     json.dumps(answer, allow_nan=False)
     return session, answer
 
 
-def walk(session: Session, steps: int) -> dict:
+def walk(session: Viewing, steps: int) -> dict:
     for _ in range(steps):
         answer = session.answer({"do": "step"})
         assert answer["kind"] == "steps"
@@ -162,4 +162,4 @@ def test_an_unknown_message_is_refused_and_changes_nothing(stage: Stage, message
     "message", [{"do": "step"}, {"do": "map", "walker": 0}, {"do": "drive", "action": 0, "along": True}]
 )
 def test_nothing_happens_before_an_episode_has_begun(stage: Stage, message: object) -> None:
-    assert Session(stage).answer(message)["kind"] == "refused"
+    assert Viewing(stage).answer(message)["kind"] == "refused"

@@ -11,18 +11,18 @@ from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
 from clearway.files import json_text, written_whole
 from clearway.learn.load import TrainedNetwork
+from clearway.live.conditions import Condition
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
-from clearway.live.report import LiveResult, summarise
-from clearway.live.room import LiveRoom, live_room
-from clearway.live.settings import Condition
-from clearway.live.tables import markdown_tables
+from clearway.live.live_room import LiveRoom, live_room
+from clearway.live.result_tables import markdown_tables
+from clearway.live.results import LiveResult, summarise
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 
 JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
 JSON_PART, MARKDOWN_PART = "live.part.json", "live.part.md"
@@ -137,7 +137,7 @@ def live_json(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: st
     return {
         "encoder": encoder,
         "episodes_per_target": protocol.episodes_per_target,
-        "step_cap": protocol.step_cap,
+        "step_limit": protocol.step_limit,
         "seed": protocol.seed,
         "action_selection": protocol.selection,
         "results": [result.to_json() for result in results],

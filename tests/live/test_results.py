@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from clearway.live.arrangement import Arrangement
+from clearway.live.conditions import Perturbations
 from clearway.live.episodes import LiveProtocol, LiveTable
-from clearway.live.layout import Arrangement
-from clearway.live.report import LiveResult, summarise
-from clearway.live.settings import Perturbations
-from clearway.live.tables import agent_rows, compared_rows, markdown_tables, rich_tables
+from clearway.live.result_tables import agent_rows, compared_rows, markdown_tables, rich_tables
+from clearway.live.results import LiveResult, summarise
 
 PROTOCOL = LiveProtocol(2, 10, 0, "sampled")
 

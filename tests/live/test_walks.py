@@ -13,16 +13,16 @@ from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
 from clearway.learn.load import TrainedNetwork
 from clearway.learn.run_folder import record_of
+from clearway.live.conditions import Condition, Perturbations
 from clearway.live.episodes import LiveProtocol
-from clearway.live.room import LiveRoom
-from clearway.live.run import LiveScene, check_alike, finish_live, stages, walk_setting
-from clearway.live.settings import Condition, Perturbations
+from clearway.live.live_room import LiveRoom
+from clearway.live.walks import LiveScene, check_alike, finish_live, stages, walk_setting
 from clearway.perception import depth_grid
 from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
 from clearway.scenes.actions import Action
-from clearway.world.tables import World, make_world
+from clearway.world.world import World, make_world
 from helpers.agents import after_poses
 from helpers.made import corridor_scene
 from helpers.small_live import state_at

@@ -1,4 +1,4 @@
-"""`Session`: the episode that one open page shows. No sockets and no page here: messages in, messages out.
+"""`Viewing`: the episode that one open page shows. No sockets and no page here: messages in, messages out.
 
 Messages are JSON objects. The page says what to `do`:
 
@@ -24,14 +24,14 @@ from clearway.scenes.actions import ACTION_COUNT
 from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
 from clearway.view.stage import Stage
 from clearway.view.walker import Walker
-from clearway.world.tables import World
+from clearway.world.world import World
 
 Message = dict[str, Any]
 YOU = "you"
 DIGITS = 4  # of probabilities and values that are sent
 
 
-class Session:
+class Viewing:
     """One page's episode.
 
     Args:

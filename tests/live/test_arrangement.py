@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.live.layout import (
+from clearway.live.arrangement import (
     Arrangement,
     arranged,
     as_built,
