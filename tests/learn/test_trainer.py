@@ -3,6 +3,7 @@
 import copy
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 import torch
@@ -15,7 +16,7 @@ from clearway.learn.losses import Batch, merged
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.rollout import Rollout
-from clearway.learn.trainer import StepFigures, Trainer
+from clearway.learn.trainer import Trainer, balanced_weights
 from clearway.model import lookup
 from clearway.model.first_layer import AllStates, VisitedStates
 from clearway.model.network import SiameseActorCritic
@@ -157,19 +158,18 @@ def test_merged_keeps_the_order_of_scenes() -> None:
 def test_the_first_layer_moves_once_a_pass_or_with_every_minibatch(monkeypatch: pytest.MonkeyPatch) -> None:
     def moves(**settings: object) -> list[bool]:
         trainer = small_trainer(small_learner(epochs=2, minibatches=3, **settings))
-        found = []
+        weights, clip = [trainer.network.siamese_weight.clone()], trainer_module.clip_gradients
 
-        def after_step(self: Trainer, *arguments: object) -> StepFigures:
-            before = trainer.network.siamese_weight.clone()
-            step = whole_step(self, *arguments)
-            found.append(not torch.equal(trainer.network.siamese_weight, before))
-            return step
+        def noted(*arguments: object) -> Tensor:
+            weights.append(trainer.network.siamese_weight.clone())
+            return clip(*arguments)
 
-        monkeypatch.setattr(Trainer, "_step", after_step)
-        trainer.update()
-        return found
+        with monkeypatch.context() as patch:
+            patch.setattr(trainer_module, "clip_gradients", noted)  # comes before every step of the optimisers
+            trainer.update()
+        weights.append(trainer.network.siamese_weight)
+        return [not torch.equal(before, after) for before, after in pairwise(weights[1:])]
 
-    whole_step = Trainer._step
     assert moves(siamese_step="pass") == [False, False, True, False, False, True]
     assert moves(siamese_step="minibatch") == [True] * 6
 
@@ -212,8 +212,13 @@ def test_hindsight_and_look_ahead_get_the_learner_s_settings(monkeypatch: pytest
 
 def test_look_ahead_is_computed_as_long_as_it_weighs(monkeypatch: pytest.MonkeyPatch) -> None:
     trainer = small_trainer(small_learner(lookahead=0.1, settle=0.5))
-    looked, better = [], trainer._better
-    monkeypatch.setattr(trainer, "_better", lambda *rows: looked.append(trainer.updates) or better(*rows))
+    looked, better = [], trainer_module.better_policy
+
+    def noted(*arguments: object, **settings: object) -> Tensor:
+        looked.append(trainer.updates)
+        return better(*arguments, **settings)
+
+    monkeypatch.setattr(trainer_module, "better_policy", noted)
     while not trainer.finished:
         trainer.update()
     assert looked == [0, 1, 2, 3, 4]
@@ -228,14 +233,16 @@ def test_an_update_ends_with_weighing_the_targets_anew() -> None:
 
 
 def test_targets_reached_less_often_are_drawn_more_often() -> None:
-    trainer = small_trainer(small_learner(balance=3.0))
-    trainer.statistics.recent_success = torch.tensor([1.0, 0.5, 0.0, 1.0, 1.0], dtype=torch.float64)
-    trainer._rebalance()
-    assert trainer.navigation.choice.weights.tolist() == [[1.0, 2.5, 4.0], [1.0, 1.0, 0.0]]  # 0 is padding
-    unbalanced = small_trainer(small_learner(balance=0.0))
-    unbalanced.statistics.recent_success = torch.full((5,), 0.5, dtype=torch.float64)
-    unbalanced._rebalance()
-    assert unbalanced.navigation.choice.weights.tolist() == [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
+    choice = small_trainer(small_learner()).navigation.choice
+    success = torch.tensor([1.0, 0.5, 0.0, 1.0, 1.0], dtype=torch.float64)
+    weights = balanced_weights(choice, success, balance=3.0)
+    assert weights.tolist() == [[1.0, 2.5, 4.0], [1.0, 1.0, 0.0]]  # 0 is padding
+
+
+def test_without_balance_all_targets_are_drawn_alike() -> None:
+    trainer = small_trainer(small_learner(balance=0.0))
+    trainer.update()
+    assert trainer.navigation.choice.weights.tolist() == [[1.0, 1.0, 1.0], [1.0, 1.0, 0.0]]
 
 
 @pytest.mark.parametrize("preset", [DEFAULT, replace(DEFAULT, balance=3.0), A2C(), PAPER_A2C])

@@ -284,8 +284,7 @@ class Trainer:
         self.statistics.refresh_success()
         if self.learner.balance:
             choice = self.navigation.choice
-            weight = 1 + self.learner.balance * (1 - self.statistics.recent_success)
-            choice.reweigh(torch.where(choice.weights > 0, weight[choice.members], 0.0))
+            choice.reweigh(balanced_weights(choice, self.statistics.recent_success, self.learner.balance))
 
     def fixed_tensors(self) -> dict[str, Tensor]:
         """The map that prepares features."""
@@ -322,3 +321,12 @@ class Trainer:
         self.frames, self.updates = frames, updates
         self._seat(max(updates - 1, 0))
         self.lookup.refresh()
+
+
+def balanced_weights(choice: TargetChoice, success: Tensor, balance: float) -> Tensor:
+    """Weights (G, J) by which targets are drawn more often that are reached less often; `success` (M,) of each target.
+
+    1 + balance (1 - success); what is never drawn keeps its 0.
+    """
+    weight = 1 + balance * (1 - success)
+    return torch.where(choice.weights > 0, weight[choice.members], 0.0)
