@@ -8,7 +8,7 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.feature_spread import feature_spread
-from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import CELL_SIZE_M, Area, FloorPlan, floor_plan_scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
 from clearway.world.world import make_world
@@ -158,3 +158,29 @@ def test_more_features_than_a_file_may_hold() -> None:
 
 def test_a_plan_needs_neither_simulator_nor_torch() -> None:
     assert not {"mujoco", "torch"} & imported_by("import clearway.scenes.floor_plan_files")
+
+
+ROW = np.array([[0, 0], [1, 0], [2, 0]])
+
+
+def test_walls_and_doors_and_areas_stand_in_a_plan() -> None:
+    plan = FloorPlan(
+        "flat", ROW, walls=np.array([[1, 1]]), doors=np.array([[1, 0]]), areas=(Area("kitchen", (0, 0), (0, 0)),)
+    )
+    assert plan.walls.tolist() == [[1, 1]] and plan.doors.tolist() == [[1, 0]] and len(plan.edges) == 2
+
+
+@pytest.mark.parametrize(
+    ("parts", "problem"),
+    [
+        ({"walls": np.array([[1, 0]])}, r"has a wall in the cell \(1, 0\) that can be entered"),
+        ({"doors": np.array([[1, 1]])}, r"has a door in the cell \(1, 1\) that cannot be entered"),
+        ({"walls": np.array([[0.5, 0]])}, r"has walls of float64 and shape \(1, 2\), expected whole numbers"),
+        ({"doors": np.array([1, 1])}, r"has doors of int64 and shape \(2,\), expected whole numbers"),
+        ({"areas": (Area("garage", (0, 0), (1, 1)),)}, "has the area .*garage.*Give a use among bathroom"),
+        ({"areas": (Area("kitchen", (1, 0), (0, 0)),)}, "has the area .*kitchen"),
+    ],
+)
+def test_parts_that_are_none_are_refused(parts, problem) -> None:
+    with pytest.raises(SceneError, match=problem):
+        FloorPlan("flat", ROW, **parts)

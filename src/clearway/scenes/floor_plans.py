@@ -26,8 +26,29 @@ CELL_SIZE_M = 0.25  # of the published AI2-THOR plans
 MAX_CELLS = MAX_STATES // HEADING_COUNT
 
 
+USES = ("bathroom", "bedroom", "kitchen", "living room", "corridor")
+
+
 def _no_edges() -> np.ndarray:
     return np.zeros((0, 2, 2), np.int64)
+
+
+def _no_cells() -> np.ndarray:
+    return np.zeros((0, 2), np.int64)
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle of cells that is used as a room of some kind, which chooses its furniture.
+
+    Attributes:
+        use: one of `USES`.
+        low, high: x and z of its lowest and highest cell, both included.
+    """
+
+    use: str
+    low: tuple[int, int]
+    high: tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +62,14 @@ class FloorPlan:
         cell_size_m: side of a cell, metres.
         source: file that errors name; empty for a plan made in memory.
         dataset: array of the file that errors name; empty where the file is the plan.
+        walls: (W, 2) int, x and z of cells that are wall up to the ceiling, none of them in `cells`; what is neither is
+            furniture.
+        doors: (D, 2) int, x and z of `cells` that are openings in a wall.
+        areas: what parts of the plan are used as; the first that holds a cell counts, none: any furniture.
 
     Raises:
-        SceneError: there are no cells or too many, one stands twice or far away, or a blocked edge is none.
+        SceneError: there are no cells or too many, one stands twice or far away, or a blocked edge, a wall, a door or
+            an area is none.
     """
 
     name: str
@@ -52,6 +78,9 @@ class FloorPlan:
     cell_size_m: float = CELL_SIZE_M
     source: str = ""
     dataset: str = ""
+    walls: np.ndarray = field(default_factory=_no_cells)
+    doors: np.ndarray = field(default_factory=_no_cells)
+    areas: tuple[Area, ...] = ()
 
     def __post_init__(self) -> None:
         """Check all of it."""
@@ -69,6 +98,7 @@ class FloorPlan:
         if times.max() > 1:
             self._refuse(f"names the cell {tuple(distinct[times.argmax()].tolist())} twice", "Name every cell once")
         self._check_blocked()
+        self._check_parts()
 
     @classmethod
     def of_map(
@@ -104,6 +134,20 @@ class FloorPlan:
         if unknown:
             ends = " and ".join(str(cell) for cell in sorted(unknown.pop()))
             self._refuse(f"has a blocked edge of {ends}", "Name two neighbouring cells that can be entered")
+
+    def _check_parts(self) -> None:
+        cells = set(map(tuple, self.cells.tolist()))
+        for name, part in (("wall", self.walls), ("door", self.doors)):
+            if part.ndim != 2 or part.shape[1] != 2 or part.dtype.kind not in "iu":
+                shape = f"has {name}s of {part.dtype} and shape {part.shape}"
+                self._refuse(f"{shape}, expected whole numbers ({name}s, 2)", f"Give x and z of every {name}")
+            for cell in map(tuple, part.tolist()):
+                if (cell in cells) == (name == "wall"):
+                    can = "that can be entered" if name == "wall" else "that cannot be entered"
+                    self._refuse(f"has a {name} in the cell {cell} {can}", f"Take the {name} or the cell out")
+        for area in self.areas:
+            if area.use not in USES or area.low[0] > area.high[0] or area.low[1] > area.high[1]:
+                self._refuse(f"has the area {area}", f"Give a use among {', '.join(USES)}, then low and high cell")
 
     def _refuse(self, problem: str, remedy: str) -> NoReturn:
         raise SceneError(self.source or self.name, problem, remedy, self.dataset)
