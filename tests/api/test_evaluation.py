@@ -58,7 +58,7 @@ def test_its_tables_and_files(trained, tmp_path, capfd) -> None:
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
-        ({"run": 5}, "run=5: expected a run folder, what train returned, or an agent"),
+        ({"agent": 5}, r"agent=5: expected a run folder, an \.onnx file, what train returned, or an agent"),
         ({"episodes": 0}, "episodes=0"),
         ({"step_cap": 2.5}, r"step_cap=2\.5"),
         ({"seed": "1"}, "seed='1'"),
@@ -67,7 +67,7 @@ def test_its_tables_and_files(trained, tmp_path, capfd) -> None:
 )
 def test_what_does_not_fit_is_refused(trained, arguments, part) -> None:
     with pytest.raises(ArgumentError, match=part):
-        clearway.evaluate(**{"run": trained, **arguments})
+        clearway.evaluate(**{"agent": trained, **arguments})
 
 
 def test_load_agent_takes_text_and_refuses_the_rest(trained) -> None:
