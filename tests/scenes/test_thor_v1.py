@@ -1,5 +1,7 @@
 import os
 import pickle
+import subprocess
+import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -245,3 +247,32 @@ def test_pictures_from_0_to_1_are_refused_not_stored_as_black(tmp_path: Path) ->
     with pytest.raises(SceneError, match=r"attic\.h5, dataset 'observation': would hold float64, expected uint8"):
         write_scene(replace(scene, observations=scene.observations / 255), path)
     assert not path.exists()
+
+
+FILL_UP = """
+import sys; sys.path[:] = {path!r}
+import os, resource
+from dataclasses import replace
+import numpy as np
+from clearway.errors import SceneError
+from clearway.scenes.thor_v1 import write_scene
+from helpers.made import corridor_scene
+
+pictures = np.random.default_rng(0).integers(0, 256, (12, 60, 80, 3), np.uint8)  # which pack badly
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, -1))
+try:
+    write_scene(replace(corridor_scene(3), observations=pictures), {file!r})
+except SceneError as error:
+    print(error, flush=True)
+    os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
+def test_a_disk_that_fills_up_is_one_error_and_leaves_nothing(tmp_path: Path) -> None:
+    """In a process of its own that ends at once, since HDF5 complains once more, or crashes, when it lets go of it."""
+    script = FILL_UP.format(path=sys.path, file=str(tmp_path / "a.h5"))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "a.h5: cannot be written (" in done.stdout and "has room" in done.stdout
+    assert list(tmp_path.iterdir()) == []

@@ -105,8 +105,9 @@ def write_scene(scene: Scene, path: str | Path) -> None:
     try:
         with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
             _write_all(file, scene, path)
-    except OSError as fault:
-        problem = f"cannot be written ({fault.strerror or fault})"
+    except (OSError, RuntimeError) as fault:  # HDF5 raises the second where the disk fills up as a file is closed
+        reason = getattr(fault, "strerror", None) or " ".join(str(fault).split())
+        problem = f"cannot be written ({reason})"
         raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
 
 
