@@ -66,7 +66,9 @@ def test_an_agent_of_ones_own_is_evaluated_on_scenes_and_targets(scene) -> None:
     result = clearway.evaluate(Turner, scene, targets=[5, 22], **SHORT)
     assert names(result) == ["Turner", "random", "shortest path"]
     assert result.figures["collisions"] == 0 and result.evaluations[0].average.target_count == 2
-    assert isinstance(result.agent, Turner) and result.agent.shapes == {(10, 10, 3)}
+    agent = Turner(None)
+    assert clearway.evaluate(agent, scene, targets=[5, 22], **SHORT).agent is agent
+    assert agent.shapes == {(10, 10, 3)}
 
 
 def test_an_agent_itself_will_do(scene) -> None:
@@ -114,6 +116,23 @@ def test_an_agent_that_sees_what_is_not_there_is_named(scene) -> None:
 
     with pytest.raises(AgentError, match="Seven: the agent gave action 7, expected 0 to 3"):
         clearway.evaluate(Seven, scene, **SHORT)
+
+
+def test_what_an_agent_raises_and_a_state_without_rows_are_told_in_one_line(scene) -> None:
+    class Failing(Turner):
+        def act(self, observation, state):
+            raise KeyError("a map")
+
+    class Forgetful(Turner):
+        def act(self, observation, state):
+            return super().act(observation, state)[0], {"turns": np.zeros(3, np.int64), "name": "x"}
+
+    with pytest.raises(AgentError, match=r"Failing: agent: failed .KeyError: 'a map'."):
+        clearway.evaluate(Failing, scene, **SHORT)
+    with pytest.raises(
+        AgentError, match=r"Forgetful: the agent's state has 'turns' of shape .3,., expected .10, \.\.\.."
+    ):
+        clearway.evaluate(Forgetful, scene, **SHORT)
 
 
 def test_wrong_arguments_are_refused(scene) -> None:

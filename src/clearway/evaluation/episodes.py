@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.agents.agent import Agent, Decisions, rows
+from clearway.agents.agent import Agent, Decisions, State, rows
 from clearway.agents.chance import CHANCE
 from clearway.agents.selection import ActionSelection, selecting
 from clearway.errors import AgentError
@@ -158,7 +158,7 @@ class _Walk:
         """Walk until every episode has ended."""
         while len(self.walking):
             decisions, self.memory = self.agent.act(self.sight(self.env.state), self.memory)
-            _check(decisions, len(self.walking))
+            _check(decisions, self.memory, len(self.walking))
             action = torch.from_numpy(decisions.action.astype(np.int64)).to(self.world.device)
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
@@ -210,8 +210,12 @@ class _Walk:
         )
 
 
-def _check(decisions: Decisions, count: int) -> None:
-    """Raise AgentError where these are no decisions of so many episodes."""
+def _check(decisions: Decisions, memory: State, count: int) -> None:
+    """Raise AgentError where these are no decisions, or no memory, of so many episodes."""
+    for name, values in memory.items():
+        if np.shape(values)[:1] != (count,):
+            problem = f"the agent's state has {name!r:.40} of shape {np.shape(values)}, expected ({count}, ...)"
+            raise AgentError(f"{problem}. Give a row for each episode")
     action, told = decisions.action, decisions.probabilities
     _check_array("actions", action, "int64", (count,))
     if told is not None:
