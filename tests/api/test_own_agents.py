@@ -16,6 +16,7 @@ from clearway.agents.named import AGENTS
 from clearway.errors import AgentError, ArgumentError
 from clearway.plugins import BUILT_IN
 from clearway.scenes.actions import Action
+from clearway.world.world import make_world
 from helpers.made import corridor_scene, grid_scene
 
 SHORT = {"episodes": 2, "step_limit": 30}
@@ -66,6 +67,7 @@ def names(result: clearway.EvaluateResult) -> list[str]:
 def test_an_agent_of_ones_own_is_evaluated_on_scenes_and_targets(scene) -> None:
     result = clearway.evaluate(Turner, scene, targets=[5, 22], **SHORT)
     assert names(result) == ["Turner", "random", "shortest path"]
+    assert type(result.agent) is Turner and result.agent.shapes == {(10, 10, 3)}
     assert result.figures["collisions"] == 0 and result.evaluations[0].average.target_count == 2
     agent = Turner(None)
     assert clearway.evaluate(agent, scene, targets=[5, 22], **SHORT).agent is agent
@@ -134,6 +136,14 @@ def test_what_an_agent_raises_and_a_state_without_rows_are_told_in_one_line(scen
         AgentError, match=r"Forgetful: the agent's state has 'turns' of shape .3,., expected .10, \.\.\.."
     ):
         clearway.evaluate(Forgetful, scene, **SHORT)
+
+
+def test_an_agent_made_for_other_targets_is_refused_in_one_line(scene) -> None:
+    other, small = make_world([scene], {"grid": [5]}), make_world([corridor_scene(2)], {"corridor": [0]})
+    for world in (other, small):
+        with pytest.raises(AgentError, match="PoseAgent: the agent was made for a world without target 22") as caught:
+            clearway.evaluate(shortest_paths(world), scene, targets=[22], **SHORT)
+        assert "\n" not in str(caught.value)
 
 
 def test_wrong_arguments_are_refused(scene) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeAlias, get_args
 
 from clearway.agents.agent import Agent
-from clearway.agents.named import AgentMaker, agent_maker, checked_agent, named_maker
+from clearway.agents.named import AgentMaker, Foreign, agent_maker, checked_agent, named_maker
 from clearway.agents.selection import ActionSelection
 from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
@@ -214,7 +214,8 @@ def _own(
             encoder=encoder_names(scenes),
             **settings,
         )
-    return EvaluateResult(own, tuple(evaluations), tuple(scenes))
+    walked = own.agent if isinstance(own, Foreign) else own
+    return EvaluateResult(walked, tuple(evaluations), tuple(scenes))
 
 
 def _check_fits(card: Card, scenes: Sequence[Scene]) -> None:
