@@ -59,21 +59,25 @@ def named_maker(source: str, found: object) -> AgentMaker:
 
 
 class Foreign:
-    """Another's agent. Whatever it raises is told of as its fault, an `AgentError` in one line."""
+    """Another's agent. Whatever it raises is told of as its fault, an `AgentError` in one line.
+
+    Attributes:
+        agent: the other's own.
+    """
 
     def __init__(self, agent: Agent, source: str) -> None:
-        self._agent, self._source = agent, source
+        self.agent, self._source = agent, source
         self.sees = agent.sees
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
         """See `Agent.reset`."""
         with self._told():
-            return self._agent.reset(target, seed)
+            return self.agent.reset(target, seed)
 
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """See `Agent.act`."""
         with self._told():
-            decisions, after = self._agent.act(observation, state)
+            decisions, after = self.agent.act(observation, state)
             return decisions, after
 
     @contextmanager
