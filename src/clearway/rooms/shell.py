@@ -182,8 +182,18 @@ def _add_column(room: Room, number: int, column: Column, finish: Finish) -> None
         room.box(frame, (0, 0, height), (width + 0.04, depth + 0.04, 0.03), "trim", 0.008)
 
 
-def add_faces(room: Room, faces: Sequence[Face], columns: Sequence[Column], finish: Finish) -> None:
-    """The visible walls inside the room, where faces show that columns make together; call it with looks only."""
+def add_faces(
+    room: Room, faces: Sequence[Face], cornices: Sequence[Face], columns: Sequence[Column], finish: Finish
+) -> None:
+    """The visible walls inside the room, where faces show that columns make together; call it with looks only.
+
+    Args:
+        room: where to.
+        faces: that show.
+        cornices: faces as they are under the ceiling.
+        columns: what stops light.
+        finish: with a picture for each face.
+    """
     for column in columns:
         room.shadow_box(*_column_box(room, column))
     for number, (face, picture) in enumerate(zip(faces, finish.faces, strict=True)):
@@ -197,8 +207,8 @@ def add_faces(room: Room, faces: Sequence[Face], columns: Sequence[Column], fini
         _surface(room, f"face {number}", corner, other - corner, np.array([0, 0, tall_m]), albedo, group)
         if finish.skirting and not face.bottom_m:
             _add_board(room, face, (0.016, 0.09), 0.0, finish.skirting, 0.004, SEEN_GROUP)
-        if finish.cornice:
-            _add_board(room, face, (0.04, 0.06), room.height_m - 0.06, finish.cornice, 0.015, CEILING_GROUP)
+    for face in cornices if finish.cornice else ():
+        _add_board(room, face, (0.04, 0.06), room.height_m - 0.06, str(finish.cornice), 0.015, CEILING_GROUP)
 
 
 def _extent_m(room: Room, along: np.ndarray) -> float:

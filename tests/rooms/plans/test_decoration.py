@@ -109,6 +109,15 @@ def test_the_front_door_is_in_an_outer_wall(monkeypatch) -> None:
         assert min(np.abs(gaps)) < 1e-6 and not at
 
 
+def test_the_front_door_is_in_the_corridor_if_there_is_one(monkeypatch) -> None:
+    at = []
+    monkeypatch.setattr(openings, "door", lambda room, frame: at.append(frame))
+    lines = ("WWWWWWWWWW", "W........W", "W........W", "WWDWWWWWWW", "W........W", "W........W", "WWWWWWWWWW")
+    decorated(0.9, 0, walled("flat", lines, (Area("corridor", (1, 1), (8, 2)), Area("bedroom", (1, 4), (8, 5)))))
+    (frame,) = at
+    assert frame.y_m < 1.2  # the corridor's two rows of cells
+
+
 def test_lamps_hang_over_free_cells() -> None:
     room, layout = decorated(0.9)
     free_m = layout.middles_m(np.argwhere(layout.free))

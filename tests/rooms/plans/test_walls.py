@@ -65,6 +65,13 @@ def test_faces_run_straight_on_with_one_above_the_door() -> None:
     assert low.ends == (-1, 0)  # its board stops before the board of the outer wall, and runs into the door's frame
 
 
+def test_under_the_ceiling_a_face_goes_on_over_the_door() -> None:
+    cells = cell_map(PLAN)
+    over = faces_of(cells, parts_of(cells), 1.0, under_ceiling=True)
+    assert sorted(map(ends_m, over)) == [[[1.4, 0.0], [1.4, 3.4]], [[2.0, 0.0], [2.0, 3.4]]]
+    assert all(face.ends == (-1, -1) for face in over)
+
+
 def test_no_face_shows_in_a_wall_or_behind_a_door_frame() -> None:
     cells = cell_map(PLAN)
     assert {face.at.yaw_deg for face in faces_of(cells, parts_of(cells), 1.0)} == {90.0, -90.0}

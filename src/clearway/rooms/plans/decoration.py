@@ -17,7 +17,8 @@ SLOT_M = 1.3  # of wall for one thing
 LEAST_M = 0.45
 MOST_WINDOWS = 5
 MOST_WINDOWS_A_ROOM = 2  # where the plan has walls
-DOOR_M = 1.05  # of wall that a door takes
+DOOR_M = 1.05  # of a stretch, SPARE_M aside, that a door takes
+FRONT_DOOR_M = 0.74  # the same where the plan has walls: they go on beyond a stretch, by GAP of a cell
 MOST_BEHIND_M = 1.3  # a piece of furniture higher than this hides what hangs behind it
 LAMP_FLOOR_M2 = 7.0  # that one ceiling lamp lights
 MOST_LAMPS = 16
@@ -25,7 +26,7 @@ COVER_M = 0.02
 ROUNDS = 10  # of k-means
 CURTAIN_ROOM_M = 0.3  # nearer than that, a camera would look through curtains, and see nothing but lawn
 PICTURE_HEIGHT_M = 1.15  # of its middle, to be seen by a camera close before it
-PICTURES = 0.65  # of the places for them, where the plan has walls
+PICTURES = 0.8  # of the places for them, where the plan has walls
 SPARE_M = 0.25  # of a stretch that nothing hangs on
 
 
@@ -34,7 +35,7 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
     _hang_lamps(room, layout)
     _cover_walls(room, layout)
     near_m, doors = (0.5 + GAP) * layout.cell_size_m, 0
-    entrance, windows, most = _entrance(layout, tops_m), Counter[int](), MOST_WINDOWS
+    entrance, windows, most = _entrance(layout), Counter[int](), MOST_WINDOWS
     if layout.has_walls:
         most = MOST_WINDOWS_A_ROOM
     for stretch in layout.stretches:
@@ -45,7 +46,7 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
             usable_m = length_m - SPARE_M
             in_room = windows[stretch.room]
             window_here = stretch.outer and in_room < most and (top_m > 0 or near_m > CURTAIN_ROOM_M)
-            if top_m == 0 and not doors and usable_m > DOOR_M and (stretch == entrance or not layout.has_walls):
+            if not doors and (stretch is entrance if layout.has_walls else top_m == 0 and usable_m > DOOR_M):
                 openings.door(room, at)
                 doors += 1
             elif window_here and usable_m > 0.7 and (room.rng.random() < 0.6 or not in_room):
@@ -57,14 +58,14 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
                 _hang(room, at, usable_m, top_m)
 
 
-def _entrance(layout: Layout, tops_m: Sequence[float]) -> Stretch | None:
+def _entrance(layout: Layout) -> Stretch | None:
     """The stretch with the front door where the plan has walls: an outer one, of a corridor if there is such."""
     fitting = [
         stretch
         for stretch in layout.stretches
         if stretch.outer
-        and (stretch.piece is None or tops_m[stretch.piece] == 0)
-        and any(length_m - SPARE_M > DOOR_M for _, length_m in _slots(stretch))
+        and stretch.piece is None
+        and any(length_m - SPARE_M > FRONT_DOOR_M for _, length_m in _slots(stretch))
     ]
     if not layout.has_walls or not fitting:
         return None

@@ -14,7 +14,7 @@ from clearway.rooms.materials import varied
 from clearway.rooms.plans.layout import Layout
 from clearway.rooms.plans.walls import GAP
 from clearway.rooms.room import Room
-from clearway.rooms.shell import SIDES, Face, Finish
+from clearway.rooms.shell import SIDES, Face, Finish, wall_size_m
 from clearway.rooms.surfaces import PIXELS_PER_METRE, pixels
 
 RUG_M = (2.2, 1.6)
@@ -26,16 +26,16 @@ def finish_of(room: Room, layout: Layout) -> Finish:
 
     Areas of a plan have floors and papers of their own.
     """
-    walls = {side: finishes.aged(room, _wall(room, side)) for side in SIDES}
     longest = "south" if room.width_m >= room.depth_m else "west"
+    if (layout.area_map >= 0).any():
+        floor, ceiling = _floor_by_area(room, layout), finishes.plain_ceiling(room)
+        papers = [finishes.aged(room, _paper(room, longest, area.use)) for area in layout.areas]
+        walls = {side: _papered_by_area(room, side, papers, layout) for side in SIDES}
+        return Finish(floor, ceiling, walls, papers[0], [papers[_area_before(face, layout)] for face in layout.faces])
+    walls = {side: finishes.aged(room, _wall(room, side)) for side in SIDES}
     floor = finishes.with_rug(room, _floor(room), _roomiest_m(layout), RUG_M)
     ceiling, inner = finishes.plain_ceiling(room), finishes.aged(room, _wall(room, longest))
-    if not layout.areas:
-        return Finish(floor, ceiling, walls, inner, [inner] * len(layout.faces))
-    papers = [finishes.aged(room, _paper(room, longest, area.use)) for area in layout.areas]
-    walls = {side: _papered_by_area(walls[side], side, papers, layout) for side in SIDES}
-    faces = [papers[_area_before(face, layout)] for face in layout.faces]
-    return Finish(_floor_by_area(room, layout), ceiling, walls, inner, faces)
+    return Finish(floor, ceiling, walls, inner, [inner] * len(layout.faces))
 
 
 def _paper(room: Room, side: str, use: str) -> np.ndarray:
@@ -48,17 +48,18 @@ def _paper(room: Room, side: str, use: str) -> np.ndarray:
     return finishes.tiled_wall(room, side, paint, tile, height_m, room.colours.accent, WET[use])
 
 
-def _papered_by_area(wall: np.ndarray, side: str, papers: Sequence[np.ndarray], layout: Layout) -> np.ndarray:
+def _papered_by_area(room: Room, side: str, papers: Sequence[np.ndarray], layout: Layout) -> np.ndarray:
     """An outer wall with the paper of every area that lies before it."""
     areas = layout.area_map
     numbers = {"south": areas[:, 0], "north": areas[:, -1], "west": areas[0], "east": areas[-1]}[side]
     if side in ("south", "east"):  # their pictures run to lower coordinates
         numbers = numbers[::-1]
-    covered, columns = wall.copy(), wall.shape[1]
+    rows, columns = (pixels(length_m) for length_m in wall_size_m(room, side)[::-1])
+    covered = np.empty((rows, columns, 3))
     marks = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
     for start, end in pairwise(marks):
         first, last = (round(columns * mark / len(numbers)) for mark in (start, end))
-        covered[:, first:last] = papers[numbers[start]][: wall.shape[0], first:last]
+        covered[:, first:last] = papers[numbers[start]][:rows, first:last]
     return covered
 
 

@@ -107,6 +107,7 @@ class Layout:
         has_walls: the plan says where walls are.
         rooms: (X, Z) int, number from 1 of the room that a free cell lies in, door cells aside; 0 elsewhere.
         faces: of the walls inside; empty where the plan has none, and the sides of `walls` show.
+        cornices: where boards run under the ceiling, along the faces and over the doors.
         doorways: in the walls.
         areas: of the plan.
         area_map: (n X, n Z) int with n = AREA_PARTS, number of the area that is nearest to each part of a cell, so that
@@ -126,6 +127,7 @@ class Layout:
     has_walls: bool
     rooms: np.ndarray
     faces: tuple[Face, ...]
+    cornices: tuple[Face, ...]
     doorways: tuple[Doorway, ...]
     areas: tuple[Area, ...]
     area_map: np.ndarray
@@ -179,6 +181,7 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
         has_walls=plan.has_walls,
         rooms=cells.rooms,
         faces=faces_of(cells, parts, size_m) if plan.has_walls else (),
+        cornices=faces_of(cells, parts, size_m, under_ceiling=True) if plan.has_walls else (),
         doorways=doorways_of(cells, size_m),
         areas=plan.areas,
         area_map=_area_map(cells, plan),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from clearway.rooms.camera import CAMERA_HEIGHT_M, VERTICAL_FOV_DEG
 from clearway.rooms.frame import Frame
@@ -12,6 +12,7 @@ from clearway.rooms.furniture import bathroom, beds, decor, kitchen, lamps, seat
 from clearway.rooms.plans.layout import Piece
 from clearway.rooms.room import Room
 
+HEADBOARD_M = 1.05  # what hangs over a bed hangs higher
 OVERHANG_M = 0.05  # how far a bed's covers reach beyond it
 BLOCK_HEIGHT_M = 0.4  # of the obstacle that fills a place whatever stands there
 
@@ -287,8 +288,8 @@ BY_USE: dict[str, tuple[Kind, ...]] = {
     ),
     "living room": (*LIVING, *NARROW),
     "bedroom": (
-        *BEDROOM,
-        Kind(_daybed, (1.75, 2.4), (0.8, 1.3), 0.6, at_wall=True, once=True),
+        *(replace(kind, top_m=HEADBOARD_M) if kind.place is _bed else kind for kind in BEDROOM),
+        Kind(_daybed, (1.75, 2.4), (0.8, 1.3), HEADBOARD_M, at_wall=True, once=True),
         *NARROW,
     ),
     "bathroom": (

@@ -47,7 +47,7 @@ def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True) -> tu
         finish = finish_of(room, layout)
         add_surfaces(room, finish, layout.partitions if layout.has_walls else columns)
         if layout.has_walls:
-            add_faces(room, layout.faces, layout.walls, finish)
+            add_faces(room, layout.faces, layout.cornices, layout.walls, finish)
     for doorway in layout.doorways:
         openings.doorway(room, doorway.at, doorway.width_m, doorway.depth_m, DOOR_HEIGHT_M, LINING_M)
     tops_m = furnish(room, layout.pieces, first_m)

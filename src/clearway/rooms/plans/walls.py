@@ -83,14 +83,21 @@ def _doorway(opening: Opening, size_m: float) -> Doorway:
     return Doorway(middle, (wide + 2 * GAP) * size_m, (deep - 2 * GAP) * size_m)
 
 
-def faces_of(cells: CellMap, parts: np.ndarray, size_m: float) -> tuple[Face, ...]:
-    """The faces of the walls, each as long as it goes straight on, and those above the doors."""
+def faces_of(cells: CellMap, parts: np.ndarray, size_m: float, *, under_ceiling: bool = False) -> tuple[Face, ...]:
+    """The faces of the walls, each as long as it goes straight on, and those above the doors.
+
+    Args:
+        cells: the map.
+        parts: `solid_parts` of it.
+        size_m: side of a cell.
+        under_ceiling: as they are there, where they go straight on over the doors.
+    """
     kinds = np.pad(np.where(parts, SOLID, AIR), 1, constant_values=SHELL)
     for opening in cells.openings:
         i0, j0, i1, j1 = (3 * line + 1 for line in opening.box)  # the map has been padded
         i_in, j_in = (-1, 1) if opening.along_x else (1, -1)  # up to the walls at its sides, and as deep as they are
         lintel = kinds[i0 + i_in : i1 - i_in, j0 + j_in : j1 - j_in]
-        lintel[lintel == AIR] = LINTEL
+        lintel[lintel == AIR] = SOLID if under_ceiling else LINTEL
     lines_m = [sub_lines_m(count // 3, size_m) for count in parts.shape]
     return tuple(face for side in STEPS for face in _faces_to(side, kinds, lines_m))
 
