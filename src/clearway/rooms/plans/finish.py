@@ -33,7 +33,7 @@ def finish_of(room: Room, layout: Layout) -> Finish:
         walls = {side: _papered_by_area(room, side, papers, layout) for side in SIDES}
         return Finish(floor, ceiling, walls, papers[0], [papers[_area_before(face, layout)] for face in layout.faces])
     walls = {side: finishes.aged(room, _wall(room, side)) for side in SIDES}
-    floor = finishes.with_rug(room, _floor(room), _roomiest_m(layout), RUG_M)
+    floor = _with_rug(room, _floor(room), _roomiest_m(layout), layout)
     ceiling, inner = finishes.plain_ceiling(room), finishes.aged(room, _wall(room, longest))
     return Finish(floor, ceiling, walls, inner, [inner] * len(layout.faces))
 
@@ -76,7 +76,7 @@ def _floor_by_area(room: Room, layout: Layout) -> np.ndarray:
     x_m, y_m = layout.middles_m(np.indices(layout.free.shape).transpose(1, 2, 0)).transpose(2, 0, 1)
     roomy = layout.free & np.isin(layout.area_at(x_m, y_m), rugs)
     if roomy.any():
-        floor = finishes.with_rug(room, floor, _roomiest_m(layout, roomy), RUG_M)
+        floor = _with_rug(room, floor, _roomiest_m(layout, roomy), layout)
     y_m, x_m = ((np.arange(count) + 0.5) / PIXELS_PER_METRE for count in floor.shape[:2])
     numbers = layout.area_at(x_m[None], y_m[:, None])
     for use in sorted(WET):
@@ -89,6 +89,26 @@ def _floor_by_area(room: Room, layout: Layout) -> np.ndarray:
         )
         floor[here] = finishes.floor_of(room, tiles)[here]
     return floor
+
+
+def _with_rug(room: Room, floor: np.ndarray, middle_m: tuple[float, float], layout: Layout) -> np.ndarray:
+    """The floor with a rug, smaller or none where walls inside leave no room for it."""
+    for share in (1.0, 0.85, 0.7, 0.55) if layout.has_walls else ():
+        if _is_clear(middle_m, (share * RUG_M[0], share * RUG_M[1]), layout):
+            return finishes.with_rug(room, floor, middle_m, (share * RUG_M[0], share * RUG_M[1]))
+    return floor if layout.has_walls else finishes.with_rug(room, floor, middle_m, RUG_M)
+
+
+def _is_clear(middle_m: tuple[float, float], size_m: tuple[float, float], layout: Layout) -> bool:
+    """Whether a rectangle of floor lies within the room and under no wall."""
+    low, high = (
+        tuple(place + sign * side / 2 for place, side in zip(middle_m, size_m, strict=True)) for sign in (-1, 1)
+    )
+    inside = min(low) > 0 and high[0] < layout.width_m and high[1] < layout.depth_m
+    return inside and not any(
+        low[0] < wall.x_max_m and high[0] > wall.x_min_m and low[1] < wall.y_max_m and high[1] > wall.y_min_m
+        for wall in layout.walls
+    )
 
 
 def _pattern(room: Room) -> str:
