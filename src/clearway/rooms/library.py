@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -90,7 +91,14 @@ def scene_path(name: str, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
 
 def plan_path(plan: FloorPlan, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
     """Where the cache keeps the furnished room of a floor plan as some sensors see it."""
-    shape = {"cells": plan.cells.tolist(), "blocked": plan.blocked_edges.tolist(), "cell_size_m": plan.cell_size_m}
+    shape = {
+        "cells": plan.cells.tolist(),
+        "blocked": plan.blocked_edges.tolist(),
+        "cell_size_m": plan.cell_size_m,
+        "walls": plan.walls.tolist(),
+        "doors": plan.doors.tolist(),
+        "areas": [asdict(area) for area in plan.areas],
+    }
     return _path_of(plan.name, {"plan": plan.name, "seed": seed, "sensors": sorted(sensors), **shape})
 
 
