@@ -28,3 +28,9 @@ FeatureStore = Literal["memory", "float16", "mapped"]
 
 MatmulPrecision = Literal["highest", "medium"]
 """See `clearway.model.precision`."""
+
+PlanKind = Literal["room", "flat"]
+"""See `clearway.generation`."""
+
+SplitName = Literal["train", "validation", "test"]
+"""See `clearway.generation.split`."""

@@ -181,7 +181,7 @@ def test_names_cannot_lead_out_of_the_cache(cache):
 def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     built = []
 
-    def build(plan, seed, *, sensors, workers, ray, progress):
+    def build(plan, seed, *, sensors, size_px, workers, ray, progress):
         built.append((plan.name, seed))
         return replace(grid_scene(seed), name=plan.name)
 
@@ -193,12 +193,17 @@ def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     assert [path.name for path in cache.glob("*.h5")] == [plan_path(plan, 2).name]
     cached_plan_scene(plan, 2, sensors=("rgb", "depth"))
     assert len(built) == 2  # without depth is another file
+    cached_plan_scene(plan, 2, size_px=(24, 32))
+    assert len(built) == 3  # and so is one of smaller pictures
 
 
 def test_another_plan_has_another_file(cache):
     plan = FloorPlan("hall", np.array([[0, 0], [1, 0]]))
     others = (
         replace(plan, name="den"),
+        replace(plan, walls=np.array([[2, 0]])),
+        replace(plan, doors=np.array([[1, 0]])),
+        replace(plan, areas=(Area("kitchen", (0, 0), (1, 0)),)),
         replace(plan, cells=np.array([[0, 0], [0, 1]])),
         replace(plan, cells=np.array([[1, 0], [0, 0]])),
         replace(plan, cell_size_m=0.5),
