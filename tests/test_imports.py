@@ -38,6 +38,7 @@ ORDER = (
     {"learn"},
     {"evaluation"},
     {"live"},
+    {"live_envs"},
     {"experiments"},
     {"deploy"},
     {"viz"},
