@@ -148,7 +148,7 @@ def test_a_seed_repeats_pictures_and_all(make: Make) -> None:
 
 
 def test_perturbations_change_what_is_seen_and_not_the_target(live, make: Make) -> None:
-    ends = {"start": (0.25, 0.25, 0.0), "target": (0.25, 2.25, 0.0)}
+    ends = {"start": (0.25, 0.25, 0.0), "target": (0.25, 2.25, 180.0)}  # from where furniture is seen
     plain, _ = make().reset(seed=0, options=ends)
     for changed in ({"light": 0.9}, {"pixel_noise": 20.0}, {"camera_pitch_jitter": 9.0}):
         seen, _ = make(perturbations=changed).reset(seed=1, options=ends)
