@@ -8,7 +8,15 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.feature_spread import feature_spread
-from clearway.scenes.floor_plans import CELL_SIZE_M, MAX_WALLS, Area, FloorPlan, floor_plan_scene, parts_apart
+from clearway.scenes.floor_plans import (
+    CELL_SIZE_M,
+    MAX_WALLS,
+    Area,
+    FloorPlan,
+    floor_plan_scene,
+    parts_apart,
+    plan_of,
+)
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
 from clearway.world.world import make_world
@@ -220,3 +228,42 @@ def test_parts_that_cannot_be_reached_are_named_in_one_line() -> None:
     assert (
         parts_apart(three, most=1) == f"hall: 3 parts cannot be {kept}: 2 cells at (0, 0) and 1 more; 3 cells in 2 more"
     )
+
+
+def test_a_scene_gives_its_plan_back_from_its_file_too(tmp_path: Path) -> None:
+    reachable = np.ones((4, 3), bool)
+    reachable[2, 1] = False
+    drawn = FloorPlan.of_map("drawn", reachable, np.array([[[0, 1], [0, 0]]]), cell_size_m=0.3)
+    plan = replace(
+        drawn,
+        cells=drawn.cells[::-1] - 2,
+        blocked_edges=drawn.blocked_edges - 2,
+        walls=np.array([[0, -1]]),
+        doors=np.array([[1, 0]]),
+        areas=(Area("kitchen", (-2, -2), (-1, 0)),),
+    )
+    made = floor_plan_scene(plan, feature_count=4)
+    write_scene(made, tmp_path / "drawn.h5")
+    for scene in (made, read_scene(tmp_path / "drawn.h5")):
+        again = plan_of(scene)
+        assert (again.name, again.cell_size_m, again.areas) == ("drawn", 0.3, plan.areas)
+        for name in ("cells", "edges", "walls", "doors"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(plan, name))
+        np.testing.assert_array_equal(floor_plan_scene(again, feature_count=4).features, made.features)
+
+
+def test_a_plan_of_nothing_but_cells_needs_no_record() -> None:
+    scene = floor_plan_scene(FloorPlan.of_map("open", np.ones((2, 2), bool)), feature_count=4)
+    assert "plan" not in scene.made_by.notes
+    assert len(plan_of(scene).edges) == 4
+
+
+def test_scenes_without_a_plan_are_refused() -> None:
+    scene = floor_plan_scene(FloorPlan.of_map("open", np.ones((2, 2), bool)), feature_count=4)
+    askew = replace(scene, locations_m=scene.locations_m + 0.1)
+    with pytest.raises(SceneError, match=r"open: its poses are not those of a floor plan\. Make the scene"):
+        plan_of(askew)
+    for parts in ({"areas": [["attic", [0, 0]]]}, {"walls": ["here"]}, 3):
+        damaged = replace(scene, made_by=replace(scene.made_by, notes={"plan": parts}))
+        with pytest.raises(SceneError, match="the record of its floor plan is damaged"):
+            plan_of(damaged)

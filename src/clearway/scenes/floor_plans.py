@@ -17,6 +17,7 @@ from typing import NoReturn
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.grid import HEADING_COUNT, connected_parts, neighbour_pairs, pose_graph
 from clearway.scenes.made_up import check_made_up, made_up_encoder, made_up_features
 from clearway.scenes.scene import Provenance, Scene
@@ -24,6 +25,8 @@ from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES
 from clearway.version import __version__
 
 SOURCE = "floor_plan"  # stands in a scene's `made_by`
+PLAN_NOTE = "plan"  # in its notes: walls, doors and areas
+REBUILD = "Make the scene of its plan again"
 CELL_SIZE_M = 0.25  # of the published AI2-THOR plans
 MAX_CELLS = MAX_STATES // HEADING_COUNT
 MAX_WALLS = 1 << 18
@@ -299,11 +302,49 @@ def floor_plan_scene(plan: FloorPlan, feature_count: int = 2048, seed: int = 0) 
             SOURCE,
             seed=seed,
             versions={"clearway": __version__, "numpy": np.__version__},
-            notes={"features": "made-up smooth functions of the pose; no pictures"},
+            notes={"features": "made-up smooth functions of the pose; no pictures", **plan_notes(plan)},
         ),
         encoder=made_up_encoder(feature_count, seed),
         cell_size_m=plan.cell_size_m,
     )
+
+
+def plan_notes(plan: FloorPlan) -> dict[str, object]:
+    """What a scene's record keeps of a plan beside what its poses tell (JSON values), for `plan_of`."""
+    parts = {
+        "walls": plan.walls.tolist(),
+        "doors": plan.doors.tolist(),
+        "areas": [[area.use, list(area.low), list(area.high)] for area in plan.areas],
+    }
+    kept = {name: part for name, part in parts.items() if part}
+    return {PLAN_NOTE: kept} if kept else {}
+
+
+def plan_of(scene: Scene) -> FloorPlan:
+    """The plan that a scene was made of.
+
+    Raises:
+        SceneError: its poses are no plan's, or its record of walls, doors and areas is damaged.
+    """
+    size_m, firsts = scene.cell_size_m, slice(None, None, HEADING_COUNT)
+    cells = np.rint(scene.locations_m[firsts] / size_m).astype(np.int64)
+    pairs, axes = neighbour_pairs(cells)
+    # heading 90 looks along x, heading 0 along z
+    ahead = scene.graph[np.minimum(HEADING_COUNT * pairs[:, 0] + 1 - axes, scene.state_count - 1), Action.MOVE_FORWARD]
+    try:
+        parts = scene.made_by.notes.get(PLAN_NOTE, {})
+        assert isinstance(parts, dict)
+        areas = tuple(Area(use, tuple(low), tuple(high)) for use, low, high in parts.get("areas", ()))
+        walls, doors = (np.array(parts.get(name, []), np.int64).reshape(-1, 2) for name in ("walls", "doors"))
+    except (AssertionError, TypeError, ValueError) as fault:
+        raise SceneError(scene.name, "the record of its floor plan is damaged", REBUILD) from fault
+    blocked = cells[pairs[ahead == BLOCKED]]
+    plan = FloorPlan(scene.name, cells, blocked, size_m, walls=walls, doors=doors, areas=areas)
+    locations_m, headings_deg, graph = plan_poses(plan)
+    same = locations_m.shape == scene.locations_m.shape and np.allclose(locations_m, scene.locations_m)
+    if not same or not np.array_equal(headings_deg, scene.headings_deg) or not np.array_equal(graph, scene.graph):
+        raise SceneError(scene.name, "its poses are not those of a floor plan", REBUILD)
+    return plan
 
 
 def _ends(pairs: np.ndarray) -> list[frozenset[tuple[int, int]]]:
