@@ -39,6 +39,7 @@ ORDER = (
     {"learn"},
     {"evaluation"},
     {"live"},
+    {"live_envs"},
     {"experiments"},
     {"deploy"},
     {"viz"},

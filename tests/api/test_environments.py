@@ -5,6 +5,9 @@ import clearway
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import ArgumentError
+from clearway.live_envs.single import LiveImageGoalEnv
+from clearway.live_envs.vector import LiveImageGoalVectorEnv
+from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene
 
@@ -41,3 +44,32 @@ def test_options_that_do_not_fit_are_refused(options, part) -> None:
     with pytest.raises((ArgumentError, ValueError), match=part) as caught:
         clearway.make_env(corridor_scene(), **options)
     assert isinstance(caught.value, clearway.ClearwayError)
+
+
+def test_a_live_one_and_many(tmp_path) -> None:
+    plan = floor_plan_scene(FloorPlan.of_map("small", np.ones((3, 2), bool), cell_size_m=0.5), feature_count=4)
+    write_scene(plan, tmp_path / "small.h5")
+    env = clearway.make_env(tmp_path / "small.h5", live=True, stop=True, height_px=12, width_px=16)
+    assert isinstance(env.unwrapped, LiveImageGoalEnv) and env.action_space.n == 5
+    assert env.reset(seed=0)[0]["observation"].shape == (12, 16, 3)
+    envs = clearway.make_env(plan, num_envs=2, live=True, height_px=12, width_px=16)
+    assert isinstance(envs, LiveImageGoalVectorEnv) and envs.num_envs == 2
+    env.close()
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        ({"scenes": "bathroom", "live": 1}, "live=1: expected True or False"),
+        (
+            {"scenes": "bathroom", "observations": "pictures"},
+            "observations: no such option.* room_seed, targets, reward",
+        ),
+        ({"scenes": [corridor_scene(), corridor_scene()]}, "a live environment is one room, found 2 scenes"),
+        ({"scenes": corridor_scene()}, "there is no room to walk in: the scene comes from"),
+    ],
+)
+def test_live_ones_that_do_not_fit_are_refused(arguments, part) -> None:
+    with pytest.raises(clearway.ClearwayError, match=part):
+        clearway.make_env(**{"live": True, **arguments})

@@ -82,6 +82,36 @@ def test_gaps_are_distances_between_surfaces_at_equal_moments():
     assert Body(large_room()).gap_m() < 0  # at the origin, in the corner of the floor
 
 
+@pytest.mark.parametrize(("ahead_m", "steps"), [(0.4, 0), (0.69, 0), (0.71, 1), (1.19, 1), (1.21, 2)])
+def test_free_steps_are_those_that_would_end_without_a_contact(ahead_m, steps):
+    body = body_at(large_room().add_box((2.0, 4.0), (3.0 + ahead_m, 3.1 + ahead_m)), 3.0, 3.0)
+    assert body.free_steps(0.5, 0.0, 2) == steps
+    assert body.free_steps(-0.5, 180.0, 2) == steps
+    assert body.free_steps(0.5, 180.0, 2) == 2
+    assert body.place_m == pytest.approx([3.0, 3.0], abs=1e-12)  # it stays
+
+
+def test_free_steps_find_what_moves_find_at_any_pose():
+    room = large_room().add_box((2.0, 2.4), (3.3, 3.4)).add_box((4.0, 4.02), (1.0, 5.0)).add_box((1.0, 1.3), (1.0, 1.3))
+    rng, body, found = np.random.default_rng(0), Body(room), []
+    for _ in range(400):
+        place_m, heading_deg = rng.uniform(0.3, 5.7, 2), float(rng.uniform(0, 360))
+        body.stand_at(place_m)
+        if body.touches:
+            continue
+        free = body.free_steps(0.4, heading_deg, 1)
+        assert free == (not body.move(0.4, heading_deg).contact), (place_m, heading_deg)
+        found.append(free)
+    assert 20 < len(found) - sum(found) < len(found) - 20
+
+
+@pytest.mark.parametrize("ahead_m", np.linspace(0.2, 0.4, 9).tolist())
+def test_free_steps_do_not_leap_over_a_post_that_is_grazed(ahead_m):
+    post = (3.199, 3.209), (3.0 + ahead_m, 3.01 + ahead_m)
+    body = body_at(large_room().add_box(*post), 3.0, 3.0)
+    assert body.free_steps(0.5, 0.0, 1) == (not body.move(0.5, 0.0).contact)
+
+
 def test_far_from_everything_the_gap_is_the_reach():
     assert body_at(large_room(), 3.0, 3.0).gap_m() == REACH_M
 

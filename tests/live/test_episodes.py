@@ -14,11 +14,13 @@ from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
 from clearway.live.conditions import MOST, Perturbations
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
+from clearway.live.live_room import live_room
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder
 from clearway.rooms.camera import eye_view, first_person_shot
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.actions import Action
+from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.sensors import RGB
 from clearway.world.world import World, make_world
 from helpers.agents import alike, by_rule, only
@@ -106,6 +108,25 @@ def test_a_random_walk_is_the_grids_up_to_its_first_contact(live, world, random_
         same = 1 + (steps[0] if len(steps) else len(trajectory.actions))
         places_m = live.scene.locations_m[trajectory.states[:same]]
         np.testing.assert_allclose(walk[:same, :2], places_m, atol=1e-9)
+
+
+def test_in_a_floor_plan_a_random_walk_is_the_plans_up_to_its_first_contact():
+    reachable = np.ones((4, 3), bool)
+    reachable[1, 1] = False
+    scene = floor_plan_scene(FloorPlan.of_map("ring", reachable, cell_size_m=0.5), feature_count=4)
+    live, world = live_room(scene), make_world([scene], {"ring": (0, 22)})
+    table = run_live_episodes(live, world, RandomWalk(), unused, Perturbations(), PROTOCOL)
+    grid = run_episodes(world, RandomWalk(), episodes_per_target=4, step_limit=15, seed=3, record=True)
+    blocked = [np.flatnonzero(t.states[1:] == t.states[:-1]) for t in grid.trajectories]
+    assert table.contacts.any() and (table.contacts > 0).tolist() == [len(steps) > 0 for steps in blocked]
+    for walk, trajectory, steps in zip(table.walks, grid.trajectories, blocked, strict=True):
+        same = 1 + (steps[0] if len(steps) else len(trajectory.actions))
+        places_m = scene.locations_m[trajectory.states[:same]]
+        np.testing.assert_allclose(walk[:same, :2] + live.origin_m, places_m, atol=1e-9)
+
+
+def unused(shots):
+    raise AssertionError("nobody looks")
 
 
 def test_clearance_is_zero_exactly_where_there_was_a_contact(random_walk):

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.live.live_room import live_room
+from clearway.live.body import Body
+from clearway.live.live_room import live_room, live_room_named
+from clearway.scenes.actions import BLOCKED, Action
+from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.scene import Provenance
 from helpers.made import corridor_scene
 
@@ -28,3 +31,27 @@ def test_the_camera_sees_the_new_obstacle_only_where_a_layout_puts_it(live):
     assert names[-1] == "new obstacle" and len(names) == 3
     body = live.model.body("new obstacle")
     np.testing.assert_array_equal(body.pos, [0, 0, -10])
+
+
+def test_a_floor_plan_is_a_room_to_walk_in_whose_moves_are_those_of_the_plan():
+    reachable = np.ones((4, 3), bool)
+    reachable[1, 1] = False
+    scene = floor_plan_scene(FloorPlan.of_map("ring", reachable, np.array([[[2, 0], [3, 0]]])), feature_count=4)
+    live = live_room(scene)
+    body = Body(live.room, live.agent)
+    np.testing.assert_allclose(live.scene.locations_m + live.origin_m, scene.locations_m)
+    for state in range(scene.state_count):
+        x_m, z_m, heading_deg = live.pose_of(state)
+        for action, sign in ((Action.MOVE_FORWARD, 1), (Action.MOVE_BACKWARD, -1)):
+            body.stand_at(np.array([x_m, z_m]))
+            step = body.move(sign * scene.cell_size_m, heading_deg)
+            assert step.contact == (scene.graph[state, action] == BLOCKED), (state, action)
+
+
+@pytest.mark.slow
+def test_a_room_by_its_name_is_that_of_its_scene():
+    named = live_room_named("bathroom", 1)
+    assert named.scene.name == "bathroom-1"
+    again = live_room(named.scene)
+    assert again.model.nbody == named.model.nbody > 2
+    np.testing.assert_array_equal(again.model.geom_pos, named.model.geom_pos)

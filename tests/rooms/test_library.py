@@ -208,6 +208,9 @@ def test_another_plan_has_another_file(cache):
         replace(plan, cells=np.array([[1, 0], [0, 0]])),
         replace(plan, cell_size_m=0.5),
         replace(plan, blocked_edges=np.array([[[0, 0], [1, 0]]])),
+        replace(plan, walls=np.array([[0, 1]])),
+        replace(plan, doors=np.array([[0, 0]])),
+        replace(plan, areas=(Area("kitchen", (0, 0), (1, 0)),)),
     )
     paths = {plan_path(plan, 0), plan_path(plan, 1), *(plan_path(other, 0) for other in others)}
     assert len(paths) == 10

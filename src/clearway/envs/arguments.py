@@ -1,9 +1,10 @@
-"""Checks of what users hand to the environments: scenes, reward, numbers, actions, seeds."""
+"""Checks of what users hand to the environments: scenes, reward, numbers, actions, seeds, masks. Without PyTorch."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -16,6 +17,7 @@ from clearway.scenes.targets import default_targets
 
 SceneSource = Scene | str | Path
 Seeds = int | Sequence[int | None] | np.ndarray | None
+RESET_MASK = "reset_mask"
 NO_LIMIT = -1  # how gymnasium.make spells it; None means the same
 
 
@@ -73,16 +75,31 @@ def chosen_autoreset(mode: AutoresetMode | str) -> AutoresetMode:
         raise EnvError(f"autoreset_mode={mode!r} is unknown. Use one of {names}") from fault
 
 
-def checked_actions(actions: np.ndarray, env_count: int) -> np.ndarray:
+def checked_actions(actions: np.ndarray, env_count: int, action_count: int = ACTION_COUNT) -> np.ndarray:
     """The actions as (env_count,) int64; EnvError where they are no actions."""
     action = np.asarray(actions)
     if not np.issubdtype(action.dtype, np.integer) or action.shape != (env_count,):
         found = f"{action.dtype} of shape {action.shape}"
         raise EnvError(f"actions: expected integers of shape ({env_count},), found {found}. Take action_space.sample()")
-    if action.min() < 0 or action.max() >= ACTION_COUNT:
-        wrong = action[(action < 0) | (action >= ACTION_COUNT)][0]
-        raise EnvError(f"action {wrong} is out of range. Actions are 0 to {ACTION_COUNT - 1}")
+    if action.min() < 0 or action.max() >= action_count:
+        wrong = action[(action < 0) | (action >= action_count)][0]
+        raise EnvError(f"action {wrong} is out of range. Actions are 0 to {action_count - 1}")
     return action.astype(np.int64)
+
+
+def environments_to_reset(options: Mapping[str, Any], env_count: int) -> np.ndarray:
+    """The environments that begin anew, (B,) int64: those of `options["reset_mask"]`, else all.
+
+    Raises:
+        EnvError: the mask is not a bool array (N,) with at least one True.
+    """
+    if RESET_MASK not in options:
+        return np.arange(env_count)
+    mask = options[RESET_MASK]
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (env_count,) or not mask.any():
+        expected = f"a bool array of shape ({env_count},) with at least one True"
+        raise EnvError(f"options['{RESET_MASK}']: expected {expected}, got {mask!r}")
+    return np.flatnonzero(mask)
 
 
 def seed_words(seed: int | Sequence[int | None] | np.ndarray, env_count: int) -> tuple[np.ndarray, np.ndarray]:

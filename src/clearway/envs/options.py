@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from clearway.envs.arguments import RESET_MASK
 from clearway.errors import EnvError
 from clearway.world.world import DistanceTable, World
 
-RESET_MASK = "reset_mask"
 EPISODE_OPTIONS = ("scene", "target", "start")
 
 
@@ -27,21 +27,6 @@ class EpisodeChoice:
 
     allowed: np.ndarray
     start: np.ndarray | None
-
-
-def environments_to_reset(options: Mapping[str, Any], env_count: int) -> np.ndarray:
-    """The environments that begin anew, (B,) int64: those of `options["reset_mask"]`, else all.
-
-    Raises:
-        EnvError: the mask is not a bool array (N,) with at least one True.
-    """
-    if RESET_MASK not in options:
-        return np.arange(env_count)
-    mask = options[RESET_MASK]
-    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (env_count,) or not mask.any():
-        expected = f"a bool array of shape ({env_count},) with at least one True"
-        raise EnvError(f"options['{RESET_MASK}']: expected {expected}, got {mask!r}")
-    return np.flatnonzero(mask)
 
 
 def episode_choice(

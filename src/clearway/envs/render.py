@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -12,8 +13,10 @@ from clearway.envs.floor_map import FloorMap
 from clearway.envs.marks import FINENESS, draw_agent, draw_bump, draw_target, paint_zone
 from clearway.envs.record import EpisodeSoFar
 from clearway.scenes.scene import Scene
-from clearway.world.world import World
 from clearway.zones import ZONE_NAMES, Zone
+
+if TYPE_CHECKING:
+    from clearway.world.world import World
 
 RENDER_MODES = ("rgb_array", "ansi")
 PANEL_HEIGHT_PX = 360

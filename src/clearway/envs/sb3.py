@@ -8,11 +8,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from clearway.envs.vector import ImageGoalVectorEnv, Observation
 from clearway.errors import EnvError
-from clearway.scenes.actions import ACTION_COUNT
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -27,20 +26,22 @@ class SB3VecEnv(VecEnv):
     move), and where its episode ended `terminal_observation` and `TimeLimit.truncated`, from which SB3 bootstraps.
 
     Args:
-        scenes: as of `ImageGoalVectorEnv`.
+        scenes: as of `ImageGoalVectorEnv`; or a vector environment of ours in the autoreset mode SAME_STEP, such as a
+            `LiveImageGoalVectorEnv`, with settings of its own.
         num_envs: environments side by side.
         scene_in_observation: add the scene's index, (1,) float32, as `scene`, for policies with a head a scene.
         **settings: others of `ImageGoalVectorEnv`.
     """
 
     def __init__(self, scenes: Any, *, num_envs: int = 1, scene_in_observation: bool = False, **settings: Any) -> None:
-        self.envs = ImageGoalVectorEnv(scenes, num_envs=num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
+        self.envs = _made(scenes, num_envs=num_envs, **settings)
+        num_envs = self.envs.num_envs
         self.scene_in_observation = scene_in_observation
         seen = self.envs.single_observation_space
         assert isinstance(seen, spaces.Dict)
         if scene_in_observation:
             seen = spaces.Dict({**seen.spaces, "scene": scene_space(len(self.envs.scene_names))})
-        super().__init__(num_envs, seen, spaces.Discrete(ACTION_COUNT))
+        super().__init__(num_envs, seen, self.envs.single_action_space)
         self._actions = np.zeros(num_envs, np.int64)
 
     def reset(self) -> Observation:
@@ -106,6 +107,13 @@ class SB3VecEnv(VecEnv):
     ) -> list[bool]:
         """Never."""
         return [False] * len(list(self._get_indices(indices)))
+
+
+def _made(scenes: Any, **settings: Any) -> Any:
+    """A vector environment as it is, or one of the scenes."""
+    if isinstance(scenes, VectorEnv):
+        return scenes
+    return ImageGoalVectorEnv(scenes, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
 
 
 def _joined(options: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from clearway.choices import ZoneLevel
-from clearway.envs.arguments import SceneSource, seed_words
-from clearway.envs.options import RESET_MASK
+from clearway.envs.arguments import RESET_MASK, SceneSource, seed_words
 from clearway.envs.render import RENDER_MODES
 from clearway.envs.spaces import ObservationKind
 from clearway.envs.vector import ImageGoalVectorEnv, Info, Observation

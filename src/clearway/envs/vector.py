@@ -23,10 +23,11 @@ from clearway.envs.arguments import (
     checked_actions,
     chosen_autoreset,
     chosen_targets,
+    environments_to_reset,
     loaded_scenes,
     seed_words,
 )
-from clearway.envs.options import EpisodeChoice, environments_to_reset, episode_choice
+from clearway.envs.options import EpisodeChoice, episode_choice
 from clearway.envs.record import EpisodeRecord
 from clearway.envs.render import RENDER_MODES, Renderer
 from clearway.envs.spaces import ObservationKind, observation_sources, observation_space

@@ -90,7 +90,13 @@ def add_new_obstacle(body: mujoco.MjsBody, at_m: tuple[float, float, float], gro
 
 
 def furniture_moved(
-    room: CollisionRoom, scene: Scene, start: int, target: int, most_m: float, rng: np.random.Generator
+    room: CollisionRoom,
+    scene: Scene,
+    start: int,
+    target: int,
+    most_m: float,
+    rng: np.random.Generator,
+    agent: AgentShape | None = None,
 ) -> Arrangement:
     """Each piece moved in a random direction by up to `most_m`, as far as it runs into nothing and a way remains.
 
@@ -100,6 +106,7 @@ def furniture_moved(
         start, target: states between which a way must remain.
         most_m: longest distance.
         rng: draws order, directions and distances.
+        agent: its body.
     """
     layout = as_built(room)
     for piece in rng.permutation(len(layout.moved_m)).tolist():
@@ -107,14 +114,20 @@ def furniture_moved(
             angle, distance_m = rng.uniform(0, 2 * np.pi), rng.uniform(0, most_m)
             offset_m = (float(distance_m * np.sin(angle)), float(distance_m * np.cos(angle)))
             tried = layout.with_piece(piece, offset_m)
-            if not _runs_into(room, layout, tried, piece) and way_remains(room, scene, tried, start, target):
+            if not _runs_into(room, layout, tried, piece) and way_remains(room, scene, tried, start, target, agent):
                 layout = tried
                 break
     return layout
 
 
 def with_obstacle_on_path(
-    room: CollisionRoom, scene: Scene, layout: Arrangement, start: int, target: int, rng: np.random.Generator
+    room: CollisionRoom,
+    scene: Scene,
+    layout: Arrangement,
+    start: int,
+    target: int,
+    rng: np.random.Generator,
+    agent: AgentShape | None = None,
 ) -> Arrangement:
     """The layout with a bin in a cell of a shortest path, if there is one that leaves another way; else as it was."""
     path = shortest_path(scene, start, target)
@@ -123,7 +136,7 @@ def with_obstacle_on_path(
     for state in rng.permutation(np.unique(cells)).tolist() if cells else []:
         x_m, z_m = scene.locations_m[state].tolist()
         tried = Arrangement(layout.moved_m, (x_m, z_m))
-        if way_remains(room, scene, tried, start, target):
+        if way_remains(room, scene, tried, start, target, agent):
             return tried
     return layout
 
@@ -139,10 +152,12 @@ def shortest_path(scene: Scene, start: int, target: int) -> list[int]:
     return path
 
 
-def way_remains(room: CollisionRoom, scene: Scene, layout: Arrangement, start: int, target: int) -> bool:
+def way_remains(
+    room: CollisionRoom, scene: Scene, layout: Arrangement, start: int, target: int, agent: AgentShape | None = None
+) -> bool:
     """Whether free moves of the grid still lead from the start to the target."""
     try:
-        grid = find_grid(arranged(room, layout), AgentShape())
+        grid = find_grid(arranged(room, layout), agent or AgentShape())
     except SceneError:  # the agent fits nowhere
         return False
     ends_m = scene.locations_m[[start, target]]

@@ -20,6 +20,7 @@ SAMPLES = 20
 HALVINGS = 12
 STAND_OFF_M = 0.001  # so far does the body draw back from what it touched
 REACH_M = 1.0  # clearances are measured up to here
+SURE_M = 1e-4  # measured distances are as exact as this
 EDGE_M = 0.1  # thickness of the walls around the floor
 
 
@@ -31,7 +32,7 @@ class Motion:
         travelled_m: distance moved, negative backwards.
         contact: the move ended at an obstacle.
         gaps_m: (SAMPLES,) distance between the body and the nearest obstacle at equal moments, at most REACH_M; 0 from
-            the contact on.
+            the contact on. Empty where nobody asked for them.
     """
 
     travelled_m: float
@@ -79,29 +80,58 @@ class Body:
         """MuJoCo reports a contact."""
         return self._data.ncon > 0
 
-    def gap_m(self) -> float:
-        """Distance to the nearest obstacle, at most REACH_M."""
-        gap_m = REACH_M
+    def gap_m(self, most_m: float = REACH_M) -> float:
+        """Distance to the nearest obstacle, at most `most_m`."""
+        gap_m = most_m
         for other in self._others:
             gap_m = min(gap_m, mujoco.mj_geomDistance(self._model, self._data, self._agent, other, gap_m, None))
         return gap_m
 
-    def wait(self) -> Motion:
+    def wait(self, *, measured: bool = True) -> Motion:
         """A step in place: a turn changes nothing about a round body."""
-        return Motion(0.0, False, np.full(SAMPLES, self.gap_m()))
+        return Motion(0.0, False, np.full(SAMPLES, self.gap_m()) if measured else np.zeros(0))
 
-    def move(self, distance_m: float, heading_deg: float) -> Motion:
-        """Move along a heading, backwards where the distance is negative, until done or in contact."""
-        heading = np.radians(heading_deg)
-        start_m, way_m = self.place_m, distance_m * np.array([np.sin(heading), np.cos(heading)])
-        gaps_m = np.zeros(SAMPLES)
+    def move(self, distance_m: float, heading_deg: float, *, measured: bool = True) -> Motion:
+        """Move along a heading, backwards where the distance is negative, until done or in contact.
+
+        Args:
+            distance_m: how far.
+            heading_deg: in which direction.
+            measured: note the gaps on the way, which takes most of the time.
+        """
+        start_m, way_m = self.place_m, distance_m * _along(heading_deg)
+        gaps_m = np.zeros(SAMPLES if measured else 0)
         for sample, share in enumerate(np.arange(1, SAMPLES + 1) / SAMPLES):
             self.stand_at(start_m + share * way_m)
             if self.touches:
                 share = self._draw_back(start_m, way_m, share - 1 / SAMPLES, share)
                 return Motion(share * distance_m, True, gaps_m)
-            gaps_m[sample] = self.gap_m()
+            if measured:
+                gaps_m[sample] = self.gap_m()
         return Motion(distance_m, False, gaps_m)
+
+    def free_steps(self, step_m: float, heading_deg: float, most: int) -> int:
+        """How many steps along a heading, backwards where they are negative, would end without a contact.
+
+        The body stays where it is. What `move` finds sample by sample is found here in fewer: where the nearest
+        obstacle is a distance away, all samples within that distance are free.
+
+        Args:
+            step_m: length of a step.
+            heading_deg: its direction.
+            most: steps to look ahead.
+        """
+        start_m, part_m = self.place_m, step_m / SAMPLES
+        sample, last = 0, most * SAMPLES
+        while sample < last:
+            sample = min(last, sample + max(1, int((self.gap_m() - SURE_M) / abs(part_m))))
+            self.stand_at(start_m + sample * part_m * _along(heading_deg))
+            if self.touches:
+                break
+        else:
+            sample = last + 1
+        self.stand_at(start_m)
+        return (sample - 1) // SAMPLES
 
     def _draw_back(self, start_m: np.ndarray, way_m: np.ndarray, free: float, touching: float) -> float:
         """Stand just before the contact between two shares of a way; returns the share travelled."""
@@ -112,6 +142,12 @@ class Body:
         share = max(free - STAND_OFF_M / float(np.linalg.norm(way_m)), 0.0)
         self.stand_at(start_m + share * way_m)
         return share
+
+
+def _along(heading_deg: float) -> np.ndarray:
+    """(2,) x and z of the point a metre away along a heading."""
+    heading = np.radians(heading_deg)
+    return np.array([np.sin(heading), np.cos(heading)])
 
 
 def _add_edges(spec: mujoco.MjSpec, room: CollisionRoom) -> None:

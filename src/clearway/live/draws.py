@@ -9,7 +9,7 @@ import numpy as np
 
 from clearway.live.conditions import Perturbations
 
-FURNITURE, OBSTACLE, MOVES, TURNS, HEIGHTS, PITCHES, LIGHT, PIXELS = range(8)
+FURNITURE, OBSTACLE, MOVES, TURNS, HEIGHTS, PITCHES, LIGHT, PIXELS, ENDS = range(9)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Episodes in the live room, walked side by side: picture, agent, body, step by step.
 
-Starts, targets and the chances of sampled actions are those of the evaluation on the grid (`evaluate.episodes`):
+Starts, targets and the chances of sampled actions are those of the evaluation on the grid (`evaluation.episodes`):
 without perturbations an episode is the same here and there up to its first contact.
 
 Axis letters: N episodes, B of them still walking.
@@ -20,11 +20,12 @@ from clearway.agents.agent import FEATURES, Agent, Observation, rows
 from clearway.agents.selection import Argmax
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds
-from clearway.live.arrangement import Arrangement, arranged, as_built, furniture_moved, with_obstacle_on_path
+from clearway.live.arrangement import Arrangement, arranged, as_built
 from clearway.live.body import SAMPLES, Body, Motion
 from clearway.live.conditions import Perturbations
-from clearway.live.draws import FURNITURE, OBSTACLE, Draws
-from clearway.live.live_room import LiveRoom
+from clearway.live.draws import Draws
+from clearway.live.live_room import LiveRoom, layout_of_episode
+from clearway.live.walker import Walker
 from clearway.reward import COLLISION_AWARE
 from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
 from clearway.rooms.render import Camera
@@ -153,54 +154,27 @@ class _Walker:
     def __init__(self, live: LiveRoom, start: int, target: int, draws: Draws) -> None:
         scene = live.scene
         self.start, self.draws = start, draws
-        self.layout = _layout(live, start, target, draws)
-        self.body = Body(arranged(live.room, self.layout))
-        self.body.stand_at(scene.locations_m[start])
-        self.heading_deg = float(scene.headings_deg[start])
-        self.target_m, self.target_heading_deg = scene.locations_m[target], float(scene.headings_deg[target])
-        self.cell_size_m, self.turn_deg = scene.cell_size_m, scene.turn_deg
+        self.layout = layout_of_episode(live, start, target, draws)
+        body = Body(arranged(live.room, self.layout), live.agent)
+        self.walker = Walker(body, live.pose_of(start), draws, step_m=scene.cell_size_m, turn_deg=scene.turn_deg)
+        self.target = live.pose_of(target)
         self.changed = self.layout != as_built(live.room)
         self.steps: list[Motion] = []
-        self.walk = [self._pose()]
-
-    def _pose(self) -> tuple[float, float, float]:
-        x_m, z_m = self.body.place_m.tolist()
-        return x_m, z_m, self.heading_deg
+        self.walk = [self.walker.pose]
 
     def act(self, action: Action) -> None:
         """Take a step."""
-        if action in (Action.MOVE_FORWARD, Action.MOVE_BACKWARD):
-            sign = 1 if action is Action.MOVE_FORWARD else -1
-            step = self.body.move(sign * (self.cell_size_m + self.draws.distance_error_m()), self.heading_deg)
-        else:
-            sign = 1 if action is Action.TURN_RIGHT else -1
-            turned_deg = self.heading_deg + sign * (self.turn_deg + self.draws.angle_error_deg())
-            self.heading_deg = turned_deg % 360
-            step = self.body.wait()
-        self.steps.append(step)
-        self.walk.append(self._pose())
+        self.steps.append(self.walker.act(action))
+        self.walk.append(self.walker.pose)
 
     @property
     def reached(self) -> bool:
         """The body is at the target and looks its way."""
-        off_deg = abs((self.heading_deg - self.target_heading_deg + 180) % 360 - 180)
-        return bool(np.linalg.norm(self.body.place_m - self.target_m) <= SUCCESS_M and off_deg <= SUCCESS_DEG)
+        return self.walker.is_at(self.target, SUCCESS_M, SUCCESS_DEG)
 
     def shot_arguments(self) -> tuple[tuple[float, float, float], float, float]:
         """Pose, camera height and pitch of the next picture."""
-        return self._pose(), CAMERA_HEIGHT_M + self.draws.height_error_m(), self.draws.pitch_error_deg()
-
-
-def _layout(live: LiveRoom, start: int, target: int, draws: Draws) -> Arrangement:
-    """The layout of an episode."""
-    layout, wanted = as_built(live.room), draws.perturbations
-    if wanted.move_furniture:
-        rng = draws.generator(FURNITURE)
-        layout = furniture_moved(live.room, live.scene, start, target, wanted.move_furniture, rng)
-    if wanted.new_obstacle:
-        rng = draws.generator(OBSTACLE)
-        layout = with_obstacle_on_path(live.room, live.scene, layout, start, target, rng)
-    return layout
+        return self.walker.pose, CAMERA_HEIGHT_M + self.draws.height_error_m(), self.draws.pitch_error_deg()
 
 
 def _check_sight(agent: Agent) -> None:

@@ -130,7 +130,9 @@ def build_floor_plan(
         locations_m=locations_m,
         headings_deg=headings_deg,
         graph=graph,
-        made_by=Provenance(floor_plans.SOURCE, seed=seed, versions=shaping_versions()),
+        made_by=Provenance(
+            floor_plans.SOURCE, seed=seed, versions=shaping_versions(), notes=floor_plans.plan_notes(plan)
+        ),
         cell_size_m=plan.cell_size_m,
         top_view=replace(
             top_view,

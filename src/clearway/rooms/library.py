@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -101,7 +102,7 @@ def plan_path(
         "cell_size_m": plan.cell_size_m,
         "walls": plan.walls.tolist(),
         "doors": plan.doors.tolist(),
-        "areas": [(area.use, area.low, area.high) for area in plan.areas],
+        "areas": [asdict(area) for area in plan.areas],
     }
     asked = {"plan": plan.name, "seed": seed, "sensors": sorted(sensors), "size_px": size_px}
     return _path_of(plan.name, {**asked, **shape})

@@ -19,3 +19,5 @@ ACTION_NAMES = ("move forward", "turn right", "turn left", "move backward")
 BLOCKED = -1  # in a graph: the move is blocked and the agent stays where it is
 MOVES = (Action.MOVE_FORWARD, Action.MOVE_BACKWARD)
 TURNS = (Action.TURN_RIGHT, Action.TURN_LEFT)
+STOP = ACTION_COUNT
+"""A fifth action, of environments that are asked for it: it ends the episode. No graph has it."""

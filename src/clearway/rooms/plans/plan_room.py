@@ -6,15 +6,17 @@ import zlib
 
 import numpy as np
 
+from clearway.rooms.furniture import openings
 from clearway.rooms.light import bake
 from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
 from clearway.rooms.plans.buildable import check_can_be_rendered
 from clearway.rooms.plans.decoration import decorate
 from clearway.rooms.plans.finish import finish_of
-from clearway.rooms.plans.layout import GAP, Layout, lay_out
+from clearway.rooms.plans.layout import Layout, lay_out
 from clearway.rooms.plans.pieces import furnish
+from clearway.rooms.plans.walls import DOOR_HEIGHT_M, GAP, LINING_M
 from clearway.rooms.room import Room
-from clearway.rooms.shell import add_surfaces, add_walls
+from clearway.rooms.shell import add_faces, add_surfaces, add_walls
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import neighbour_pairs
 
@@ -24,13 +26,14 @@ CLEARANCE = 0.02  # cells
 LAYOUT_STREAM = 3  # of random numbers, beside the room's own
 
 
-def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True) -> tuple[Room, Layout]:
+def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True, loose: bool = False) -> tuple[Room, Layout]:
     """The room of a plan, and where its parts stand. Its obstacles leave the plan's cells and edges open, no others.
 
     Args:
         plan: the plan. Its name and the seed choose furniture, colours and textures.
         seed: 0 or more.
         looks: bake the light, so that `room.spec.compile()` is ready to render (seconds); False gives obstacles only.
+        loose: every piece of furniture hangs on a body of its own, so that it can be moved (`pieces`).
 
     Raises:
         SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
@@ -42,14 +45,24 @@ def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True) -> tu
     columns = layout.walls + layout.partitions
     add_walls(room, columns)
     if looks:
-        add_surfaces(room, finish_of(room, layout), columns)
+        finish = finish_of(room, layout)
+        add_surfaces(room, finish, layout.partitions if layout.has_walls else columns)
+        if layout.has_walls:
+            add_faces(room, layout.faces, layout.cornices, layout.walls, finish)
+    for doorway in layout.doorways:
+        openings.doorway(room, doorway.at, doorway.width_m, doorway.depth_m, DOOR_HEIGHT_M, LINING_M)
     tops_m = furnish(room, layout.pieces, first_m)
     decorate(room, layout, tops_m)
     cells, edges = open_plan(room, layout)
     assert _same(cells, plan.cells) and _same(edges, plan.cells[plan.edges]), f"the room of {plan.name} is another plan"
     if looks:
-        bake(room, count_hidden=False)
+        bake(room, count_hidden=False, loose=loose)
     return room, layout
+
+
+def agent_for(cell_size_m: float) -> AgentShape:
+    """The body that fits through a plan's ways of one cell, and moves from cell to cell."""
+    return AgentShape(radius_m=AGENT_RADIUS * cell_size_m, step_m=cell_size_m, clearance_m=CLEARANCE * cell_size_m)
 
 
 def open_plan(room: Room, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
@@ -59,8 +72,7 @@ def open_plan(room: Room, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
         cells: (C, 2) int64, x and z in the plan's numbers; by x, then z.
         edges: (E, 2, 2) int64, x and z of the two cells of each free move, the lower cell first.
     """
-    size_m = layout.cell_size_m
-    agent = AgentShape(radius_m=AGENT_RADIUS * size_m, step_m=size_m, clearance_m=CLEARANCE * size_m)
+    agent = agent_for(layout.cell_size_m)
     obstacles = Obstacles(collision_model(room, agent), agent)
     places = np.argwhere(np.ones(layout.free.shape, bool))
     middles_m = layout.middles_m(places)

@@ -1,0 +1,369 @@
+"""`LiveImageGoalVectorEnv`: N agents in one room off the grid, whose pictures are taken together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from clearway.envs.arguments import (
+    NO_LIMIT,
+    RESET_MASK,
+    Seeds,
+    check_numbers,
+    checked_actions,
+    chosen_autoreset,
+    environments_to_reset,
+    seed_words,
+)
+from clearway.errors import EnvError
+from clearway.live_envs.arguments import (
+    CLEARANCE,
+    LIVE_RENDER_MODES,
+    PerturbationSource,
+    RoomSource,
+    checked_drives,
+    checked_ends,
+    checked_number,
+    checked_perturbations,
+    checked_sensors,
+    opened_room,
+)
+from clearway.live_envs.episode import End, Episodes, LiveEpisode, Rules
+from clearway.live_envs.eyes import Eyes
+from clearway.reward import Reward, reward_named
+from clearway.rooms.camera import first_person_shot
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.scenes.sensors import RGB, Sensor
+
+Observation = dict[str, np.ndarray]
+Info = dict[str, Any]
+
+SUCCESS_M, SUCCESS_DEG = 0.25, 30.0
+HEIGHT_PX, WIDTH_PX = 96, 128
+FARTHEST_M, ONCE_ROUND_DEG = 10.0, 360.0  # of a move and of a turn
+EPISODE_OPTIONS = ("target", "start")
+
+
+class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
+    """N agents side by side in one room, each walking to the pose where its target picture was taken.
+
+    The batched `clearway.live_envs.single.LiveImageGoalEnv`, step for step the same; its docstring describes actions,
+    observations, rewards, starting states and episode ends. Moves are made one by one, and all pictures are taken
+    together, by `workers` processes that share the room.
+
+    ## Action Space
+    `MultiDiscrete([4] * N)`, with `stop=True` `MultiDiscrete([5] * N)`, with `continuous=True` `Box(-1, 1, (N, 2))`.
+
+    ## Observation Space
+    That of the single environment with a leading axis N.
+
+    ## Rewards
+    (N,) float64. In the mode NEXT_STEP the step that resets an environment earns 0.
+
+    ## Starting State
+    Environment i has a random stream of its own: `reset(seed=s)` seeds it with s + i, a sequence of seeds with its own
+    (None: its stream goes on), and it then lives through the same episodes in a batch of any size.
+
+    ## Episode End
+    All of Gymnasium's autoreset modes, as of `clearway.envs.vector.ImageGoalVectorEnv`.
+
+    ## Information
+    Arrays (N,) of what the single environment tells, each with a bool mask `_key`.
+
+    ## Arguments
+    Those of `LiveImageGoalEnv`; `num_envs`, `autoreset_mode`, and `workers`, renderer processes for each camera (None:
+    one a core). `reset` takes `options={"target": ..., "start": ..., "reset_mask": mask}`, all optional; a target or
+    start is one for all environments or one for each.
+
+    ## Version History
+    * v0: first version.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 (Gymnasium's protocol)
+        "render_modes": list(LIVE_RENDER_MODES),
+        "render_fps": 4,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        room: RoomSource,
+        *,
+        room_seed: int = 0,
+        targets: Sequence[int] | None = None,
+        reward: str | Reward = "collision-aware",
+        sensors: Sequence[str] = (RGB,),
+        height_px: int = HEIGHT_PX,
+        width_px: int = WIDTH_PX,
+        continuous: bool = False,
+        stop: bool = False,
+        step_m: float | None = None,
+        turn_deg: float | None = None,
+        success_m: float = SUCCESS_M,
+        success_deg: float = SUCCESS_DEG,
+        perturbations: PerturbationSource = None,
+        history_length: int | None = None,
+        max_episode_steps: int | None = None,
+        num_envs: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        workers: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        check_numbers(num_envs, 1 if history_length is None else history_length, max_episode_steps, None)
+        self.autoreset_mode = chosen_autoreset(autoreset_mode)
+        self._sensors = checked_sensors(sensors, height_px, width_px)
+        _check_switches(continuous, stop, render_mode, self._sensors)
+        if step_m is not None:
+            checked_number("step_m", step_m, FARTHEST_M)
+        if turn_deg is not None:
+            checked_number("turn_deg", turn_deg, ONCE_ROUND_DEG)
+        earned, perturbed = reward_named(reward), checked_perturbations(perturbations)
+        within = checked_number("success_m", success_m, FARTHEST_M), checked_number("success_deg", success_deg, 180.0)
+
+        live = opened_room(room, room_seed)
+        rules = Rules(
+            earned,
+            step_m=float(live.scene.cell_size_m if step_m is None else step_m),
+            turn_deg=float(live.scene.turn_deg if turn_deg is None else turn_deg),
+            success_m=within[0],
+            success_deg=within[1],
+            stop=stop,
+            perturbations=perturbed,
+        )
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
+        self.live, self._continuous, self._stop = live, continuous, stop
+        self._limit = None if max_episode_steps == NO_LIMIT else max_episode_steps
+        self._episodes = Episodes(live, rules, _checked_targets(targets))
+        cameras = [sensor for sensor in self._sensors if sensor.name != CLEARANCE]
+        self._eyes = Eyes(live.model, cameras, workers)
+
+        self._history = history_length or 1
+        leading = () if history_length is None else (history_length,)
+        self.single_observation_space = _observation_space(self._sensors, leading)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        actions = ACTION_COUNT + stop
+        self.single_action_space = spaces.Box(-1, 1, (2,), np.float32) if continuous else spaces.Discrete(actions)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+        self._streams = [np.random.default_rng() for _ in range(num_envs)]
+        self._running: list[LiveEpisode | None] = [None] * num_envs
+        self._elapsed = np.zeros(num_envs, np.int64)
+        self._ended = np.zeros(num_envs, bool)
+        # (N, K, ...) of the poses and (N, ...) of the targets, by the observation's keys
+        self._poses = {_keys(s)[0]: np.zeros((num_envs, self._history, *s.shape), s.dtype) for s in self._sensors}
+        self._goals = {_keys(s)[1]: np.zeros((num_envs, *s.shape), s.dtype) for s in cameras}
+        self._stacked = history_length is not None
+
+    @property
+    def scene_names(self) -> tuple[str, ...]:
+        """Name of the one room, as `info["scene"]` counts."""
+        return (self.live.scene.name,)
+
+    def reset(self, *, seed: Seeds = None, options: dict[str, Any] | None = None) -> tuple[Observation, Info]:
+        """Begin new episodes: everywhere, or in the environments of `options["reset_mask"]`.
+
+        Raises:
+            EnvError: a seed or an option that does not fit.
+            ResetNeeded: the first reset leaves environments out.
+        """
+        options = options or {}
+        for name in options:
+            if name not in (*EPISODE_OPTIONS, RESET_MASK):
+                known = ", ".join((*EPISODE_OPTIONS, RESET_MASK))
+                raise EnvError(f"options[{name!r}] is unknown. Known options: {known}")
+        index = environments_to_reset(options, self.num_envs)
+        if None in self._running and len(index) < self.num_envs:
+            raise ResetNeeded("the first reset has to begin all environments: call reset() without a reset_mask")
+        if seed is not None:
+            words, given = seed_words(seed, self.num_envs)
+            super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+            for env in index[given[index]].tolist():
+                self._streams[env] = np.random.default_rng(int(words[env]) % 2**64)
+        asked = {
+            name: checked_ends(name, options[name], self.num_envs)
+            for name in EPISODE_OPTIONS
+            if options.get(name) is not None
+        }
+        for env in index.tolist():
+            self._begin(env, **{name: ends[env] for name, ends in asked.items()})
+        begun = np.zeros(self.num_envs, bool)
+        begun[index] = True
+        self._look(begun, begun)
+        nothing = np.zeros(self.num_envs, bool)
+        return self._observation(), self._info(nothing, nothing, begun)
+
+    def step(self, actions: np.ndarray) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
+        """Move every agent by its action: (N,) integers, or (N, 2) speeds and turn rates.
+
+        Raises:
+            EnvError: the actions are of another shape or type, or out of range.
+            ResetNeeded: before the first reset, and in the mode DISABLED where an episode is over.
+        """
+        if self._continuous:
+            chosen: list[Any] = list(checked_drives(actions, self.num_envs))
+        else:
+            chosen = checked_actions(actions, self.num_envs, ACTION_COUNT + self._stop).tolist()
+        self._check_ready()
+        resting = self._ended.copy()  # all False but in the mode NEXT_STEP: these reset now, actions are ignored
+        reward = np.zeros(self.num_envs)
+        terminated, contact, success = (np.zeros(self.num_envs, bool) for _ in range(3))
+        for env, action in enumerate(chosen):
+            if resting[env]:
+                self._begin(env)
+                continue
+            done = self._episode(env).step(action)
+            self._elapsed[env] += 1
+            reward[env], terminated[env] = done.reward, done.ended
+            contact[env], success[env] = done.contact, done.success
+        limit_met = False if self._limit is None else self._elapsed >= self._limit
+        truncated = np.asarray(limit_met & ~terminated & ~resting)
+        everywhere = np.ones(self.num_envs, bool)
+        self._look(everywhere, resting)
+        ended, info = terminated | truncated, Info()
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+            info = self._final(contact, success, ended)
+            for env in np.flatnonzero(ended).tolist():
+                self._begin(env)
+            self._look(ended, ended)
+            contact, success = contact & ~ended, success & ~ended
+        elif self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            self._ended = ended
+        info |= self._info(contact, success, everywhere)
+        return self._observation(), reward, terminated, truncated, info
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """What each agent sees, beside its target: one picture (height, 2 width, 3) uint8 an environment."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() without a render_mode. Give one when the environment is made")
+            return None
+        if None in self._running:
+            raise ResetNeeded("render() before the first reset: call reset()")
+        poses, goals = (seen[key] for seen, key in zip((self._poses, self._goals), _keys(RGB), strict=True))
+        return tuple(np.concatenate([seen[-1], goal], axis=1) for seen, goal in zip(poses, goals, strict=True))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the renderer processes."""
+        self._eyes.close()
+
+    def _episode(self, env: int) -> LiveEpisode:
+        episode = self._running[env]
+        assert episode is not None
+        return episode
+
+    def _check_ready(self) -> None:
+        if None in self._running:
+            raise ResetNeeded("step() before the first reset: call reset()")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            over = np.flatnonzero(self._ended).tolist()
+            remedy = "call reset(), in a vector environment with options={'reset_mask': mask}"
+            raise ResetNeeded(f"the episodes of environments {over} are over: {remedy}")
+
+    def _begin(self, env: int, target: End | None = None, start: End | None = None) -> None:
+        seed = int(self._streams[env].integers(2**63))
+        self._running[env] = self._episodes.begin(seed, target=target, start=start, last=self._running[env])
+        self._elapsed[env], self._ended[env] = 0, False
+
+    def _look(self, where: np.ndarray, begun: np.ndarray) -> None:
+        """Let the agents in where (N,) bool see; those in begun (N,), among them, see their target too."""
+        looking, anew = np.flatnonzero(where).tolist(), np.flatnonzero(begun).tolist()
+        moving = self._episodes.moving
+        shots = [self._episode(env).shot(moving) for env in looking]
+        unmoved_m = self._episodes.as_built.bodies_m if moving else ()
+        shots += [first_person_shot(*self._episode(env).target, moved_m=unmoved_m) for env in anew]
+        taken = self._eyes(shots)
+        for sensor in self._sensors:
+            pose_key, goal_key = _keys(sensor.name)
+            poses = self._poses[pose_key]
+            if sensor.name == CLEARANCE:
+                seen = np.array([[self._episode(env).clearance_m] for env in looking], sensor.dtype)
+            else:
+                seen = taken[sensor.name][: len(looking)]
+                if anew:
+                    self._goals[goal_key][anew] = taken[sensor.name][len(looking) :]
+            for env, now in zip(looking, seen, strict=True):
+                now = self._episode(env).draws.seen(now) if sensor.name == RGB else now
+                poses[env, :-1] = poses[env, 1:]
+                poses[env, slice(None) if begun[env] else -1] = now
+
+    def _observation(self) -> Observation:
+        poses = self._poses if self._stacked else {key: seen[:, -1] for key, seen in self._poses.items()}
+        return {key: seen.copy() for key, seen in sorted((poses | self._goals).items())}
+
+    def _info(self, contact: np.ndarray, success: np.ndarray, where: np.ndarray) -> Info:
+        """The info of the environments in where (N,) bool; zeros elsewhere, as Gymnasium fills them."""
+        episodes = [self._episode(env) for env in range(self.num_envs)]
+        origin = np.array([*self.live.origin_m, 0.0])
+        pose = np.array([episode.walker.pose for episode in episodes]) + origin
+        target = np.array([episode.target for episode in episodes]) + origin
+        values = {
+            "collision": contact,
+            "cost": contact.astype(np.float64),
+            "success": success,
+            "zone": np.array([int(episode.zone) for episode in episodes]),
+            "clearance_m": np.array([episode.clearance_m for episode in episodes]),
+            "distance_m": np.array([episode.distance_m for episode in episodes]),
+            "scene": np.zeros(self.num_envs, np.int64),
+        }
+        for name, poses in (("", pose), ("target_", target)):
+            for part, values_of_part in zip(("x_m", "z_m", "heading_deg"), poses.T, strict=True):
+                values[f"{name}{part}"] = values_of_part
+        info: Info = {}
+        for key, value in values.items():
+            info[key] = np.where(where, value, np.zeros_like(value))
+            info[f"_{key}"] = where.copy()
+        return info
+
+    def _final(self, contact: np.ndarray, success: np.ndarray, ended: np.ndarray) -> Info:
+        """What the episodes ended with, in the form of Gymnasium's SyncVectorEnv."""
+        last = self._observation()
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for env in np.flatnonzero(ended):  # an array of objects can only be filled one by one
+            final_obs[env] = {key: value[env] for key, value in last.items()}
+        final_info = self._info(contact, success, ended)
+        return {"final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended}
+
+
+def _keys(sensor: Sensor | str) -> tuple[str, str]:
+    """Keys of the poses' observations by a sensor and of the target's, as in the environments on the grid."""
+    name = sensor if isinstance(sensor, str) else sensor.name
+    return ("observation", "target") if name == RGB else (name, f"target_{name}")
+
+
+def _observation_space(sensors: Sequence[Sensor], leading: tuple[int, ...]) -> spaces.Dict:
+    boxes: dict[str, spaces.Space] = {}
+    for sensor in sensors:
+        dtype = np.dtype(sensor.dtype).type
+        poses, target = _keys(sensor)
+        boxes[poses] = spaces.Box(sensor.low, sensor.high, (*leading, *sensor.shape), dtype)
+        if sensor.name != CLEARANCE:
+            boxes[target] = spaces.Box(sensor.low, sensor.high, sensor.shape, dtype)
+    return spaces.Dict(boxes)
+
+
+def _check_switches(continuous: bool, stop: bool, render_mode: str | None, sensors: Sequence[Sensor]) -> None:
+    for name, value in (("continuous", continuous), ("stop", stop)):
+        if not isinstance(value, (bool, np.bool_)):
+            raise EnvError(f"{name}={value!r:.40}: expected True or False")
+    if continuous and stop:
+        raise EnvError("stop=True is a fifth discrete action. Leave out stop or continuous")
+    if render_mode is not None and render_mode not in LIVE_RENDER_MODES:
+        raise EnvError(f"render_mode={render_mode!r:.40} is unknown. Use {LIVE_RENDER_MODES[0]!r}, or None")
+    if render_mode is not None and RGB not in [sensor.name for sensor in sensors]:
+        raise EnvError(f"render_mode={render_mode!r} shows colour pictures. Name {RGB!r} among the sensors")
+
+
+def _checked_targets(targets: Sequence[int] | None) -> np.ndarray | None:
+    if targets is None:
+        return None
+    found = np.asarray(targets)
+    if found.ndim != 1 or not len(found) or not np.issubdtype(found.dtype, np.integer):
+        raise EnvError(f"targets={targets!r:.80}: expected state ids, such as [26, 37]")
+    return found.astype(np.int64)
