@@ -3,10 +3,10 @@ import pytest
 
 import clearway as door
 from clearway.generation import files
-from clearway.generation.files import SOURCE, notes_of, scene_path
+from clearway.generation.files import notes_of, scene_path
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
-from clearway.scenes.floor_plans import floor_plan_scene
+from clearway.scenes.floor_plans import GENERATED, floor_plan_scene
 from clearway.scenes.scene import Provenance
 from clearway.scenes.thor_v1 import write_scene
 
@@ -61,7 +61,7 @@ def test_what_is_there_is_kept_and_counted(clearway, tmp_path, monkeypatch):
 def test_a_generated_file_is_inspected_trained_and_evaluated(clearway, tmp_path, small):
     request = Request("flat", "train", 0, 1)
     scene = floor_plan_scene(generated_plan(request), 24)
-    object.__setattr__(scene, "made_by", Provenance(SOURCE, seed=0, notes=notes_of(request)))
+    object.__setattr__(scene, "made_by", Provenance(GENERATED, seed=0, notes=notes_of(request)))
     object.__setattr__(scene, "observations", np.zeros((scene.state_count, 24, 32, 3), np.uint8))
     path = scene_path(request, tmp_path)
     write_scene(scene, path)

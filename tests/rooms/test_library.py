@@ -201,9 +201,6 @@ def test_another_plan_has_another_file(cache):
     plan = FloorPlan("hall", np.array([[0, 0], [1, 0]]))
     others = (
         replace(plan, name="den"),
-        replace(plan, walls=np.array([[2, 0]])),
-        replace(plan, doors=np.array([[1, 0]])),
-        replace(plan, areas=(Area("kitchen", (0, 0), (1, 0)),)),
         replace(plan, cells=np.array([[0, 0], [0, 1]])),
         replace(plan, cells=np.array([[1, 0], [0, 0]])),
         replace(plan, cell_size_m=0.5),

@@ -11,16 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from clearway.errors import ClearwayError, RenderError, SceneError
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import GENERATOR_VERSION, SIZE_PX, Request
-from clearway.rooms.build import build_floor_plan, check_mujoco, shaping_versions
+from clearway.rooms.build import build_floor_plan, check_mujoco
 from clearway.rooms.library import cached_plan_scene
 from clearway.rooms.render import core_count
 from clearway.rooms.render_worker import renderer_environment
-from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.floor_plans import GENERATED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.spread.workers import Work, workers_for
@@ -28,7 +26,6 @@ from clearway.spread.workers import Work, workers_for
 if TYPE_CHECKING:
     from clearway.perception.encoder import Encoder
 
-SOURCE = "generated"  # stands in a scene's `made_by`
 SIDES_PX = (16, 1024)  # least and most of a picture's height and width
 NO_ENCODER = "none"
 CALIBRATION_ROOMS = 4  # the first of "train", seed 0
@@ -116,7 +113,7 @@ def generate_scenes(
 def check_kept(scene: Scene, path: Path, request: Request, seen: Seen) -> None:
     """Check that a file that is there is what is asked for. Raises SceneError, which says what differs."""
     wanted, found = notes_of(request), scene.made_by.notes
-    ours = scene.made_by.source == SOURCE
+    ours = scene.made_by.source == GENERATED
     if not ours or found.get("generator") != GENERATOR_VERSION:
         made = f"by version {found.get('generator')} of the generator" if ours else f"from {scene.made_by.source}"
         raise SceneError(path, f"was made {made}, this clearway has version {GENERATOR_VERSION}", OTHER_FOLDER)
@@ -148,29 +145,9 @@ def request_of(made_by: Provenance) -> Request | None:
     """The request whose plan a scene is; None where it is no generated one."""
     notes, seed = made_by.notes, made_by.seed
     kind, split, number = notes.get("kind"), notes.get("split"), notes.get("number")
-    if made_by.source != SOURCE or seed is None or not isinstance(number, int):
+    if made_by.source != GENERATED or seed is None or not isinstance(number, int):
         return None
     return Request(kind, split, seed, number)  # type: ignore[arg-type]  # which it checks
-
-
-def plan_of(scene: Scene) -> FloorPlan | None:
-    """The plan of a generated scene, walls, doors and areas included, drawn again; None where it is no generated one.
-
-    Raises:
-        SceneError: another version of the generator made it, or the plan is another one.
-    """
-    request = request_of(scene.made_by)
-    if request is None:
-        return None
-    version = scene.made_by.notes.get("generator")
-    if version != GENERATOR_VERSION:
-        problem = f"was made by version {version} of the generator, this clearway has version {GENERATOR_VERSION}"
-        raise SceneError(scene.name, problem, "Generate it again")
-    plan = generated_plan(request)
-    cells_m = plan.cells * plan.cell_size_m
-    if scene.cell_count != len(cells_m) or not np.array_equal(np.unique(scene.locations_m, axis=0), cells_m):
-        raise SceneError(scene.name, f"has other cells than {request.name}", "Generate it again")
-    return replace(plan, name=scene.name)
 
 
 def notes_of(request: Request) -> dict[str, object]:
@@ -182,8 +159,8 @@ def build_request(request: Request, seen: Seen, *, here: bool = False, workers: 
     """The furnished, rendered room or flat of a request, without features; `here` as of `build_floor_plan`."""
     plan = generated_plan(request)
     scene = build_floor_plan(plan, request.seed, sensors=seen.sensors, size_px=seen.size_px, here=here, workers=workers)
-    made_by = Provenance(SOURCE, seed=request.seed, versions=shaping_versions(), notes=notes_of(request))
-    return replace(scene, made_by=made_by)
+    notes = {**scene.made_by.notes, **notes_of(request)}
+    return replace(scene, made_by=replace(scene.made_by, source=GENERATED, notes=notes))
 
 
 def _kept(path: Path) -> Scene | None:

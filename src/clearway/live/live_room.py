@@ -52,7 +52,7 @@ def live_room(scene: Scene) -> LiveRoom:
         SceneError: the scene is none of our rooms or floor plans, or this version builds the room differently.
     """
     made = scene.made_by
-    if made.source == floor_plans.SOURCE and made.seed is not None:
+    if made.source in floor_plans.SOURCES and made.seed is not None:
         return _live_plan(scene, made.seed)
     if made.source != "room" or made.room is None or made.seed is None:
         raise SceneError(

@@ -25,6 +25,8 @@ from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES
 from clearway.version import __version__
 
 SOURCE = "floor_plan"  # stands in a scene's `made_by`
+GENERATED = "generated"  # the same of a plan that was drawn (`clearway.generation`)
+SOURCES = (SOURCE, GENERATED)  # of scenes that `plan_of` knows
 PLAN_NOTE = "plan"  # in its notes: walls, doors and areas
 REBUILD = "Make the scene of its plan again"
 CELL_SIZE_M = 0.25  # of the published AI2-THOR plans
