@@ -1,5 +1,6 @@
 """The site builds without a broken link, and every command and program of README and tutorial does what it says."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,17 @@ def test_blocks_are_found() -> None:
     blocks = code_blocks(ROOT / "docs/tutorial.md")
     assert blocks[0] == Block("sh", "clearway demo --out demo\n")
     assert {block.language for block in blocks} == {"sh", "python"}
+
+
+@pytest.mark.parametrize(
+    "page", [*sorted((ROOT / "docs").glob("*.md")), ROOT / "README.md"], ids=lambda page: page.stem
+)
+def test_the_sources_that_a_page_names_are_there(page: Path) -> None:
+    if page.stem == "log":  # of its own time
+        return
+    named = re.findall(r"(?<![\w./-])((?:[a-z_0-9]+/)+[a-z_0-9]+\.py)\b", page.read_text())
+    places = ROOT, ROOT / "src", ROOT / "src/clearway"
+    assert [name for name in named if not any((place / name).exists() for place in places)] == []
 
 
 def test_a_change_that_is_of_no_use_is_noticed() -> None:

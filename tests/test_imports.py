@@ -28,6 +28,7 @@ ORDER = (
     {"rooms"},
     {"importers"},
     {"perception"},
+    {"generation"},
     {"zones"},
     {"clearance"},
     {"reward"},

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from clearway.agents.agent import Agent, Decisions
     from clearway.api.environments import make_env
     from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
+    from clearway.api.generation import generate
     from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
     from clearway.api.training import TrainResult, train
     from clearway.deploy.navigator import Navigator
@@ -31,6 +32,7 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "load_scene": "clearway.api.scenes",
     "load_scenes": "clearway.api.scenes",
     "build_room": "clearway.api.scenes",
+    "generate": "clearway.api.generation",
     "encode_scenes": "clearway.api.scenes",
     "Reward": "clearway.reward",
     "make_env": "clearway.api.environments",
@@ -74,6 +76,7 @@ __all__ = [
     "build_room",
     "encode_scenes",
     "evaluate",
+    "generate",
     "load_agent",
     "load_scene",
     "load_scenes",

@@ -17,7 +17,7 @@ ExperimentName = Literal["table1", "fig3", "fig4", "table2", "table3", "fig5", "
 BudgetName = Literal["smoke", "paper"]
 """See `clearway.experiments.budget`."""
 
-LearnerName = Literal["published", "published-a3c", "default"]
+LearnerName = Literal["paper", "paper-a3c", "default"]
 """See `clearway.experiments.setting`."""
 
 PresetName = Literal["default", "paper", "paper-a3c"]
@@ -28,3 +28,9 @@ FeatureStore = Literal["memory", "float16", "mapped"]
 
 MatmulPrecision = Literal["highest", "medium"]
 """See `clearway.model.precision`."""
+
+PlanKind = Literal["room", "flat"]
+"""See `clearway.generation`."""
+
+SplitName = Literal["train", "validation", "test"]
+"""See `clearway.generation.split`."""

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def picture_progress(label: str, total: int, wanted: bool) -> Iterator[Callable[[int], None]]:
-    """A progress bar on standard error; yields what to call with the number of pictures done so far.
+def picture_progress(label: str, total: int, wanted: bool, unit: str = "pictures") -> Iterator[Callable[[int], None]]:
+    """A progress bar of pictures, or of a unit; yields what to call with the number of them done so far.
 
-    Silent if standard error is not a terminal.
+    Silent if standard error is not a terminal. `unit` is what they are.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -20,7 +20,7 @@ def picture_progress(label: str, total: int, wanted: bool) -> Iterator[Callable[
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("pictures,"),
+        TextColumn(f"{unit},"),
     )
     shown = wanted and console.is_terminal
     with Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, disable=not shown) as bar:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from clearway.agents.named import AGENTS
 from clearway.errors import AgentError, ArgumentError
 from clearway.plugins import BUILT_IN
 from clearway.scenes.actions import Action
+from clearway.world.world import make_world
 from helpers.made import corridor_scene, grid_scene
 
 SHORT = {"episodes": 2, "step_limit": 30}
@@ -65,8 +67,11 @@ def names(result: clearway.EvaluateResult) -> list[str]:
 def test_an_agent_of_ones_own_is_evaluated_on_scenes_and_targets(scene) -> None:
     result = clearway.evaluate(Turner, scene, targets=[5, 22], **SHORT)
     assert names(result) == ["Turner", "random", "shortest path"]
+    assert type(result.agent) is Turner and result.agent.shapes == {(10, 10, 3)}
     assert result.figures["collisions"] == 0 and result.evaluations[0].average.target_count == 2
-    assert isinstance(result.agent, Turner) and result.agent.shapes == {(10, 10, 3)}
+    agent = Turner(None)
+    assert clearway.evaluate(agent, scene, targets=[5, 22], **SHORT).agent is agent
+    assert agent.shapes == {(10, 10, 3)}
 
 
 def test_an_agent_itself_will_do(scene) -> None:
@@ -116,6 +121,31 @@ def test_an_agent_that_sees_what_is_not_there_is_named(scene) -> None:
         clearway.evaluate(Seven, scene, **SHORT)
 
 
+def test_what_an_agent_raises_and_a_state_without_rows_are_told_in_one_line(scene) -> None:
+    class Failing(Turner):
+        def act(self, observation, state):
+            raise KeyError("a map")
+
+    class Forgetful(Turner):
+        def act(self, observation, state):
+            return super().act(observation, state)[0], {"turns": np.zeros(3, np.int64), "name": "x"}
+
+    with pytest.raises(AgentError, match=r"Failing: agent: failed .KeyError: 'a map'."):
+        clearway.evaluate(Failing, scene, **SHORT)
+    with pytest.raises(
+        AgentError, match=r"Forgetful: the agent's state has 'turns' of shape .3,., expected .10, \.\.\.."
+    ):
+        clearway.evaluate(Forgetful, scene, **SHORT)
+
+
+def test_an_agent_made_for_other_targets_is_refused_in_one_line(scene) -> None:
+    other, small = make_world([scene], {"grid": [5]}), make_world([corridor_scene(2)], {"corridor": [0]})
+    for world in (other, small):
+        with pytest.raises(AgentError, match="PoseAgent: the agent was made for a world without target 22") as caught:
+            clearway.evaluate(shortest_paths(world), scene, targets=[22], **SHORT)
+        assert "\n" not in str(caught.value)
+
+
 def test_wrong_arguments_are_refused(scene) -> None:
     with pytest.raises(ArgumentError, match="the agent has no run that names them"):
         clearway.evaluate(Turner)
@@ -149,3 +179,32 @@ def test_the_scene_of_an_exported_agent_is_asked_for(scene, tmp_path: Path) -> N
         assert own.protocol == theirs.protocol
     with pytest.raises(ArgumentError, match="the agent is for scene grid, given corridor"):
         clearway.evaluate(tmp_path / "agent.onnx", corridor_scene(5, feature_count=8), **SHORT)
+    with pytest.raises(ArgumentError, match="the agent is for scene grid, given corridor"):
+        clearway.evaluate(tmp_path / "agent.onnx", corridor_scene(5, feature_count=8), targets=[3], **SHORT)
+
+
+def test_features_that_an_exported_agent_does_not_see_are_refused(scene, tmp_path: Path) -> None:
+    """Else it would walk by numbers that mean something else, and nobody would be told."""
+    from clearway.deploy.export import export_onnx
+    from clearway.deploy.from_run import load_run_in_scene
+    from clearway.scenes.thor_v1 import write_scene
+
+    write_scene(scene, tmp_path / "grid.h5")
+    clearway.train(tmp_path / "grid.h5", targets=[5], frames=80, envs=10, rollout_steps=8, width=16, out=tmp_path / "r")
+    export_onnx(load_run_in_scene(tmp_path / "r"), tmp_path / "agent.onnx", with_encoder=False)
+    seen = clearway.load_scene(tmp_path / "grid.h5")
+    assert seen.encoder is not None
+    others = {
+        "has 5 features": replace(seen, features=np.asarray(seen.features)[:, :5]),
+        r"of made-up \(another\)": replace(seen, encoder=replace(seen.encoder, identity="another")),
+    }
+    for words, other in others.items():
+        with pytest.raises(ArgumentError, match=f"{words}.*, the agent sees 8 of made-up .*Encode the scene") as caught:
+            clearway.evaluate(tmp_path / "agent.onnx", other, **SHORT)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_run_folder_is_a_run_whatever_it_is_called(scene, tmp_path: Path) -> None:
+    folder = tmp_path / "run.onnx"
+    run = clearway.train(scene, targets=[5], frames=80, envs=10, rollout_steps=8, width=16, out=folder)
+    assert names(clearway.evaluate(folder, scene, **SHORT)) == names(clearway.evaluate(run, **SHORT))

@@ -72,6 +72,22 @@ def test_some_plans_with_another_size_and_seed(clearway, plans, tmp_path):
     assert (found["feature_count"], found["seed"], found["mean_degree"]) == (8, 4, pytest.approx(4 / 3))
 
 
+def test_parts_that_cannot_be_reached_are_reported(clearway, tmp_path):
+    (tmp_path / "flat.txt").write_text("WWWWW\nW..W.\nWWDWW\nW...W\n")
+    answer = clearway("scenes", "import", "floor-plan", tmp_path / "flat.txt", "--features", 8, "--out", tmp_path)
+    assert answer.code == 0, answer
+    assert "flat: 1 part cannot be reached from the largest part (kept in the scene): 1 cell at (4, 2)" in answer.err
+    found = clearway("scenes", "inspect", tmp_path / "flat.h5", "--json").json
+    assert (found["cells"], found["components"], found["component_sizes"]) == (7, 2, [24, 4])
+
+
+def test_a_door_in_no_wall_is_one_line(clearway, tmp_path):
+    (tmp_path / "flat.txt").write_text("...\n.D.\n...\n")
+    answer = clearway("scenes", "import", "floor-plan", tmp_path / "flat.txt", "--out", tmp_path / "scenes")
+    assert answer.refusal("flat.txt", "has a door in the cell (1, 1) that is in no wall", "Put walls")
+    assert not (tmp_path / "scenes").exists()
+
+
 def test_a_map_can_be_drawn_without_a_picture_from_above(clearway, tmp_path):
     (tmp_path / "room.txt").write_text("..#\n...\n")
     assert (

@@ -108,6 +108,11 @@ def test_flags_that_cannot_be_used(clearway, runs, words, parts):
     assert clearway("evaluate", runs.bold, *words).refusal(*parts)
 
 
+@pytest.mark.parametrize("words", [("--live",), ("--checkpoint", "x"), ("--pictures", "x")], ids=" ".join)
+def test_what_needs_a_run_folder_is_refused_beside_an_exported_file(clearway, tmp_path, words):
+    assert clearway("evaluate", tmp_path / "agent.onnx", *words).refusal(words[0], "needs a run folder", "is a file")
+
+
 def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_before_it(clearway, runs, monkeypatch):
     def names() -> set[str]:
         return {path.name for path in runs.wary.iterdir() if path.name.startswith("live")}

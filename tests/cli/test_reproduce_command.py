@@ -146,7 +146,7 @@ def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_pat
 
 
 def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
-    assert setting.LEARNERS == {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}
+    assert setting.LEARNERS == {"paper": PAPER_A2C, "paper-a3c": PAPER_A3C, "default": DEFAULT}
     assert set(setting.LEARNERS) == set(get_args(LearnerName))
     assert set(EXPERIMENTS) == set(get_args(ExperimentName))
     assert set(BUDGETS) == set(get_args(BudgetName))
@@ -171,7 +171,7 @@ def test_other_frames_and_rooms_show_on_top() -> None:
 
 
 def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
-    settings = {"out": tmp_path, "budget": "paper", "rooms": ("bathroom",), "learners": ("published",)}
+    settings = {"out": tmp_path, "budget": "paper", "rooms": ("bathroom",), "learners": ("paper",)}
     first = ReproduceRequest(names=("fig3",), frames=8, commands=("one",), **settings)
     content = reproduce._request_json(first)
     (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content))
@@ -182,8 +182,8 @@ def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     assert reproduce._with_earlier(other) == other
     spelt = replace(second, seeds=5)  # the budget's own number
     assert list(reproduce._with_earlier(spelt).names) == ["table1", "fig3"]
-    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "published"]}))
-    turned = replace(second, learners=("published", "default"))
+    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "paper"]}))
+    turned = replace(second, learners=("paper", "default"))
     assert list(reproduce._with_earlier(turned).names) == ["table1", "fig3"]
 
 

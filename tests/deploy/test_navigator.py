@@ -64,6 +64,8 @@ def test_a_file_without_encoder_takes_features(deployed, policy_file) -> None:
         alone.act(deployed.pictures[0])
     with pytest.raises(DeployError, match="NaN or Inf"):
         alone.act(np.full(16, np.nan, np.float32))
+    with pytest.raises(DeployError, match="NaN or Inf"):
+        alone.act(np.full(16, 1e300))  # more than float32 holds
 
 
 def test_actions_are_drawn_by_their_probabilities_and_a_seed_repeats() -> None:
@@ -144,6 +146,7 @@ PICTURE = np.zeros((4, 4, 3), np.uint8)
         (PICTURE[None], r"\(1, 4, 4, 3\)"),
         ("picture.png", "Give an RGB picture"),
         (None, "Give an RGB picture"),
+        ([[1, 2], [3]], "what is seen is no picture .*Give an array"),
         (np.zeros((1, 4097, 3), np.uint8), "4097 x 1 pixels, expected at most 4096"),
         (Image.new("L", (5, 5)), r"uint8 \(5, 5\)"),
     ],

@@ -94,7 +94,14 @@ def bare(world: World) -> World:
             r"the agent sees rgb, and poses and features alone are known here\. Give the scenes",
         ),
         ("lidar", WORLD, [], AgentError, r"the agent sees lidar, and poses and features alone"),
-        ("lidar", WORLD, SCENES, SceneError, r"corridor: has rgb, depth, but no lidar\."),
+        ("lidar", WORLD, SCENES, SceneError, r"has rgb, depth, but no lidar\. Choose among rgb, depth, or give"),
+        (
+            RGB,
+            WORLD,
+            [replace(one, observations=None) for one in small_scenes()],
+            SceneError,
+            r"corridor: has no pictures, so no rgb\. Build or import it again with --sensors rgb$",
+        ),
         (DEPTH, WORLD, small_scenes(), SceneError, r"corridor: has rgb, but no depth\. .*--sensors rgb depth"),
         (
             RGB,

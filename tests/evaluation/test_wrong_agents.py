@@ -9,6 +9,7 @@ from clearway.agents.agent import Decisions
 from clearway.agents.by_pose import RandomWalk
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
+from clearway.scenes.actions import Action
 from clearway.world.world import make_world
 from helpers.made import corridor_scene
 
@@ -55,6 +56,7 @@ WRONG = {
         lambda n: Decisions(np.zeros(n, np.int64), np.ones((n, 3))),
         r"probabilities float64 \(6, 3\), expected float32 \(6, 4\)",
     ),
+    "actions alone": (lambda n: np.zeros(n, np.int64), r"gave ndarray, expected Decisions\. Give clearway\.Decisions"),
     "told once": (
         lambda n: Decisions(np.zeros(n, np.int64), np.ones(4)),
         r"probabilities float64 \(4,\), expected float32 \(6, 4\)",
@@ -93,3 +95,92 @@ def test_short_integers_are_actions_too(kind: type) -> None:
 
 def test_the_same_good_steps_alone_are_walked_to_the_end() -> None:
     assert run_episodes(WORLD, Wrong(told(0.25), 2), episodes_per_target=3, step_limit=9, seed=4).steps.max() <= 9
+
+
+STATES = {
+    "none": (lambda n: None, r"the agent gave NoneType as its state, expected arrays by name\. Give \{\} where"),
+    "an array": (lambda n: np.zeros((n, 2)), "the agent gave ndarray as its state, expected arrays by name"),
+    "a list": (lambda n: {"turns": [0] * n}, r"state has 'turns', list, expected an array \(6, \.\.\.\)\. Give a row"),
+    "too few rows": (lambda n: {"turns": np.zeros(n - 1)}, r"has 'turns' of shape \(5,\), expected \(6, \.\.\.\)"),
+}
+
+
+@pytest.mark.parametrize("when", ["reset", "act"])
+@pytest.mark.parametrize("name", STATES)
+def test_what_is_no_state_is_said_in_one_line(name: str, when: str) -> None:
+    wrong, said = STATES[name]
+
+    class Forgets(RandomWalk):
+        def reset(self, target, seed):
+            good = super().reset(target, seed)
+            return wrong(len(seed)) if when == "reset" else good
+
+        def act(self, observation, state):
+            decisions, after = super().act(observation, state)
+            return decisions, wrong(len(decisions.action)) if when == "act" else after
+
+    with pytest.raises(AgentError, match=said) as caught:
+        run_episodes(WORLD, Forgets(), episodes_per_target=3)
+    assert "\n" not in str(caught.value)
+
+
+def turns_seven_times(count: np.ndarray) -> Decisions:
+    """Then goes forward, with a turn every fifth step."""
+    action = np.where((count < 8) | (count % 5 == 0), Action.TURN_RIGHT, Action.MOVE_FORWARD)
+    return Decisions(action.astype(np.int64), certain=np.ones(len(count), bool))
+
+
+class Counts(RandomWalk):
+    """Remembers how often it was asked."""
+
+    def reset(self, target, seed):
+        return {"count": np.zeros(len(seed), np.int64)}
+
+    def act(self, observation, state):
+        count = state["count"] + 1
+        return turns_seven_times(count), {"count": count}
+
+
+class CountsInPlace(Counts):
+    """Writes to the state that it was given, which it should not."""
+
+    def act(self, observation, state):
+        state["count"] += 1
+        return turns_seven_times(state["count"]), state
+
+
+class CountsByChance(Counts):
+    """Calls its memory so."""
+
+    def reset(self, target, seed):
+        return {"chance": np.zeros(len(seed), np.int64)}
+
+    def act(self, observation, state):
+        count = state["chance"] + 1
+        return turns_seven_times(count), {"chance": count}
+
+
+class Grows(Counts):
+    """Keeps a row of all its steps, of more and more columns."""
+
+    def reset(self, target, seed):
+        return {"all": np.zeros((len(seed), 0))}
+
+    def act(self, observation, state):
+        steps = np.concatenate([state["all"], np.ones((len(state["all"]), 1))], axis=1)
+        return turns_seven_times(steps.sum(1)), {"all": steps}
+
+
+class AddsNames(Counts):
+    """Remembers something else from the third step on."""
+
+    def act(self, observation, state):
+        count = state["count"] + 1
+        return turns_seven_times(count), {"count": count, **({"late": count} if count[0] > 2 else {})}
+
+
+@pytest.mark.parametrize("kind", [CountsInPlace, CountsByChance, Grows, AddsNames])
+def test_however_an_agent_keeps_its_count_no_circle_is_seen_where_there_is_none(kind: type) -> None:
+    plain, other = (run_episodes(WORLD, agent(), episodes_per_target=8, step_limit=200) for agent in (Counts, kind))
+    assert not plain.looped.any() and not other.looped.any()
+    assert plain.reached.any() and np.array_equal(plain.steps, other.steps)

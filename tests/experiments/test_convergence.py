@@ -98,7 +98,7 @@ def test_runs_that_never_settle_count_with_all_frames(
         whole = [run.learner.frames for run in group.runs]
         assert (named["seeds"], named["settled"]) == (2, settled)
         assert named["frames"] == pytest.approx(sum(first if settled else whole) / 2)
-    assert [claim.text.split(":")[0] for claim in claims] == ["published", "default"]
+    assert [claim.text.split(":")[0] for claim in claims] == ["paper", "default"]
     assert settled or {claim.verdict for claim in claims} == {"undecided"}  # a tie decides nothing
 
 

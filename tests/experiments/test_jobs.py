@@ -100,7 +100,7 @@ def endless_command(folder: Path) -> list[str]:
     """`clearway reproduce` on the small rooms, too long to end by itself; runs go to the folder `out` in it."""
     small_setting(folder)
     words = ["--budget", "smoke", "--scenes", folder / "scenes", "--out", folder / "out", "--frames", "10000000"]
-    return [sys.executable, "-m", "clearway", "reproduce", "fig3", "--learners", "published", *map(str, words)]
+    return [sys.executable, "-m", "clearway", "reproduce", "fig3", "--learners", "paper", *map(str, words)]
 
 
 def wait_until(happens: Callable[[], bool], process: subprocess.Popen[str]) -> None:

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 
 def command(scenes: Path, out: Path) -> list[str]:
-    words = ["--scenes", str(scenes), "--out", str(out), "--frames", "20000", "--learners", "published"]
+    words = ["--scenes", str(scenes), "--out", str(out), "--frames", "20000", "--learners", "paper"]
     return [sys.executable, "-m", "clearway", "reproduce", "fig3", "fig5", "--budget", "smoke", *words]
 
 

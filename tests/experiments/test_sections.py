@@ -183,7 +183,7 @@ def test_sets_tried_together_are_those_of_the_seeds_that_all_have() -> None:
 def test_table1_repeats_the_clipping_learner_without_clipping(setting: Setting, sections: dict[str, Section]) -> None:
     table = sections["table1"].tables[0]
     kinds = {row[1:3] for row in table.rows if row[1] not in ("exact", "walked")}
-    assert {agent for learner, agent in kinds if learner == "published, unclipped"} == {"shortest", "collision-aware"}
+    assert {agent for learner, agent in kinds if learner == "paper, unclipped"} == {"shortest", "collision-aware"}
     assert not any(learner == "default, unclipped" for learner, _ in kinds)  # it does not clip
     unclipped = {job.run.learner.clip_rewards for job in planned(setting, ["table1"]) if not job.run.learner.hindsight}
     assert unclipped == {True, False}
@@ -201,7 +201,7 @@ def test_maps_show_both_agents_from_one_start(setting: Setting, sections: dict[s
 
 
 def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Section]) -> None:
-    both = replace(setting, learners={**setting.learners, "published-a3c": setting.learners["published"]})
+    both = replace(setting, learners={**setting.learners, "paper-a3c": setting.learners["paper"]})
     names = [figure.name for figure in fig3.section(both).figures]
     assert len(set(names)) == len(names) == 3 * 2 * 2  # learners, scenes, steps and collisions
 
@@ -210,7 +210,7 @@ def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
     assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2  # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled
     assert len({claim.text for section in ("table2", "table3") for claim in sections[section].claims}) == 2 * 2 * 5
-    assert all(claim.text.startswith(("published: ", "published, unclipped: ", "default: ")) for claim in claims)
+    assert all(claim.text.startswith(("paper: ", "paper, unclipped: ", "default: ")) for claim in claims)
 
 
 def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
@@ -324,13 +324,13 @@ def failing(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> tuple[str, int
 def test_a_failed_target_is_counted_named_and_listed_first(setting: Setting, failing: tuple[str, int]) -> None:
     section = table1.section(setting)
     table, by_target = section.tables
-    rows = [row[:5] for row in table.rows if row[1:3] == ("published", "shortest")]
+    rows = [row[:5] for row in table.rows if row[1:3] == ("paper", "shortest")]
     assert [row[3:] for row in rows] == [(2, "1 of 10")] * 2
-    assert [row[4] for row in table.rows if row[1:3] == ("published", "bump")] == ["0 of 10"] * 2
-    assert f"Failed, published, shortest: {failing[0]} {failing[1]} (seed 1)." in table.notes
-    assert by_target.rows[0][:5] == (*failing, "published", "shortest", 1)
+    assert [row[4] for row in table.rows if row[1:3] == ("paper", "bump")] == ["0 of 10"] * 2
+    assert f"Failed, paper, shortest: {failing[0]} {failing[1]} (seed 1)." in table.notes
+    assert by_target.rows[0][:5] == (*failing, "paper", "shortest", 1)
     told = [
-        claim.evidence for claim in section.claims if claim.text.startswith("published: fewer collisions than with the")
+        claim.evidence for claim in section.claims if claim.text.startswith("paper: fewer collisions than with the")
     ]
     assert "Failed targets, over all seeds: 0 of 10, 1 of 10; episodes that arrived: 100.00%, 9" in told[0]
 
@@ -368,8 +368,8 @@ def test_figure_6_says_how_well_the_trained_targets_were_learnt(setting: Setting
 def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[str, Section]) -> None:
     further = [claim.text for claim in sections["table1"].claims if claim.further]
     assert "default: fewer collisions than with a penalty for bumping" in further
-    assert "published, unclipped: fewer collisions than with the shortest-path reward" in further
-    assert "published: fewer collisions than with the shortest-path reward" not in further
+    assert "paper, unclipped: fewer collisions than with the shortest-path reward" in further
+    assert "paper: fewer collisions than with the shortest-path reward" not in further
     summary = report._summary(list(sections.values()))
     assert [len(table.rows) for table in summary] == [30, 14]
 

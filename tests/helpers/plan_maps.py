@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan
 
 SINGLE = (".",)
 ELL = (
@@ -26,7 +26,33 @@ STRAY = (
     ".#.###",
     "...##.",
 )
+FLAT = (
+    "WWWWWWWWWWWWW",
+    "W###..W...##W",
+    "W.....W...##W",
+    "W.....W#....W",
+    "WW.WWWWWWDWWW",
+    "W...........W",
+    "WWWWDWWW....W",
+    "WW.....W.##.W",
+    "###..#.W....W",
+    "###...#WWWWWW",
+)  # three rooms and a corridor that opens into a fourth, a gap and two doors; the last line has no wall beyond it
+TWO_ROOMS = (
+    "WWWWWWWWW",
+    "W...W##.W",
+    "W...D...W",
+    "W.##W...W",
+    "WWWWWWWWW",
+)
 MAPS = {"single": SINGLE, "ell": ELL, "island": ISLAND, "stray": STRAY}
+
+
+def walled(
+    name: str = "two rooms", lines: tuple[str, ...] = TWO_ROOMS, areas: tuple[Area, ...] = (), cell_size_m: float = 0.5
+) -> FloorPlan:
+    """The plan of a map with walls and doors."""
+    return FloorPlan.of_text(name, lines, areas=areas, cell_size_m=cell_size_m)
 
 
 def plan_of(

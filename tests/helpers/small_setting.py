@@ -42,5 +42,5 @@ def small_setting(out: Path, seeds: int = 2) -> Setting:
         targets=((0, 13, 30), (5, 22)),
         budget=BUDGET,
         seeds=tuple(range(seeds)),
-        learners={"published": small_learner(PAPER_A2C), "default": small_learner(DEFAULT)},
+        learners={"paper": small_learner(PAPER_A2C), "default": small_learner(DEFAULT)},
     )

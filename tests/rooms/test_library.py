@@ -14,7 +14,7 @@ import pytest
 
 from clearway.rooms import library
 from clearway.rooms.library import cached_plan_scene, cached_room_scene, plan_path, scene_path
-from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
 from helpers.made import grid_scene
@@ -181,7 +181,7 @@ def test_names_cannot_lead_out_of_the_cache(cache):
 def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     built = []
 
-    def build(plan, seed, *, sensors, workers, ray, progress):
+    def build(plan, seed, *, sensors, size_px, workers, ray, progress):
         built.append((plan.name, seed))
         return replace(grid_scene(seed), name=plan.name)
 
@@ -193,16 +193,24 @@ def test_the_room_of_a_floor_plan_is_built_once(cache, monkeypatch):
     assert [path.name for path in cache.glob("*.h5")] == [plan_path(plan, 2).name]
     cached_plan_scene(plan, 2, sensors=("rgb", "depth"))
     assert len(built) == 2  # without depth is another file
+    cached_plan_scene(plan, 2, size_px=(24, 32))
+    assert len(built) == 3  # and so is one of smaller pictures
 
 
 def test_another_plan_has_another_file(cache):
     plan = FloorPlan("hall", np.array([[0, 0], [1, 0]]))
     others = (
         replace(plan, name="den"),
+        replace(plan, walls=np.array([[2, 0]])),
+        replace(plan, doors=np.array([[1, 0]])),
+        replace(plan, areas=(Area("kitchen", (0, 0), (1, 0)),)),
         replace(plan, cells=np.array([[0, 0], [0, 1]])),
         replace(plan, cells=np.array([[1, 0], [0, 0]])),
         replace(plan, cell_size_m=0.5),
         replace(plan, blocked_edges=np.array([[[0, 0], [1, 0]]])),
+        replace(plan, walls=np.array([[0, 1]])),
+        replace(plan, doors=np.array([[0, 0]])),
+        replace(plan, areas=(Area("kitchen", (0, 0), (1, 0)),)),
     )
     paths = {plan_path(plan, 0), plan_path(plan, 1), *(plan_path(other, 0) for other in others)}
-    assert len(paths) == 7
+    assert len(paths) == 10

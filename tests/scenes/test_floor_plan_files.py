@@ -42,6 +42,13 @@ def test_all_kinds_of_files_hold_the_same_plan(tmp_path: Path) -> None:
         assert cells_of(path) == ELL, path
 
 
+def test_a_text_file_may_have_walls_and_doors(tmp_path: Path) -> None:
+    plan = read_floor_plan(write(tmp_path, "flat.txt", "W.W\n#DW\n"), cell_size_m=0.5)
+    assert plan.cells.tolist() == [[1, 0], [1, 1]] and plan.doors.tolist() == [[1, 0]]
+    assert plan.walls.tolist() == [[0, 1], [2, 0], [2, 1]]
+    assert (plan.name, plan.cell_size_m, plan.source) == ("flat", 0.5, str(tmp_path / "flat.txt"))
+
+
 def test_a_file_of_many_plans(tmp_path: Path) -> None:
     path = tmp_path / "plans.npz"
     np.savez(path, hall=np.array([[4, 4]]), ell=np.array(ELL))
@@ -67,7 +74,11 @@ def test_a_text_file_holds_the_plan_of_its_own_name(tmp_path: Path) -> None:
     ("name", "text", "message"),
     [
         ("a.txt", "..\n.\n", "line 2 has 1 cells, the first has 2"),
-        ("a.txt", "..\n.x\n", r"line 2, column 2 holds 'x'. Write # for blocked and \. for reachable"),
+        (
+            "a.txt",
+            "..\n.x\n",
+            r"line 2, column 2 holds 'x'. Write # for blocked, \. for reachable, W for a wall and D for a door in it",
+        ),
         ("a.txt", "##\n##\n", "has 0 reachable cells"),
         ("a.txt", " \n\n", "is empty"),
         ("a.csv", "1,0\n2,1\n", "line 2, column 1 holds '2'. Write 0 for blocked and 1 for reachable"),

@@ -8,7 +8,15 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.feature_spread import feature_spread
-from clearway.scenes.floor_plans import CELL_SIZE_M, Area, FloorPlan, floor_plan_scene, plan_of
+from clearway.scenes.floor_plans import (
+    CELL_SIZE_M,
+    MAX_WALLS,
+    Area,
+    FloorPlan,
+    floor_plan_scene,
+    parts_apart,
+    plan_of,
+)
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
 from clearway.world.world import make_world
@@ -175,6 +183,8 @@ def test_walls_and_doors_and_areas_stand_in_a_plan() -> None:
     [
         ({"walls": np.array([[1, 0]])}, r"has a wall in the cell \(1, 0\) that can be entered"),
         ({"doors": np.array([[1, 1]])}, r"has a door in the cell \(1, 1\) that cannot be entered"),
+        ({"walls": np.array([[0, 40_001]])}, "has walls more than 10,000 m away.*Move the plan"),
+        ({"walls": np.zeros((MAX_WALLS + 1, 2), int)}, f"has {MAX_WALLS + 1} walls, at most {MAX_WALLS}"),
         ({"walls": np.array([[0.5, 0]])}, r"has walls of float64 and shape \(1, 2\), expected whole numbers"),
         ({"doors": np.array([1, 1])}, r"has doors of int64 and shape \(2,\), expected whole numbers"),
         ({"areas": (Area("garage", (0, 0), (1, 1)),)}, "has the area .*garage.*Give a use among bathroom"),
@@ -184,6 +194,40 @@ def test_walls_and_doors_and_areas_stand_in_a_plan() -> None:
 def test_parts_that_are_none_are_refused(parts, problem) -> None:
     with pytest.raises(SceneError, match=problem):
         FloorPlan("flat", ROW, **parts)
+
+
+def test_a_map_in_characters_is_a_plan_with_walls_and_doors() -> None:
+    plan = FloorPlan.of_text("flat", ("W.#", "WD."), areas=(Area("kitchen", (1, 0), (2, 1)),), cell_size_m=0.5)
+    assert plan.cells.tolist() == [[1, 0], [1, 1], [2, 0]]  # by x, then z; the last line is z = 0
+    assert plan.walls.tolist() == [[0, 0], [0, 1]] and plan.doors.tolist() == [[1, 0]]
+    assert plan.has_walls and plan.areas[0].use == "kitchen" and plan.cell_size_m == 0.5
+    plain = FloorPlan.of_text("ell", (".#", ".."))
+    assert not plain.has_walls and np.array_equal(plain.cells, FloorPlan.of_map("ell", ELL).cells)
+
+
+@pytest.mark.parametrize(
+    ("lines", "problem"),
+    [
+        (("..", "."), r"^flat: line 2 has 1 cells, the first has 2"),
+        (("..", ".w"), r"^flat: line 2, column 2 holds 'w'. Write # .*, \. .*, W for a wall and D for a door in it"),
+        ((), "^flat: is empty"),
+        (("WW",), "^flat: has 0 reachable cells"),
+    ],
+)
+def test_maps_in_characters_that_are_none(lines: tuple[str, ...], problem: str) -> None:
+    with pytest.raises(SceneError, match=problem):
+        FloorPlan.of_text("flat", lines)
+
+
+def test_parts_that_cannot_be_reached_are_named_in_one_line() -> None:
+    assert parts_apart(FloorPlan.of_text("hall", ("..", ".."))) == ""
+    one = FloorPlan.of_text("hall", ("..W.", "..W."))
+    kept = "reached from the largest part (kept in the scene)"
+    assert parts_apart(one) == f"hall: 1 part cannot be {kept}: 2 cells at (3, 0), (3, 1)"
+    three = FloorPlan.of_text("hall", ("...#.", "####.", "..#.#"))
+    assert (
+        parts_apart(three, most=1) == f"hall: 3 parts cannot be {kept}: 2 cells at (0, 0) and 1 more; 3 cells in 2 more"
+    )
 
 
 def test_a_scene_gives_its_plan_back_from_its_file_too(tmp_path: Path) -> None:

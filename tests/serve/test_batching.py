@@ -167,6 +167,38 @@ def test_too_many_that_wait_are_refused_at_once() -> None:
     assert [fault.code for fault in refused] == ["overloaded", "overloaded"]
 
 
+def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
+    """Sent again, it begins the episode that it would have begun."""
+
+    free = threading.Event()
+
+    class Waits(Sums):
+        def act(self, observation, state):
+            assert free.wait(PATIENT_S)
+            return super().act(observation, state)
+
+    async def begin(refused: bool) -> State | None:
+        service = Service(Waits(), Limits(waiting=1, batch=1))
+        session = service.sessions.open("sampled", 7)
+        if refused:
+            computed = asyncio.create_task(service.batcher.act(plain(1), BEGUN))
+            while not service.batcher.waiting:
+                await asyncio.sleep(0)
+            while service.batcher.waiting:
+                await asyncio.sleep(0)
+            waits = asyncio.create_task(service.batcher.act(plain(1), BEGUN))
+            await asyncio.sleep(0)
+            with pytest.raises(Fault, match="too many pictures"):
+                await service.set_target(session, grey(2))
+            free.set()
+            await asyncio.gather(computed, waits)
+        await service.set_target(session, grey(2))
+        return session.state
+
+    refused, plainly = asyncio.run(begin(True)), asyncio.run(begin(False))
+    assert refused is not None and plainly is not None and equal(refused, plainly)
+
+
 def test_an_agent_that_fails_fails_its_batch_alone() -> None:
     class Moody(Sums):
         def act(self, observation, state):

@@ -1,5 +1,6 @@
 """A walker in a corridor of five cells (states 4 * cell + heading / 90), held against numbers typed in."""
 
+import numpy as np
 import pytest
 import torch
 
@@ -175,3 +176,13 @@ def test_an_agent_that_sees_more_than_poses_is_not_for_the_viewer() -> None:
 
     with pytest.raises(AssertionError, match="knows its pose"):
         walker(0, Seeing())
+
+
+def test_a_map_of_the_mind_asks_the_agent_itself_not_how_it_chooses() -> None:
+    """What remembers the tried actions of every pose would do so for every pose of the map."""
+    plain = likes(corridor_world(), selection="sampled")
+    walk = walker(0, plain, selection="argmax-untried")
+    walk.step()
+    held, own = walk.map_of_mind(), walker(0, plain).map_of_mind()
+    for name in ("action", "probabilities", "value", "certain"):
+        assert np.array_equal(getattr(held, name), getattr(own, name))

@@ -57,7 +57,12 @@ class Decisions:
 
 @runtime_checkable
 class Agent(Protocol):
-    """Who walks to where a picture was taken."""
+    """Who walks to where a picture was taken; all calls are for B episodes at a time.
+
+    What is seen is arrays by the sensor's name: "rgb" (B, height, width, 3) uint8, "depth" (B, height, width) float32
+    metres, "features" (B, F) float32, and "pose" (B,) int64, which no robot knows. What is remembered, the state, is
+    arrays (B, ...) by names of the agent's own; it keeps nothing else between calls.
+    """
 
     @property
     def sees(self) -> tuple[str, ...]:
@@ -67,12 +72,21 @@ class Agent(Protocol):
         """Begin B episodes.
 
         Args:
-            target: what is seen at the targets. It may hold `FEATURES` too, where those are known already.
+            target: what is seen at the targets. It may hold "features" too, where those are known already.
             seed: (B,) int64, of all that is drawn in an episode.
+
+        Returns:
+            The state to begin with; {} where nothing is remembered.
         """
 
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
-        """The next actions, and what to give to the next call. The state that was given stays as it is."""
+        """The next actions, and what to give to the next call.
+
+        Args:
+            observation: what is seen now.
+            state: of the same episodes; it stays as it is, a changed one is another. Episodes that have ended are
+                gone from both.
+        """
 
 
 def rows(state: State, index: np.ndarray) -> State:

@@ -15,6 +15,7 @@ from torch import Tensor
 from clearway.agents import memory
 from clearway.agents.agent import POSE, Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
+from clearway.errors import AgentError
 from clearway.model.lookup import LookupNetwork
 from clearway.model.policy import network_critic, shortest_path_actions
 from clearway.scenes.actions import ACTION_COUNT
@@ -44,9 +45,13 @@ class PoseAgent:
         self._target_at[world.target_state.cpu().numpy()] = np.arange(world.target_count)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
-        """Begin B episodes to targets of the world; see `Agent.reset`."""
-        index = self._target_at[target[POSE]]
-        assert (index >= 0).all(), "a target is none of the world's"
+        """Begin B episodes; see `Agent.reset`. Raises AgentError: a target is none of the world's."""
+        known = target[POSE] < len(self._target_at)
+        index = np.where(known, self._target_at[np.where(known, target[POSE], 0)], -1)
+        if (index < 0).any():
+            pose = int(target[POSE][index < 0][0])
+            problem = f"the agent was made for a world without target {pose}, in the numbering of all scenes"
+            raise AgentError(f"{problem}. Give what makes it for a World, or the targets that it knows")
         count = len(index)
         return {
             "target": index,

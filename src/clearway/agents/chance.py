@@ -13,7 +13,7 @@ import numpy as np
 from clearway.agents.agent import Decisions
 from clearway.world.randomness import UNIT, drawn_by, stream_keys, stream_words
 
-CHANCE = "chance"  # its name in a state
+CHANCE = "clearway.chance"  # its name in a state, which no other array may have
 ACTION_STREAM = 12
 
 

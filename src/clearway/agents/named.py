@@ -6,10 +6,13 @@ takes the world, or a function.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeAlias
 
-from clearway.agents.agent import Agent
+import numpy as np
+
+from clearway.agents.agent import Agent, Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.errors import AgentError, PluginError
 from clearway.plugins import find_plugin, imported, load_plugin
@@ -50,9 +53,40 @@ def named_maker(source: str, found: object) -> AgentMaker:
         except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
             reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
             raise AgentError(f"{source}: cannot be made ({reason}). Correct it") from fault
-        return checked_agent(source, agent)
+        return Foreign(checked_agent(source, agent), source)
 
     return made
+
+
+class Foreign:
+    """Another's agent. Whatever it raises is told of as its fault, an `AgentError` in one line.
+
+    Attributes:
+        agent: the other's own.
+    """
+
+    def __init__(self, agent: Agent, source: str) -> None:
+        self.agent, self._source = agent, source
+        self.sees = agent.sees
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        """See `Agent.reset`."""
+        with self._told():
+            return self.agent.reset(target, seed)
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        """See `Agent.act`."""
+        with self._told():
+            decisions, after = self.agent.act(observation, state)
+            return decisions, after
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as fault:  # another's code: anything can come of it
+            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            raise AgentError(f"{self._source}: failed ({reason}). Correct it") from fault
 
 
 def checked_agent(source: str, agent: object) -> Agent:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias, get_args
 
 from clearway.agents.agent import Agent
-from clearway.agents.named import AgentMaker, agent_maker, checked_agent, named_maker
+from clearway.agents.named import AgentMaker, Foreign, agent_maker, checked_agent, named_maker
 from clearway.agents.selection import ActionSelection
 from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
@@ -115,6 +116,11 @@ class EvaluateResult:
 TEXT_WIDTH = 120  # columns
 
 
+def is_exported(source: Path) -> bool:
+    """A path is an exported agent's file, by its name; a folder of such a name is a run."""
+    return source.suffix == ".onnx" and not source.is_dir()
+
+
 def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] | None = None) -> TrainedAgent:
     """The trained agent of a run folder, from its newest checkpoint or the one given.
 
@@ -163,7 +169,7 @@ def evaluate(
     }
     others = _makers(beside)
     found = None if scenes is None else load_scenes(scenes)
-    if isinstance(agent, str | os.PathLike) and os.fspath(agent).endswith(".onnx"):
+    if isinstance(agent, str | os.PathLike) and is_exported(as_path("agent", agent)):
         agent = open_agent(as_path("agent", agent))
     if not isinstance(agent, TrainedAgent | TrainResult | str | os.PathLike):
         return _own(agent, found, targets, others, settings)
@@ -193,7 +199,8 @@ def _own(
         raise ArgumentError("scenes: none given, and the agent has no run that names them. Give scenes")
     card = getattr(agent, "card", None)
     if isinstance(card, Card):
-        targets = _targets_of(card, scenes) if targets is None else targets
+        _check_fits(card, scenes)
+        targets = _targets_of(card) if targets is None else targets
     world = make_world(scenes, chosen_targets(scenes, targets, settings["seed"]))
     own = checked_agent(AGENT, agent) if made else named_maker(AGENT, agent)(world)
     name = card.scene if isinstance(card, Card) else getattr(agent, "__name__", type(agent).__name__)
@@ -207,14 +214,32 @@ def _own(
             encoder=encoder_names(scenes),
             **settings,
         )
-    return EvaluateResult(own, tuple(evaluations), tuple(scenes))
+    walked = own.agent if isinstance(own, Foreign) else own
+    return EvaluateResult(walked, tuple(evaluations), tuple(scenes))
 
 
-def _targets_of(card: Card, scenes: Sequence[Scene]) -> Targets:
-    """The targets that an exported agent was trained on; None where its file does not say."""
+def _check_fits(card: Card, scenes: Sequence[Scene]) -> None:
+    """Raise ArgumentError where an exported agent is for another scene, or sees features that the scene does not have.
+
+    Features may be those of a file that does not say what made them; then their number has to do.
+    """
     if [scene.name for scene in scenes] != [card.scene]:
         given = ", ".join(scene.name for scene in scenes)
         raise ArgumentError(f"scenes: the agent is for scene {card.scene}, given {given}. Give that scene alone")
+    scene = scenes[0]
+    if card.takes_pictures or scene.features is None:
+        return
+    wanted, found = card.encoder, scene.encoder
+    other = found is not None and found.identity != wanted.get("identity")
+    if other or scene.features.shape[1] != card.feature_count:
+        given = f"{scene.features.shape[1]} features of {scene.encoder_name}{f' ({found.identity})' if found else ''}"
+        expected = f"{card.feature_count} of {wanted.get('name')} ({wanted.get('identity')})"
+        problem = f"scenes: scene {scene.name} has {given}, the agent sees {expected}"
+        raise ArgumentError(f"{problem}. Encode the scene as for training, or use an agent exported with its encoder")
+
+
+def _targets_of(card: Card) -> Targets:
+    """The targets that an exported agent was trained on; None where its file does not say."""
     kept = card.training.get("targets")
     return {card.scene: kept} if isinstance(kept, list) else None
 

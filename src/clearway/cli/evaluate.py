@@ -48,6 +48,7 @@ class Evaluate:
     def run(self) -> None:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
         self.room.check()
+        self._check_file()
         if not self.room.live:
             self._on_grid()
             return
@@ -67,16 +68,23 @@ class Evaluate:
             json=self.json,
         )
 
+    def _check_file(self) -> None:
+        """Raise ClearwayError where an exported agent is given with what a run folder alone can do."""
+        needs_run = {"--live": self.room.live, "--checkpoint": self.checkpoint, "--pictures": self.pictures}
+        asked = [option for option, given in needs_run.items() if given]
+        if asked:
+            from clearway.api.evaluation import is_exported
+
+            if is_exported(self.folder):
+                raise ClearwayError(f"{asked[0]}: needs a run folder, and {self.folder} is a file. Leave it out")
+
     def _on_grid(self) -> None:
-        from clearway.api.evaluation import evaluate, load_agent
+        from clearway.api.evaluation import evaluate, is_exported, load_agent
         from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 
         episodes, step_limit = _or(self.episodes, EPISODES_PER_TARGET), _or(self.step_limit, STEP_LIMIT)
         files = scene_files(self.scenes) if self.scenes else None
-        exported = self.folder.suffix == ".onnx"
-        if exported and (self.checkpoint or self.pictures):
-            wrong = "--checkpoint" if self.checkpoint else "--pictures"
-            raise ClearwayError(f"{wrong}: needs a run folder, and {self.folder} is a file. Leave it out")
+        exported = is_exported(self.folder)
         agent = self.folder if exported else load_agent(self.folder, self.checkpoint)
         result = evaluate(agent, files, beside=self.beside, episodes=episodes, step_limit=step_limit, seed=self.seed)
         if not exported:

@@ -19,6 +19,7 @@ from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
 from clearway.cli.export import ExportAgent
+from clearway.cli.generate import Generate
 from clearway.cli.imports.command import ImportScenes
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
@@ -39,13 +40,14 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build rooms, import dumps, floor plans and photographs, inspect, walk through, export.
+    """Scene files: build and generate rooms, import dumps, floor plans and photographs, inspect, walk through, export.
 
     Example: clearway scenes inspect bathroom.h5
     """
 
     command: (
         Annotated[Build, tyro.conf.subcommand("build")]
+        | Annotated[Generate, tyro.conf.subcommand("generate")]
         | Annotated[ImportScenes, tyro.conf.subcommand("import")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
         | Annotated[Export, tyro.conf.subcommand("export")]

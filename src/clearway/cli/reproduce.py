@@ -44,8 +44,8 @@ class Reproduce:
     """For the default rooms: auto, random-resnet50, or a model's name or folder."""
     seeds: int | None = None
     """Agents of each kind; by default as the budget says."""
-    learners: tuple[LearnerName, ...] = ("published", "default")
-    """published: the paper's settings, synchronous; published-a3c: asynchronous, far slower; default: the recipe."""
+    learners: tuple[LearnerName, ...] = ("paper", "default")
+    """paper: the paper's settings, synchronous; published-a3c: asynchronous, far slower; default: the recipe."""
     workers: int | None = None
     """Runs side by side; by default one a core, as far as memory allows. A Ray cluster has its own count."""
     threads: int = 1

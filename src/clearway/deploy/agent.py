@@ -45,7 +45,11 @@ def checked_seen(seen: object, card: Card) -> np.ndarray:
     Raises:
         DeployError: it is something else, too large, or not finite.
     """
-    array = np.asarray(seen)
+    try:
+        array = np.asarray(seen)
+    except ValueError as fault:  # rows of unequal lengths
+        wanted, reason = "picture" if card.takes_pictures else "feature vector", " ".join(str(fault).split())[:120]
+        raise DeployError(f"what is seen is no {wanted} ({reason}). Give an array") from fault
     return checked_picture(array) if card.takes_pictures else _checked_features(array, card)
 
 
@@ -65,6 +69,8 @@ def _checked_features(features: np.ndarray, card: Card) -> np.ndarray:
         problem = f"given {features.dtype} {features.shape}, expected features, float32 ({card.feature_count},)"
         remedy = f"Encode the picture with {card.encoder.get('name')} first, or use an agent exported with its encoder"
         raise DeployError(f"{problem}. {remedy}")
+    with np.errstate(over="ignore"):  # what float32 cannot hold is Inf, and refused as such
+        features = features.astype(np.float32)
     if not np.isfinite(features).all():
         raise DeployError("the features hold NaN or Inf. Check the encoder")
-    return features.astype(np.float32)
+    return features

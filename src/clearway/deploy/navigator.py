@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from threading import Lock
 from typing import Literal, NamedTuple, get_args
@@ -127,7 +128,7 @@ def decision_of(decisions: Decisions) -> Decision:
 def episode_seeds(seed: int | None) -> Iterator[np.ndarray]:
     """Seeds (1,) int64 of one episode after the other, which differ every time without a seed. Raises DeployError."""
     rng = np.random.default_rng(checked_seed(seed))
-    return iter(lambda: rng.integers(1 << 62, size=1), None)
+    return (rng.integers(1 << 62, size=1) for _ in count())
 
 
 def checked_seed(seed: object) -> int | None:

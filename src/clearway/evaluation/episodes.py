@@ -6,7 +6,7 @@ Axis letters: N episodes, B of them still walking, A actions, M targets, Z zones
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,6 +145,7 @@ class _Walk:
         self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
         self.env.reset(target=target)
         self.memory = agent.reset(sight(world.target_state[target]), seeds.cpu().numpy())
+        _check_state(self.memory, count)
         self.target, self.start = target, self.env.state.clone()
         self.walking = torch.arange(count, device=world.device)  # (B,) episode of each row of the batch
         self.tally = Tally.zero(count, world.device)
@@ -158,7 +159,8 @@ class _Walk:
         """Walk until every episode has ended."""
         while len(self.walking):
             decisions, self.memory = self.agent.act(self.sight(self.env.state), self.memory)
-            _check(decisions, len(self.walking))
+            _check_decisions(decisions, len(self.walking))
+            _check_state(self.memory, len(self.walking))
             action = torch.from_numpy(decisions.action.astype(np.int64)).to(self.world.device)
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
@@ -210,8 +212,24 @@ class _Walk:
         )
 
 
-def _check(decisions: Decisions, count: int) -> None:
+def _check_state(state: object, count: int) -> None:
+    """Raise AgentError where this is no state of so many episodes."""
+    if not isinstance(state, Mapping):
+        problem = f"the agent gave {type(state).__name__} as its state, expected arrays by name"
+        raise AgentError(f"{problem}. Give {{}} where it remembers nothing")
+    for name, values in state.items():
+        if not isinstance(values, np.ndarray):
+            problem = f"the agent's state has {name!r:.40}, {type(values).__name__}, expected an array ({count}, ...)"
+            raise AgentError(f"{problem}. Give a row for each episode")
+        if values.shape[:1] != (count,):
+            problem = f"the agent's state has {name!r:.40} of shape {values.shape}, expected ({count}, ...)"
+            raise AgentError(f"{problem}. Give a row for each episode")
+
+
+def _check_decisions(decisions: object, count: int) -> None:
     """Raise AgentError where these are no decisions of so many episodes."""
+    if not isinstance(decisions, Decisions):
+        raise AgentError(f"the agent gave {type(decisions).__name__}, expected Decisions. Give clearway.Decisions(...)")
     action, told = decisions.action, decisions.probabilities
     _check_array("actions", action, "int64", (count,))
     if told is not None:

@@ -88,7 +88,8 @@ class LoopSkipper:
             closed = closed & torch.from_numpy(_same(where, self.snapshot)).to(closed.device)
             tally = self._rounds_added(tally, closed, step_limit)
         if self.walked == self.renew_at:
-            self.snapshot, self.tally, self.renew_at = where, tally, 2 * self.renew_at
+            self.snapshot = {name: values.copy() for name, values in where.items()}  # its own, whoever writes to theirs
+            self.tally, self.renew_at = tally, 2 * self.renew_at
             self.certain = torch.ones_like(self.certain)
         return tally, closed
 
@@ -107,7 +108,9 @@ class LoopSkipper:
 
 
 def _same(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(B,) bool: rows that are equal in all their arrays."""
+    """(B,) bool: rows that are equal in all their arrays; none where these have other names or shapes."""
     count = len(next(iter(one.values())))
+    if {name: values.shape for name, values in one.items()} != {name: values.shape for name, values in other.items()}:
+        return np.zeros(count, bool)
     equal = [(one[name] == other[name]).reshape(count, -1).all(1) for name in one]
     return np.logical_and.reduce(equal)

@@ -50,7 +50,7 @@ class ReproduceRequest:
     frames: int | None = None
     encoder: str = "auto"
     seeds: int | None = None
-    learners: Sequence[LearnerName] = ("published", "default")
+    learners: Sequence[LearnerName] = ("paper", "default")
     workers: int | None = None
     threads: int = 1
     ray: str | None = None

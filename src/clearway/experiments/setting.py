@@ -23,10 +23,10 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.world import World, make_world
 
 SCENES = "scenes"
-LEARNERS: dict[LearnerName, Learner] = {"published": PAPER_A2C, "published-a3c": PAPER_A3C, "default": DEFAULT}
+LEARNERS: dict[LearnerName, Learner] = {"paper": PAPER_A2C, "paper-a3c": PAPER_A3C, "default": DEFAULT}
 ABOUT_LEARNERS: Mapping[str, str] = {
-    "published": "the paper's settings, A2C in place of A3C (PAPER_A2C)",
-    "published-a3c": "the paper's settings and its A3C (PAPER_A3C)",
+    "paper": "the paper's settings, A2C in place of A3C (PAPER_A2C)",
+    "paper-a3c": "the paper's settings and its A3C (PAPER_A3C)",
     "default": "this project's default recipe",
 }
 

@@ -1,6 +1,6 @@
 """Episodes in the live room, walked side by side: picture, agent, body, step by step.
 
-Starts, targets and the chances of sampled actions are those of the evaluation on the grid (`evaluate.episodes`):
+Starts, targets and the chances of sampled actions are those of the evaluation on the grid (`evaluation.episodes`):
 without perturbations an episode is the same here and there up to its first contact.
 
 Axis letters: N episodes, B of them still walking.

@@ -31,7 +31,7 @@ Batch = tuple[Observations, int, int]
 
 def find_record(
     name: str,
-    scenes: Sequence[Scene],
+    scenes: Sequence[Scene] | Callable[[], Sequence[Scene]],
     *,
     seed: int = 0,
     shape: ResNetShape = RESNET50,
@@ -43,7 +43,7 @@ def find_record(
         name: "resnet50" (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto"
             (the first if it can be had, else the second), "depth-grid" (of depth, without a network), one of another
             package (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
-        scenes: what "random-resnet50" calibrates on; their order does not matter.
+        scenes: what "random-resnet50" calibrates on, in any order; or what gives them, asked only if it is needed.
         seed: of "random-resnet50".
         shape, preprocessing: of "random-resnet50".
 
@@ -158,6 +158,17 @@ def encode_scenes(
     return encoded
 
 
+def encoded(scene: Scene, encoder: Encoder) -> Scene:
+    """A scene with features of its pictures, made in this process with the threads it has, and not kept in the cache.
+
+    Raises:
+        EncoderError: the scene has nothing of the encoder's sensor.
+    """
+    pictures = pictures_of(scene, sensor_of(encoder.record))
+    parts = [_encode(encoder, batch) for batch in _batches(pictures, BATCH_PICTURES)]
+    return scene.with_features(np.concatenate(parts), encoder.record)
+
+
 def _open(load: Callable[[EncoderRecord], Encoder], record: EncoderRecord, threads: int | None) -> Encoder:
     """What a worker encodes with: the network, with so many threads; None leaves them as they are."""
     if threads is not None:
@@ -218,8 +229,11 @@ def pictures_of(scene: Scene, sensor: str = RGB) -> Observations:
         raise EncoderError(str(fault)) from fault
 
 
-def _fitted(scenes: Sequence[Scene], seed: int, shape: ResNetShape, preprocessing: Preprocessing) -> EncoderRecord:
+def _fitted(
+    given: Sequence[Scene] | Callable[[], Sequence[Scene]], seed: int, shape: ResNetShape, preprocessing: Preprocessing
+) -> EncoderRecord:
     """The record of a random ResNet calibrated on the scenes, from the cache if it was fitted before."""
+    scenes = given() if callable(given) else given
     if not scenes:
         raise EncoderError(f"encoder {RANDOM} is calibrated on the scenes' pictures, and there are none. Name a scene")
     by_key = {content_key(pictures_of(scene)): pictures_of(scene) for scene in scenes}

@@ -17,6 +17,8 @@ from clearway.scenes.sensors import RGB, check_names
 from clearway.scenes.validate import check_moves
 from clearway.version import __version__
 
+PICTURE_SIZE_PX = (300, 400)  # height and width, of our own rooms
+
 
 def build_scene(
     name: str,
@@ -77,21 +79,25 @@ def build_floor_plan(
     seed: int = 0,
     *,
     sensors: Sequence[str] = (RGB,),
+    size_px: tuple[int, int] = PICTURE_SIZE_PX,
     workers: int | None = None,
     ray: str | None = None,
     progress: bool = False,
+    here: bool = False,
 ) -> Scene:
     """A floor plan as a furnished room: its cells and edges exactly, with pictures, and without features.
 
-    The pictures are held in memory, 1.4 MB a cell.
+    The pictures are held in memory, 1.4 MB a cell at 300 x 400 pixels.
 
     Args:
         plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
         seed: with the plan's name chooses furniture, colours and textures.
         sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
+        size_px: height and width of the pictures.
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
+        here: this process renders, see `rooms.render.render`.
 
     Raises:
         SceneError: the plan's cells, their number or its extent are no room's, the seed is negative, or there is no
@@ -110,10 +116,13 @@ def build_floor_plan(
     with _status(f"furnishing and lighting {plan.name}", progress):
         room, layout = build_plan_room(plan, seed)
         model = room.spec.compile()
-    top_view = render_top_view(model, room.width_m, room.depth_m)
+    top_view = render_top_view(model, room.width_m, room.depth_m, here=here)
     x_m, z_m = layout.origin_m
-    view = first_person_view(locations_m - np.array(layout.origin_m), headings_deg)
-    pictures, further = sense(model, view, sensors, title=plan.name, workers=workers, ray=ray, progress=progress)
+    (height_px, width_px), inside_m = size_px, locations_m - np.array(layout.origin_m)
+    view = first_person_view(inside_m, headings_deg, height_px=height_px, width_px=width_px)
+    pictures, further = sense(
+        model, view, sensors, title=plan.name, workers=workers, ray=ray, progress=progress, here=here
+    )
     return Scene(
         name=plan.name,
         observations=pictures,

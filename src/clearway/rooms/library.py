@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -13,7 +14,7 @@ from typing import Protocol
 from clearway import files, rooms
 from clearway.errors import SceneError
 from clearway.rooms import build as building
-from clearway.rooms.build import build_floor_plan, build_scene, scene_name, shaping_versions
+from clearway.rooms.build import PICTURE_SIZE_PX, build_floor_plan, build_scene, scene_name, shaping_versions
 from clearway.scenes import floor_plans, grid
 from clearway.scenes import sensors as sensing
 from clearway.scenes.floor_plans import FloorPlan
@@ -71,6 +72,7 @@ def cached_plan_scene(
     seed: int = 0,
     *,
     sensors: Sequence[str] = (RGB,),
+    size_px: tuple[int, int] = PICTURE_SIZE_PX,
     workers: int | None = None,
     ray: str | None = None,
     progress: bool = False,
@@ -79,8 +81,10 @@ def cached_plan_scene(
 
     Args and errors: those of `build_floor_plan`.
     """
-    make = partial(build_floor_plan, plan, seed, sensors=sensors, workers=workers, ray=ray, progress=progress)
-    return _cached(plan_path(plan, seed, sensors), plan.name, make)
+    make = partial(
+        build_floor_plan, plan, seed, sensors=sensors, size_px=size_px, workers=workers, ray=ray, progress=progress
+    )
+    return _cached(plan_path(plan, seed, sensors, size_px), plan.name, make)
 
 
 def scene_path(name: str, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
@@ -88,10 +92,20 @@ def scene_path(name: str, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
     return _path_of(scene_name(name, seed), {"room": name, "seed": seed, "sensors": sorted(sensors)})
 
 
-def plan_path(plan: FloorPlan, seed: int, sensors: Sequence[str] = (RGB,)) -> Path:
+def plan_path(
+    plan: FloorPlan, seed: int, sensors: Sequence[str] = (RGB,), size_px: tuple[int, int] = PICTURE_SIZE_PX
+) -> Path:
     """Where the cache keeps the furnished room of a floor plan as some sensors see it."""
-    shape = {"cells": plan.cells.tolist(), "blocked": plan.blocked_edges.tolist(), "cell_size_m": plan.cell_size_m}
-    return _path_of(plan.name, {"plan": plan.name, "seed": seed, "sensors": sorted(sensors), **shape})
+    shape = {
+        "cells": plan.cells.tolist(),
+        "blocked": plan.blocked_edges.tolist(),
+        "cell_size_m": plan.cell_size_m,
+        "walls": plan.walls.tolist(),
+        "doors": plan.doors.tolist(),
+        "areas": [asdict(area) for area in plan.areas],
+    }
+    asked = {"plan": plan.name, "seed": seed, "sensors": sorted(sensors), "size_px": size_px}
+    return _path_of(plan.name, {**asked, **shape})
 
 
 def _path_of(title: str, shaped_by: Mapping[str, object]) -> Path:

@@ -38,6 +38,7 @@ def render(
     ray: str | None = None,
     progress: bool = False,
     label: str = "rendering",
+    here: bool = False,
 ) -> np.ndarray:
     """The pictures of a view, as its `empty_pictures` has them, the same whoever takes them.
 
@@ -48,17 +49,19 @@ def render(
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show a progress bar, if standard error is a terminal.
         label: what the progress bar says.
+        here: this process renders, and needs `renderer_environment`; workers and ray do not count.
 
     Raises:
         RenderError: a machine has no OpenGL backend that works, or a renderer process died.
         RunError: Ray is not installed, or the cluster cannot be reached.
     """
     pictures = view.empty_pictures(len(view.shots))
-    count = None if ray is not None else _process_count(workers, len(pictures))
+    count = None if ray is not None or here else _process_count(workers, len(pictures))
+    workers, ray = (None, None) if here else (count or workers, ray)
     size = RAY_SHARE_SHOTS if count is None else _share_size(len(pictures), count)
     with (
         picture_progress(label, len(pictures), progress) as show_done,
-        workers_for(_work(model, view, count), workers=count or workers, ray=ray) as crew,
+        workers_for(_work(model, view, count), workers=workers, ray=ray) as crew,
     ):
         done = 0
         for share in crew.results(_shares(view.shots, size)):
@@ -92,7 +95,7 @@ def _work(model: mujoco.MjModel, view: View, processes: int | None) -> Work[Came
     """Rendering by so many processes of this machine, or on a cluster (None)."""
     lens = {name: value for name, value in vars(view).items() if name != "shots"}
     set_up = partial(open_camera, lens, binary_model(model))
-    threads = 1 if processes is None else max(1, _core_count() // processes)
+    threads = 1 if processes is None else max(1, core_count() // processes)
     return Work(set_up, take, _died, environment=renderer_environment(threads), keeps_messages=True)
 
 
@@ -107,7 +110,7 @@ def _process_count(workers: int | None, shots: int) -> int:
     """Number of processes for so many shots, 1 or more."""
     if workers is not None and workers < 1:
         raise RenderError(f"{workers} renderer processes cannot render; ask for 1 or more")
-    return max(1, min(workers or _core_count(), MOST_WORKERS, shots))
+    return max(1, min(workers or core_count(), MOST_WORKERS, shots))
 
 
 def _share_size(shots: int, processes: int) -> int:
@@ -119,6 +122,6 @@ def _shares(shots: Sequence[Shot], size: int) -> Iterator[Sequence[Shot]]:
     return (shots[first : first + size] for first in range(0, len(shots), size))
 
 
-def _core_count() -> int:
+def core_count() -> int:
     """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

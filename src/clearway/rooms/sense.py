@@ -26,6 +26,7 @@ def sense(
     workers: int | None = None,
     ray: str | None = None,
     progress: bool = False,
+    here: bool = False,
 ) -> tuple[np.ndarray, tuple[Readings, ...]]:
     """What the sensors see from every shot of a view.
 
@@ -34,7 +35,7 @@ def sense(
         view: the shots and the lens, the same for all sensors.
         sensors: names that passed `sensors.check_names`.
         title: of the room, for progress bars.
-        workers, ray, progress: see `render`.
+        workers, ray, progress, here: see `render`.
 
     Returns:
         pictures: (shots, height_px, width_px, 3) uint8 RGB.
@@ -47,7 +48,7 @@ def sense(
     for name in (RGB, *(name for name in sensors if name != RGB)):
         label = f"rendering {title}" if name == RGB else f"rendering {title}, {name}"
         one = replace(view, sensor=name)
-        taken[name] = render(model, one, workers=workers, ray=ray, progress=progress, label=label)
+        taken[name] = render(model, one, workers=workers, ray=ray, progress=progress, label=label, here=here)
     pictures = taken.pop(RGB)
     further = (Readings(SENSORS[name](view.height_px, view.width_px), raw) for name, raw in taken.items())
     return pictures, tuple(further)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -40,6 +40,24 @@ class Column:
         }[side]
 
 
+@dataclass(frozen=True)
+class Face:
+    """A face of a wall inside the room, as far as it goes straight on.
+
+    Attributes:
+        at: the middle of its lower edge on the floor, facing away from the wall.
+        length_m: how long it is.
+        bottom_m: where it begins; above 0 over a door.
+        ends: how boards along it end at the frame's -x and +x: 1 beyond it, over the end of the next face's board, -1
+            before the next face's board, 0 at its end.
+    """
+
+    at: Frame
+    length_m: float
+    bottom_m: float = 0.0
+    ends: tuple[int, int] = (0, 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Finish:
     """What the shell is covered with; every picture is (height, width, 3) at PIXELS_PER_METRE, row 0 at the bottom.
@@ -49,6 +67,7 @@ class Finish:
         ceiling: colour of the ceiling.
         walls: the picture of each side, as wide and high as the wall.
         partitions: one picture for all columns, at least as wide as their widest side.
+        faces: a picture for each face, at least as wide as the room's longest wall.
         skirting: material of the skirting boards, or None for tiles down to the floor.
         cornice: material of the cornices, or None.
     """
@@ -57,6 +76,7 @@ class Finish:
     ceiling: np.ndarray = field(repr=False)
     walls: Mapping[str, np.ndarray] = field(repr=False)
     partitions: np.ndarray | None = field(default=None, repr=False)
+    faces: Sequence[np.ndarray] = field(default=(), repr=False)
     skirting: str | None = "trim"
     cornice: str | None = "trim"
 
@@ -160,6 +180,52 @@ def _add_column(room: Room, number: int, column: Column, finish: Finish) -> None
             room.box(face, (0, reach + 0.008, 0), (length + 0.032, 0.016, 0.09), finish.skirting, 0.004)
     if height < room.height_m:
         room.box(frame, (0, 0, height), (width + 0.04, depth + 0.04, 0.03), "trim", 0.008)
+
+
+def add_faces(
+    room: Room, faces: Sequence[Face], cornices: Sequence[Face], columns: Sequence[Column], finish: Finish
+) -> None:
+    """The visible walls inside the room, where faces show that columns make together; call it with looks only.
+
+    Args:
+        room: where to.
+        faces: that show.
+        cornices: faces as they are under the ceiling.
+        columns: what stops light.
+        finish: with a picture for each face.
+    """
+    for column in columns:
+        room.shadow_box(*_column_box(room, column))
+    for number, (face, picture) in enumerate(zip(faces, finish.faces, strict=True)):
+        tall_m = room.height_m - face.bottom_m
+        corner, other = (face.at.point(x_m, 0, face.bottom_m) for x_m in (face.length_m / 2, -face.length_m / 2))
+        along = (other - corner) / face.length_m
+        start_m = float(corner @ along) if along.sum() > 0 else float(corner @ along) + _extent_m(room, along)
+        first, low = min(pixels(start_m), picture.shape[1] - pixels(face.length_m)), pixels(face.bottom_m)
+        albedo = picture[low if face.bottom_m else 0 :, max(first, 0) : max(first, 0) + pixels(face.length_m)]
+        group = CEILING_GROUP if face.bottom_m else SEEN_GROUP  # the view from above shows the way through
+        _surface(room, f"face {number}", corner, other - corner, np.array([0, 0, tall_m]), albedo, group)
+        if finish.skirting and not face.bottom_m:
+            _add_board(room, face, (0.016, 0.09), 0.0, finish.skirting, 0.004, SEEN_GROUP)
+    for face in cornices if finish.cornice else ():
+        _add_board(room, face, (0.04, 0.06), room.height_m - 0.06, str(finish.cornice), 0.015, CEILING_GROUP)
+
+
+def _extent_m(room: Room, along: np.ndarray) -> float:
+    """Length of the room along a horizontal axis."""
+    return room.width_m if abs(along[0]) > 0.5 else room.depth_m
+
+
+def _add_board(
+    room: Room, face: Face, size_m: tuple[float, float], z_m: float, material: str, bevel_m: float, group: int
+) -> None:
+    """A board (thick, high) along a face."""
+    thick_m, high_m = size_m
+    left_m, right_m = (end * thick_m for end in face.ends)
+    length_m = face.length_m + left_m + right_m
+    if length_m > thick_m:
+        place = ((right_m - left_m) / 2, thick_m / 2, z_m)
+        room.box(face.at, place, (length_m, thick_m, high_m), material, bevel_m, group=group)
 
 
 def _piece_of(picture: np.ndarray, width_m: float, height_m: float, shift_px: int) -> np.ndarray:

@@ -17,7 +17,12 @@ ABOVE_M = 10.0  # where the camera hangs; the picture is orthographic, so the he
 
 
 def render_top_view(
-    model: mujoco.MjModel, width_m: float, depth_m: float, moved_m: tuple[tuple[float, float, float], ...] = ()
+    model: mujoco.MjModel,
+    width_m: float,
+    depth_m: float,
+    moved_m: tuple[tuple[float, float, float], ...] = (),
+    *,
+    here: bool = False,
 ) -> TopView:
     """The floor from x = 0 to `width_m` and z = 0 to `depth_m`, rounded to whole pixels, seen from above.
 
@@ -25,11 +30,13 @@ def render_top_view(
         model: the compiled room.
         width_m, depth_m: size of the floor.
         moved_m: where its loose pieces stand, see `camera.Shot`.
+        here: see `render`.
 
     Raises:
         RenderError: this machine has no OpenGL backend that works.
     """
-    return render_from_above(model, (0.0, 0.0), (width_m, depth_m), ABOVE_M, PIXELS_PER_M, (SEEN_GROUP,), moved_m)
+    size_m, groups = (width_m, depth_m), (SEEN_GROUP,)
+    return render_from_above(model, (0.0, 0.0), size_m, ABOVE_M, PIXELS_PER_M, groups, moved_m, here=here)
 
 
 def render_from_above(
@@ -40,6 +47,8 @@ def render_from_above(
     pixels_per_m: float,
     groups: tuple[int, ...],
     moved_m: tuple[tuple[float, float, float], ...] = (),
+    *,
+    here: bool = False,
 ) -> TopView:
     """A rectangle of floor, rounded to whole pixels, seen from straight above.
 
@@ -51,6 +60,7 @@ def render_from_above(
         pixels_per_m: scale.
         groups: the geom groups that show.
         moved_m: where loose pieces stand, see `camera.Shot`.
+        here: see `render`.
 
     Raises:
         RenderError: this machine has no OpenGL backend that works.
@@ -67,7 +77,7 @@ def render_from_above(
         groups=groups,
     )
     return TopView(
-        image=render(model, view, workers=1)[0],
+        image=render(model, view, workers=1, here=here)[0],
         x_min_m=middle_x_m - half_x_m,
         x_max_m=middle_x_m + half_x_m,
         z_min_m=middle_z_m - half_z_m,

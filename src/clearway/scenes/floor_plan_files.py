@@ -2,7 +2,7 @@
 
 .npz  NumPy arrays, one a plan, named by it: (C, 2) whole numbers, x and z of each reachable cell; or a bool map (X, Z).
 .csv  Either the header "x,z" and a line for each reachable cell, or a map of 0 (blocked) and 1 (reachable).
-.txt  A map in characters: "#" is blocked, "." can be reached.
+.txt  A map in characters: "#" is blocked, "." can be reached, "W" is a wall up to the ceiling, "D" a door in it.
 
 Maps in .csv and .txt files are seen from above: the first line is the far end (largest z), the first column the
 smallest x; the last line is z = 0, the first column x = 0.
@@ -23,9 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan
+from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan, grid_from_above
 
-BLOCKED_LETTER, FREE_LETTER = "#", "."
 SUFFIXES = (".npz", ".csv", ".txt")
 MAX_BYTES = 8 * 1024**2  # of a text file, or of an unpacked array
 PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")  # of a plan, which becomes the name of a file
@@ -93,11 +92,12 @@ def _read_plan(
     if not PLAIN_NAME.fullmatch(chosen):
         remedy = "Use letters, digits, spaces, points and dashes alone"
         raise SceneError(path, f"the plan's name {chosen[:100]!r} is no name for a file", remedy)
+    if path.suffix == ".txt":
+        return FloorPlan.of_text(chosen, _read_text(path), cell_size_m=cell_size_m, source=str(path))
     if archive is not None:
         values, dataset = _read_array(path, archive, chosen), chosen
     else:
-        text, dataset = _read_text(path), ""
-        values = _csv_values(path, text) if path.suffix == ".csv" else _character_map(path, text)
+        values, dataset = _csv_values(path, _read_text(path)), ""
     if values.dtype == np.bool_ and values.ndim == 2:
         return FloorPlan.of_map(chosen, values, cell_size_m=cell_size_m, source=str(path), dataset=dataset)
     return FloorPlan(chosen, values, cell_size_m=cell_size_m, source=str(path), dataset=dataset)
@@ -169,7 +169,7 @@ def _csv_values(path: Path, lines: list[str]) -> np.ndarray:
     rows = [[word.strip() for word in line.split(",")] for line in lines]
     if rows[0] == ["x", "z"]:
         return np.array([_cell(path, number, row) for number, row in enumerate(rows[1:], 2)], np.int64).reshape(-1, 2)
-    return _map_from_above(path, rows, "0", "1")
+    return grid_from_above(path, rows, {"0": "blocked", "1": "reachable"}) == "1"
 
 
 def _cell(path: Path, number: int, row: list[str]) -> tuple[int, int]:
@@ -177,21 +177,3 @@ def _cell(path: Path, number: int, row: list[str]) -> tuple[int, int]:
         problem = f"line {number} is {','.join(row)[:40]!r}, expected two whole numbers, x and z"
         raise SceneError(path, problem, "Write one cell a line")
     return int(row[0]), int(row[1])
-
-
-def _character_map(path: Path, lines: list[str]) -> np.ndarray:
-    return _map_from_above(path, [list(line) for line in lines], BLOCKED_LETTER, FREE_LETTER)
-
-
-def _map_from_above(path: Path, rows: list[list[str]], blocked: str, free: str) -> np.ndarray:
-    """The map (X, Z) bool of rows of words, far end first."""
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(rows[0]):
-            problem = f"line {number} has {len(row)} cells, the first has {len(rows[0])}"
-            raise SceneError(path, problem, "Give all lines of a map the same length")
-        strange = next((column for column, word in enumerate(row) if word not in (blocked, free)), None)
-        if strange is not None:
-            problem = f"line {number}, column {strange + 1} holds {row[strange][:20]!r}"
-            raise SceneError(path, problem, f"Write {blocked} for blocked and {free} for reachable")
-    seen_from_above = np.array(rows) == free  # (Z, X), far end first
-    return seen_from_above[::-1].T

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.grid import HEADING_COUNT, neighbour_pairs, pose_graph
+from clearway.scenes.grid import HEADING_COUNT, connected_parts, neighbour_pairs, pose_graph
 from clearway.scenes.made_up import check_made_up, made_up_encoder, made_up_features
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES
@@ -27,8 +29,9 @@ PLAN_NOTE = "plan"  # in its notes: walls, doors and areas
 REBUILD = "Make the scene of its plan again"
 CELL_SIZE_M = 0.25  # of the published AI2-THOR plans
 MAX_CELLS = MAX_STATES // HEADING_COUNT
-
-
+MAX_WALLS = 1 << 18
+BLOCKED_LETTER, FREE_LETTER, WALL_LETTER, DOOR_LETTER = "#", ".", "W", "D"  # of a map in characters
+LETTERS = {BLOCKED_LETTER: "blocked", FREE_LETTER: "reachable", WALL_LETTER: "a wall", DOOR_LETTER: "a door in it"}
 USES = ("bathroom", "bedroom", "kitchen", "living room", "corridor")
 
 
@@ -94,8 +97,7 @@ class FloorPlan:
             self._refuse(f"{shape}, expected whole numbers (cells, 2)", "Give x and z of every reachable cell")
         if not 1 <= len(self.cells) <= MAX_CELLS:
             self._refuse(f"has {len(self.cells)} reachable cells, expected 1 to {MAX_CELLS}", "Give another plan")
-        far = MAX_COORDINATE_M / self.cell_size_m
-        if (self.cells > far).any() or (self.cells < -far).any():
+        if self._is_far(self.cells):
             self._refuse(f"has cells more than {MAX_COORDINATE_M:,.0f} m away", "Move the plan near its origin")
         distinct, times = np.unique(self.cells, axis=0, return_counts=True)
         if times.max() > 1:
@@ -118,6 +120,46 @@ class FloorPlan:
         assert reachable.ndim == 2 and reachable.dtype == np.bool_, (reachable.shape, reachable.dtype)
         blocked = _no_edges() if blocked_edges is None else blocked_edges
         return cls(name, np.argwhere(reachable), blocked, cell_size_m, source, dataset)
+
+    @classmethod
+    def of_text(
+        cls,
+        name: str,
+        lines: Sequence[str],
+        *,
+        areas: tuple[Area, ...] = (),
+        cell_size_m: float = CELL_SIZE_M,
+        source: str = "",
+    ) -> FloorPlan:
+        """The plan of a map in characters (`LETTERS`), as seen from above.
+
+        The first line is the far end, the largest z; the last line is z = 0, the first column x = 0.
+
+        Raises:
+            SceneError: the lines differ in length or hold another character, or it is no plan.
+        """
+        letters = grid_from_above(source or name, [list(line) for line in lines], LETTERS)
+        cells = np.argwhere((letters == FREE_LETTER) | (letters == DOOR_LETTER))
+        return cls(
+            name,
+            cells,
+            cell_size_m=cell_size_m,
+            source=source,
+            walls=np.argwhere(letters == WALL_LETTER),
+            doors=np.argwhere(letters == DOOR_LETTER),
+            areas=areas,
+        )
+
+    @property
+    def has_walls(self) -> bool:
+        """Whether the plan says where walls are; else they follow from its cells."""
+        return len(self.walls) + len(self.doors) > 0
+
+    @property
+    def parts(self) -> list[np.ndarray]:
+        """The cells of each part that can be reached in itself, (cells, 2) each, the largest part first."""
+        part, sizes = connected_parts(len(self.cells), self.edges)
+        return [self.cells[part == number] for number in range(len(sizes))]
 
     @property
     def edges(self) -> np.ndarray:
@@ -144,6 +186,10 @@ class FloorPlan:
             if part.ndim != 2 or part.shape[1] != 2 or part.dtype.kind not in "iu":
                 shape = f"has {name}s of {part.dtype} and shape {part.shape}"
                 self._refuse(f"{shape}, expected whole numbers ({name}s, 2)", f"Give x and z of every {name}")
+            if len(part) > MAX_WALLS:
+                self._refuse(f"has {len(part)} {name}s, at most {MAX_WALLS} can be kept", "Give a smaller plan")
+            if self._is_far(part):
+                self._refuse(f"has {name}s more than {MAX_COORDINATE_M:,.0f} m away", "Move the plan near its origin")
             for cell in map(tuple, part.tolist()):
                 if (cell in cells) == (name == "wall"):
                     can = "that can be entered" if name == "wall" else "that cannot be entered"
@@ -152,8 +198,66 @@ class FloorPlan:
             if area.use not in USES or area.low[0] > area.high[0] or area.low[1] > area.high[1]:
                 self._refuse(f"has the area {area}", f"Give a use among {', '.join(USES)}, then low and high cell")
 
+    def _is_far(self, cells: np.ndarray) -> bool:
+        far = MAX_COORDINATE_M / self.cell_size_m
+        return bool((cells > far).any() or (cells < -far).any())
+
     def _refuse(self, problem: str, remedy: str) -> NoReturn:
         raise SceneError(self.source or self.name, problem, remedy, self.dataset)
+
+
+def grid_from_above(where: Path | str, rows: list[list[str]], words: Mapping[str, str]) -> np.ndarray:
+    """The map (X, Z) str of rows of words as seen from above, the far end first.
+
+    Args:
+        where: what errors name.
+        rows: of one length.
+        words: that may stand in it, and what each means.
+
+    Raises:
+        SceneError: there are no rows, they differ in length, or another word stands there.
+    """
+    if not rows or not rows[0]:
+        raise SceneError(where, "is empty", "Give a map or a list of cells")
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(rows[0]):
+            problem = f"line {number} has {len(row)} cells, the first has {len(rows[0])}"
+            raise SceneError(where, problem, "Give all lines of a map the same length")
+        strange = next((column for column, word in enumerate(row) if word not in words), None)
+        if strange is not None:
+            problem = f"line {number}, column {strange + 1} holds {row[strange][:20]!r}"
+            *most, last = (f"{word} for {meaning}" for word, meaning in words.items())
+            raise SceneError(where, problem, f"Write {', '.join(most)} and {last}")
+    return np.array(rows)[::-1].T
+
+
+def parts_apart(plan: FloorPlan, most: int = 6) -> str:
+    """One line on the parts of a plan that cannot be reached from its largest; empty where there are none.
+
+    Args:
+        plan: the plan.
+        most: parts, and cells of each part, that are named; the rest are counted.
+    """
+    _, *others = plan.parts
+    if not others:
+        return ""
+    named = [f"{_cell_count(len(part))} at {_first_of(list(map(str, _tuples(part))), most)}" for part in others[:most]]
+    if len(others) > most:
+        named.append(f"{_cell_count(sum(map(len, others[most:])))} in {len(others) - most} more")
+    which = "1 part cannot be" if len(others) == 1 else f"{len(others)} parts cannot be"
+    return f"{plan.name}: {which} reached from the largest part (kept in the scene): {'; '.join(named)}"
+
+
+def _cell_count(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"
+
+
+def _first_of(words: list[str], most: int) -> str:
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+
+
+def _tuples(cells: np.ndarray) -> list[tuple[int, int]]:
+    return [(x, z) for x, z in cells.tolist()]
 
 
 def plan_poses(plan: FloorPlan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

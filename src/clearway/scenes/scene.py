@@ -14,7 +14,7 @@ import numpy as np
 
 from clearway.errors import SceneError, printable
 from clearway.scenes import graph as graphs
-from clearway.scenes.sensors import RGB, Readings, Sensor, rgb
+from clearway.scenes.sensors import RGB, SENSORS, Readings, Sensor, rgb
 
 
 class Observations(Protocol):
@@ -146,9 +146,12 @@ class Scene:
         for readings in self.further:
             if readings.sensor.name == name:
                 return readings
-        found = ", ".join(sensor.name for sensor in self.sensors) or "nothing"
-        remedy = f"Build or import it again with --sensors rgb {name}"
-        raise SceneError(self.name, f"has {found}, but no {name}", remedy)
+        found = ", ".join(sensor.name for sensor in self.sensors)
+        problem = f"has {found}, but no {name}" if found else f"has no pictures, so no {name}"
+        remedy = f"Build or import it again with --sensors {' '.join(dict.fromkeys((RGB, name)))}"
+        if name not in SENSORS:
+            remedy = f"Choose among {found or ', '.join(SENSORS)}, or give a scene with it"
+        raise SceneError(self.name, problem, remedy)
 
     @property
     def state_count(self) -> int:

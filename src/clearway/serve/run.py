@@ -77,7 +77,7 @@ def run_service(agent: DeployedAgent, listener: socket.socket, token: str, limit
         DeployError: the agent takes no pictures.
     """
     service = Service(agent, limits)
-    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `pictures` refuses by a limit of our own
+    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `decoding` refuses by a limit of our own
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     http, sockets = impatient(limits.patience_s)
     serve(

@@ -59,7 +59,8 @@ class Service:
         """Begin an episode with the picture file of a target; on a Fault the session stays as it was."""
         async with session.turn:
             picture = await self._decoded(content)
-            session.state, session.steps = await self.batcher.reset(picture, next(session.seeds)), 0
+            session.state = await self.batcher.reset(picture, session.seed)
+            session.steps, session.seed = 0, next(session.seeds)
 
     async def step(self, session: Session, content: bytes) -> Answer:
         """What to do, seeing a picture file; on a Fault, or cancelled, the session stays as it was."""

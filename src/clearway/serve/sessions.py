@@ -26,7 +26,8 @@ class Session:
     Attributes:
         id: what clients call it by; nobody can guess another's.
         selection: how its actions are chosen.
-        seeds: of its episodes, one after the other.
+        seed: of its next episode, (1,) int64.
+        seeds: of the episodes after that, one after the other.
         state: what the agent remembers, of one row; None until there is a target.
         steps: answered since the target was set.
         used_s: when it was last asked for, on the clock of its `Sessions`.
@@ -35,6 +36,7 @@ class Session:
 
     id: str
     selection: Selection
+    seed: np.ndarray
     seeds: Iterator[np.ndarray]
     used_s: float
     state: State | None = None
@@ -69,7 +71,8 @@ class Sessions:
             raise Fault(
                 "too_many_sessions", f"{self._limits.sessions} sessions are open. Close one, or try again later"
             )
-        made = Session(secrets.token_urlsafe(ID_BYTES), selection, episode_seeds(seed), self._clock())
+        seeds = episode_seeds(seed)
+        made = Session(secrets.token_urlsafe(ID_BYTES), selection, next(seeds), seeds, self._clock())
         self._open[made.id] = made
         return made
 

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from clearway.agents.selection import selecting
 from clearway.errors import ClearwayError
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
@@ -35,7 +34,7 @@ class Viewing:
     """One page's episode.
 
     Args:
-        stage: scenes and agents, shared between sessions and never changed.
+        stage: scenes and agents, shared between pages and never changed.
     """
 
     def __init__(self, stage: Stage) -> None:
@@ -85,8 +84,17 @@ class Viewing:
         recorded = [actions_of(walk) for walk in episode.walks] + [[]] * MOST_WALKERS
         walkers = []
         for shown, placed, actions in zip(self.stage.agents, worlds, recorded, strict=False):
-            agent = selecting(shown.on_poses(placed), episode.selection, placed)
-            walkers.append(Walker(placed, 0, start, shown.reward, seed=episode.seed, agent=agent, recorded=actions))
+            walk = Walker(
+                placed,
+                0,
+                start,
+                shown.reward,
+                seed=episode.seed,
+                agent=shown.on_poses(placed),
+                selection=episode.selection,
+                recorded=actions,
+            )
+            walkers.append(walk)
         if episode.drive:
             walk = Walker(
                 worlds[-1], 0, start, self.stage.reward, seed=episode.seed, agent=None, recorded=recorded[len(walkers)]

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from clearway.agents.agent import POSE, Agent, Decisions
+from clearway.agents.selection import ActionSelection, selecting
 from clearway.reward import Reward
 from clearway.view.episode import MOST_STEPS
 from clearway.world.navigation import Navigation
@@ -58,6 +59,7 @@ class Walker:
         reward: what it earns.
         seed: of sampled actions.
         agent: who chooses, by the pose; None for the user.
+        selection: how its actions are chosen.
         recorded: actions that it takes before it chooses by itself.
     """
 
@@ -70,17 +72,20 @@ class Walker:
         *,
         seed: int,
         agent: Agent | None,
+        selection: ActionSelection = "sampled",
         recorded: Sequence[int] = (),
     ) -> None:
         assert agent is None or set(agent.sees) <= {POSE}, "what walks in the viewer knows its pose"
         seeds = torch.tensor([seed])
         self.world, self.target, self.agent = world, target, agent
+        self.chooser = agent and selecting(agent, selection, world)
         self.offset = int(world.scene_offset[world.target_scene[target]])
         self.states_here = int(world.scene_offset[world.target_scene[target] + 1]) - self.offset
         self.to_go = world.distance_table()
         self.env = Navigation(world, reward, seeds, history_length=1, reward_dtype=torch.float64)
         self.env.reset(target=torch.tensor([target]), start=torch.tensor([start + self.offset]))
-        self.memory = agent.reset({POSE: world.target_state[[target]].numpy()}, seeds.numpy()) if agent else {}
+        goal = {POSE: world.target_state[[target]].numpy()}
+        self.memory = self.chooser.reset(goal, seeds.numpy()) if self.chooser else {}
         self.recorded = list(recorded)
         reached = int(self.env.state) == int(world.target_state[target])
         zone = int(world.zone[self.env.state])
@@ -132,8 +137,8 @@ class Walker:
     def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Standing:
         before = self.steps[-1] if action is not None else None
         probabilities = value = following = None
-        if self.agent is not None:
-            decisions, self.memory = self.agent.act({POSE: self.env.state.numpy()}, self.memory)
+        if self.chooser is not None:
+            decisions, self.memory = self.chooser.act({POSE: self.env.state.numpy()}, self.memory)
             value = None if decisions.value is None else float(decisions.value[0])
             if not reached:
                 told = decisions.probabilities

@@ -6,12 +6,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from clearway.rooms.plans.layout import GAP, Layout, Piece, lay_out
+from clearway.rooms.plans.layout import Layout, Piece, lay_out
+from clearway.rooms.plans.walls import GAP
 from clearway.rooms.shell import Column
-from clearway.scenes.floor_plans import FloorPlan
-from helpers.plan_maps import ELL, ISLAND, SINGLE, plan_of
+from clearway.scenes.floor_plans import Area, FloorPlan
+from helpers.plan_maps import ELL, ISLAND, SINGLE, plan_of, walled
 
 EXAMPLES = settings(max_examples=30, deadline=None, derandomize=True)
+
+
+WALLED_MAPS = (
+    st.integers(1, 7)
+    .flatmap(lambda width: st.lists(st.text("..##W", min_size=width, max_size=width), min_size=1, max_size=7))
+    .filter(lambda lines: "." in "".join(lines))
+)
 
 
 def laid_out(plan: FloorPlan, seed: int = 0) -> Layout:
@@ -128,6 +136,72 @@ def test_everything_keeps_its_distance_and_every_blocked_cell_is_covered(reachab
     blocked = layout.middles_m(np.argwhere(~layout.free))
     assert (distances_m(blocked, solids).min(axis=1) == 0).all()
     assert layout.free.sum() == len(plan.cells)
+
+
+def test_a_plan_with_walls_has_furniture_where_it_says_and_no_rim() -> None:
+    plan = walled()
+    layout = laid_out(plan)
+    # 7 x 3 cells of 0.5 m inside the walls, 0.2 cells to them
+    assert (layout.width_m, layout.depth_m) == pytest.approx((3.7, 1.7))
+    assert layout.origin_m == pytest.approx((0.15, 0.15)) and layout.first_cell == (1, 1)
+    low, high = sorted(layout.pieces, key=lambda piece: piece.at.y_m)
+    # two cells before the outer wall and the inner one, 0.1 m beyond them up to the walls and 0.1 m off the free cells
+    assert rectangle_of(low) == pytest.approx(np.array([[0.7, 0.0], [1.7, 0.5]]))
+    assert (low.room, high.room) == (1, 2) and low.back_at_wall and high.back_at_wall
+
+
+def test_furniture_knows_a_wall_inside_behind_it() -> None:
+    layout = laid_out(walled("den", ("......", "......", "WWWW..", "..#W..", "......")))
+    (piece,) = layout.pieces
+    assert piece.back_at_wall and piece.at.yaw_deg in (90.0, 180.0)
+
+
+def test_pictures_may_hang_on_walls_inside_but_not_in_doorways_and_windows_only_outside() -> None:
+    layout = laid_out(walled())
+    inner = [stretch for stretch in layout.stretches if not stretch.outer]
+    at_wall = sorted((round(s.at.x_m, 6), round(s.at.y_m, 6), round(s.length_m, 6), s.room, s.piece) for s in inner)
+    # the wall's faces are at x = 1.7 and 2.0; beside the door 0.1 m and 0.1 m of frame are left out
+    assert [row[:2] for row in at_wall] == [(1.7, 0.25), (1.7, 1.45), (2.0, 0.25), (2.0, 1.45)]
+    assert all(row[2] == pytest.approx(0.3) for row in at_wall)
+    assert [row[3] for row in at_wall] == [1, 1, 2, 2] and [row[4] is None for row in at_wall] == [0, 1, 1, 0]
+
+
+def test_a_wall_drawn_around_a_notch_is_an_outer_wall() -> None:
+    layout = laid_out(walled("ell", ("WWWWWWW", "W..WWWW", "W.....W", "WWWWWWW")))
+    assert all(stretch.outer for stretch in layout.stretches)
+
+
+def test_pieces_and_stretches_know_their_area_and_areas_meet_in_the_wall() -> None:
+    areas = (Area("kitchen", (1, 1), (3, 3)), Area("bathroom", (5, 1), (7, 3)))
+    layout = laid_out(walled(areas=areas))
+    assert [piece.area for piece in sorted(layout.pieces, key=lambda piece: piece.at.x_m)] == list(areas)
+    assert {stretch.area for stretch in layout.stretches} == set(areas)
+    x_m = np.array([0.0, 1.7, 1.8, 1.9, 2.0, 3.7])  # the wall's cells span 1.6 to 2.1
+    assert layout.area_at(x_m, np.full(6, 0.2)).tolist() == [0, 0, 0, 1, 1, 1]
+    assert (laid_out(walled()).area_map == -1).all()
+
+
+@EXAMPLES
+@given(WALLED_MAPS, st.integers(0, 9), st.sampled_from([0.25, 0.5, 1.3]))
+def test_walls_and_furniture_fill_what_is_not_free_and_nothing_lies_in_another(lines, seed, cell_size_m) -> None:
+    plan = FloorPlan.of_text("any", lines, cell_size_m=cell_size_m)
+    if not plan.has_walls:
+        return
+    layout = laid_out(plan, seed)
+    solids = np.array([*map(column_of, layout.walls), *map(rectangle_of, layout.pieces)]).reshape(-1, 2, 2)
+    blocked = layout.middles_m(np.argwhere(~layout.free))
+    assert (distances_m(blocked, solids).min(axis=1, initial=np.inf) == 0).all()
+    for number, (low, high) in enumerate(solids):
+        overlap_m = np.minimum(high, solids[:, 1]) - np.maximum(low, solids[:, 0])
+        overlap_m[number] = -1
+        assert (overlap_m.min(axis=1) < 1e-9).all()
+
+
+def test_rooms_of_plans_without_walls_stay_as_they_were() -> None:
+    layout = laid_out(plan_of("ell", ELL), 5)
+    numbers = [[piece.at.x_m, piece.at.y_m, piece.at.yaw_deg, piece.width_m, piece.depth_m] for piece in layout.pieces]
+    assert np.sum(np.round(numbers, 6), axis=0) == pytest.approx([12.955, 11.105, 90.0, 9.69, 4.09])
+    assert not layout.faces and not layout.doorways and {piece.room for piece in layout.pieces} == {0}
 
 
 def test_the_seed_chooses_the_walls_with_furniture() -> None:

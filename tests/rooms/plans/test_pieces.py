@@ -1,17 +1,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from clearway.rooms.frame import Frame
+from clearway.rooms.frame import Frame, rotation
 from clearway.rooms.groups import OBSTACLE_GROUP
 from clearway.rooms.plans.layout import Piece
-from clearway.rooms.plans.pieces import ANYWHERE, LAST_RESORT, THEMES, Kind, furnish
+from clearway.rooms.plans.pieces import ANYWHERE, BY_USE, FIRST, LAST_RESORT, THEMES, Kind, furnish
 from clearway.rooms.room import Room
+from clearway.scenes.floor_plans import USES, Area
 
-KINDS = sorted({*(kind for theme in THEMES for kind in theme), *ANYWHERE, LAST_RESORT}, key=lambda kind: str(kind))
+ALL = (*THEMES, *BY_USE.values(), ANYWHERE, (LAST_RESORT,))
+KINDS = sorted({kind for kinds in ALL for kind in kinds}, key=lambda kind: str(kind))
 NEAREST_M = 0.35
 MIDDLE_M = 5.0
 
@@ -33,7 +36,8 @@ def test_every_kind_fills_its_place_and_is_as_high_as_it_says(kind: Kind) -> Non
         kind.place(room, Frame(MIDDLE_M, MIDDLE_M), *size_m)
         for geom in room.spec.geoms:
             if geom.group == OBSTACLE_GROUP:
-                reach_m = np.abs(geom.pos[:2] - MIDDLE_M) + geom.size[:2]
+                turned = np.abs(rotation(np.array(geom.quat))[:2, :2])
+                reach_m = np.abs(geom.pos[:2] - MIDDLE_M) + turned @ geom.size[:2]
                 assert (reach_m <= np.array(size_m) / 2 + 1e-6).all()
         tops_m, reaches_m = [], []
         for part in room.parts:
@@ -65,6 +69,44 @@ def test_there_is_one_bed_at_most() -> None:
 def test_a_place_that_nothing_fits_gets_a_cupboard() -> None:
     _, tops_m = room_with([place(5.0, 4.0)])
     assert tops_m == [LAST_RESORT.top_m]
+
+
+def test_every_use_has_furniture_of_its_own() -> None:
+    assert set(BY_USE) == set(USES)
+    for use, kinds in BY_USE.items():
+        area = Area(use, (0, 0), (9, 9))
+        places = [replace(place(1.5, 0.5, True), area=area)] * 6
+        _, tops_m = room_with(places)
+        assert set(tops_m) <= {kind.top_m for kind in kinds}, use
+
+
+@pytest.mark.parametrize(("use", "material"), [("bathroom", "porcelain"), ("bedroom", "duvet"), ("kitchen", "granite")])
+def test_what_makes_a_room_of_a_use_is_in_each_area_once(use: str, material: str) -> None:
+    areas = [Area(use, (0, 0), (4, 4)), Area(use, (5, 0), (9, 4))]
+    sizes_m = [(1.6, 0.5), (1.6, 1.0), (1.6, 2.0)]
+    places = [replace(place(*size_m, True), area=area) for area in areas for size_m in sizes_m]
+    for seed in range(4):
+        room, tops_m = room_with(places, seed, looks=True)
+        firsts = [top_m in {kind.top_m for kind in FIRST[use]} for top_m in tops_m]
+        assert any(firsts[:3]) and any(firsts[3:])
+        assert any(part.material == material for part in room.parts)
+
+
+def test_rooms_between_walls_have_themes_of_their_own() -> None:
+    def themes_in(seed: int) -> set[bool]:
+        rooms = []
+        for number in (1, 2, 3):
+            before = [replace(place(1.2, 0.5, True), room=earlier) for earlier in range(1, number)]
+            room, _ = room_with([*before, *[replace(place(1.2, 0.5, True), room=number)] * 9], seed, looks=True)
+            rooms.append(any(part.material == "granite" for part in room.parts))
+        return set(rooms)
+
+    assert {True, False} in [themes_in(seed) for seed in range(6)]
+
+
+def test_furniture_without_areas_stays_as_it_was() -> None:
+    places = [place(1.2, 0.5, True), place(0.8, 0.8), place(1.6, 1.6, True), place(0.3, 0.3)] * 3
+    assert room_with(places, 3)[1] == [0.9, 0.75, 1.25, 2.6, 1.9, 0.75, 1.25, 2.6, 2.0, 0.75, 1.25, 1.01]
 
 
 def test_the_seed_repeats_and_another_differs() -> None:

@@ -20,9 +20,9 @@ from clearway.rooms.plans import plan_room
 from clearway.rooms.plans.plan_room import build_plan_room, open_plan
 from clearway.rooms.render import render
 from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
-from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan
 from helpers.imported import imported_by
-from helpers.plan_maps import ELL, ISLAND, MAPS, plan_of
+from helpers.plan_maps import ELL, FLAT, ISLAND, MAPS, plan_of, walled
 
 EXAMPLES = settings(max_examples=25, deadline=None, derandomize=True)
 REAL_PLANS = Path(
@@ -57,6 +57,28 @@ def test_the_obstacles_leave_exactly_the_plan_open(name: str, cell_size_m: float
         assert_room_is_the_plan(plan_of(name, MAPS[name], cell_size_m=cell_size_m), seed)
 
 
+@pytest.mark.parametrize("cell_size_m", [0.2, 0.25, 0.5, 1.0, 2.0])
+def test_walls_and_doors_leave_exactly_the_plan_open(cell_size_m: float) -> None:
+    for plan in (walled("flat", FLAT, cell_size_m=min(cell_size_m, 1.5)), walled(cell_size_m=cell_size_m)):
+        for seed in range(2):
+            assert_room_is_the_plan(plan, seed)
+
+
+@EXAMPLES
+@given(
+    st.integers(1, 8)
+    .flatmap(lambda width: st.lists(st.text("..##WWD", min_size=width, max_size=width), min_size=1, max_size=8))
+    .filter(lambda lines: "." in "".join(lines)),
+    st.integers(0, 99),
+    st.sampled_from([0.2, 0.5, 2.0]),
+)
+def test_any_map_with_walls_and_doors_is_built_or_has_a_door_in_no_wall(lines, seed, cell_size_m) -> None:
+    try:
+        assert_room_is_the_plan(FloorPlan.of_text("any", lines, cell_size_m=cell_size_m), seed)
+    except SceneError as error:
+        assert "that is in no wall" in str(error)
+
+
 def test_a_blocked_edge_blocks_that_move_and_no_other() -> None:
     blocked = [[[0, 0], [0, 1]], [[1, 0], [1, 1]], [[4, 2], [5, 2]]]  # two side by side, one across
     for cell_size_m in (0.2, 0.5, 2.0):
@@ -89,6 +111,14 @@ def test_a_room_that_leaves_another_plan_open_is_not_passed_on(monkeypatch) -> N
         (plan_of("hall", ("." * 46,) * 46), 0, r"hall: has 2116 reachable cells, 2048 can be rendered"),
         (FloorPlan("long", np.array([[0, 0], [200, 0]])), 0, r"long: spans 50.2 x 0.2 m, 40 m to a side"),
         (FloorPlan("wide", np.array([[0, 0], [99, 99]])), 0, r"wide: spans 25.0 x 25.0 m, .* 400 square metres"),
+        (walled("maze", ("W.W.W.W.W.W",) * 9), -1, r"maze: the seed must be 0 or more"),
+        (
+            walled("cells", ("." + "W." * 20, "W" * 41, "." + "W." * 20)),
+            0,
+            r"cells: has 42 rooms between its walls, 40 can be lit. Give",
+        ),
+        (walled("far", ("." + "#" * 98 + "W",)), 0, r"far: spans 50.0 x 0.5 m, 40 m to a side"),
+        (walled("gate", ("...", ".D.")), 0, r"gate: has a door in the cell \(1, 0\) that is in no wall. Put walls"),
         (plan_of("ell", ELL), -1, r"ell: the seed must be 0 or more, found -1"),
     ],
 )
@@ -157,6 +187,60 @@ def test_a_blocked_move_shows_something_close_ahead(furnished: Furnished) -> Non
             ahead_m = furnished.seen_m(place_m, 90.0 - heading_deg, np.linspace(-29, 10, 14))
             assert ahead_m < 1.0, (x, z, heading_deg)  # two cells
     assert blocked == 4 * 3 + 4 + 2  # around, around the blocked cell, the edge from both its sides
+
+
+@pytest.fixture(scope="module")
+def two_rooms() -> Furnished:
+    plan = walled(areas=(Area("bathroom", (1, 1), (3, 3)), Area("kitchen", (5, 1), (7, 3))))
+    room, layout = build_plan_room(plan)
+    model = room.spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return Furnished(plan, model, data, plan.cells * plan.cell_size_m - np.array(layout.origin_m))
+
+
+def test_a_doorway_shows_with_jambs_and_a_wall_above_it(two_rooms: Furnished) -> None:
+    model, data = two_rooms.model, two_rooms.data
+    shown = np.array([0, 1, 1, 0, 0, 0], np.uint8)
+
+    def ahead_m(x_m: float, y_m: float, z_m: float) -> float:
+        """Distance to what is seen along x from a place of the room."""
+        hit = np.zeros(1, np.int32)
+        return mujoco.mj_ray(model, data, np.array([x_m, y_m, z_m]), np.array([1.0, 0, 0]), shown, 1, -1, hit)
+
+    # the wall's faces are at x = 1.7 and 2.0 (cells of 0.5 m, the floor starts 0.1 m before them), the door at y = 0.85
+    assert ahead_m(1.0, 0.85, 1.0) > 1.5 and ahead_m(1.0, 0.85, 1.95) > 1.5
+    assert ahead_m(1.0, 0.85, 2.3) == pytest.approx(0.7, abs=0.01)  # the wall above
+    assert ahead_m(1.0, 0.85, 2.08) == pytest.approx(0.7, abs=0.03)  # the architrave
+    for jamb_m in (0.85 - 0.33, 0.85 + 0.33):
+        assert ahead_m(1.0, jamb_m, 1.0) == pytest.approx(0.7, abs=0.03)
+    assert ahead_m(1.0, 1.4, 2.3) == pytest.approx(0.7, abs=0.06)  # the wall beside it
+
+
+def test_no_camera_stands_in_a_wall_or_a_frame(two_rooms: Furnished) -> None:
+    nearest_m = min(
+        two_rooms.seen_m(place_m, azimuth_deg, np.array([-25.0, 0.0, 25.0]))
+        for place_m in two_rooms.places_m
+        for azimuth_deg in range(0, 360, 30)
+    )
+    assert nearest_m > 0.2
+
+
+def test_both_rooms_are_lit_and_the_way_shows_from_above(two_rooms: Furnished) -> None:
+    places_m = two_rooms.places_m[[0, len(two_rooms.places_m) - 1]]
+    view = first_person_view(np.repeat(places_m, 4, axis=0), np.tile(list(STEPS), 2))
+    pictures = render(two_rooms.model, view, workers=1)
+    for picture in pictures.reshape(2, -1):
+        assert 70 < picture.mean() < 190
+    from_above = np.zeros(6, np.uint8)
+    from_above[SEEN_GROUP] = 1
+    seen_m = [
+        mujoco.mj_ray(
+            two_rooms.model, two_rooms.data, np.array([1.85, y_m, 9.0]), np.array([0, 0, -1.0]), from_above, 1, -1, hit
+        )
+        for y_m, hit in ((0.85, np.zeros(1, np.int32)), (1.4, np.zeros(1, np.int32)))
+    ]
+    assert seen_m == pytest.approx([9.0, 9.0 - 2.6], abs=0.03)  # the floor of the doorway, the top of the wall
 
 
 def real_plans() -> list[FloorPlan]:

@@ -11,6 +11,7 @@ import tyro
 
 from clearway.choices import SensorName
 from clearway.cli.arguments import check_at_least
+from clearway.cli.console import say
 from clearway.cli.imports.writing import Encoding, encode_and_write, place_name, write_scenes
 from clearway.errors import ClearwayError
 from clearway.ray_cluster import kept_connected
@@ -27,8 +28,8 @@ class ImportFloorPlan:
     """
 
     file: Annotated[Path, tyro.conf.Positional]
-    """A map seen from above in .txt (# blocked, . reachable) or .csv (0 blocked, 1 reachable), a list of cells in .csv
-    (header x,z), or NumPy arrays of cells in .npz, one a plan."""
+    """A map seen from above in .txt (# blocked, . reachable, W a wall, D a door in it) or .csv (0 blocked, 1
+    reachable), a list of cells in .csv (header x,z), or NumPy arrays of cells in .npz, one a plan."""
     out: Path
     """Folder for the scene files."""
     name: tuple[str, ...] = ()
@@ -47,17 +48,21 @@ class ImportFloorPlan:
     def run(self) -> None:
         """Make and write."""
         from clearway.scenes.floor_plan_files import read_floor_plans
-        from clearway.scenes.floor_plans import floor_plan_scene
+        from clearway.scenes.floor_plans import floor_plan_scene, parts_apart
 
         plans = read_floor_plans(self.file, self.name, cell_size_m=self.cell_size)
         if self.features is None:
             self._render(plans)
-            return
-        self.encoding.check_unused("--features makes features up. Leave out --features")
-        if self.sensors != type(self).sensors:
-            raise ClearwayError("--sensors says what to render, but --features renders nothing. Leave out one of them")
-        for plan in plans:
-            write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
+        else:
+            self.encoding.check_unused("--features makes features up. Leave out --features")
+            if self.sensors != type(self).sensors:
+                raise ClearwayError(
+                    "--sensors says what to render, but --features renders nothing. Leave out one of them"
+                )
+            for plan in plans:
+                write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
+        for apart in filter(None, map(parts_apart, plans)):  # last: a refusal is one line
+            say(apart)
 
     def _render(self, plans: Sequence[FloorPlan]) -> None:
         """Make rooms, encode their pictures and write."""

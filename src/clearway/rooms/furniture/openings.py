@@ -6,10 +6,14 @@ import numpy as np
 
 from clearway.rooms import artwork
 from clearway.rooms.frame import Frame
+from clearway.rooms.groups import CEILING_GROUP, SHELL_NAME
 from clearway.rooms.parts import Window
 from clearway.rooms.room import Room
 
 FRAME_M = 0.06
+CURTAIN_REACH_M = 0.38  # of a curtain's rail beyond the window
+ARCHITRAVE_M = (0.075, 0.02)  # broad, thick
+REVEAL_M = 0.008  # of a doorway's lining that its architrave leaves open
 
 
 def window(room: Room, at: Frame, width_m: float, height_m: float, curtains: bool = True, panes: int = 2) -> None:
@@ -39,7 +43,7 @@ def _curtains(room: Room, at: Frame, width_m: float, height_m: float) -> None:
     """A rail with rings' worth of cloth drawn to both sides, down to the floor or, high up, below the sill."""
     top = height_m + 0.16
     bottom = -at.z_m + 0.03 if at.z_m < 1.15 else -0.12
-    half = width_m / 2 + 0.38
+    half = width_m / 2 + CURTAIN_REACH_M
     room.rod(at, (-half, 0.11, top), (half, 0.11, top), 0.013, "walnut")
     for side in (-1, 1):
         room.ball(at, (side * half, 0.11, top), (0.028, 0.028, 0.028), "walnut", slices=8)
@@ -66,3 +70,45 @@ def door(room: Room, at: Frame, material: str = "wood", width_m: float = 0.85, p
     room.cylinder(at, (width_m / 2 - 0.07, 0.026, 0.99), 0.026, 0.012, "brass", (np.sqrt(0.5), -np.sqrt(0.5), 0, 0))
     room.rod(at, (width_m / 2 - 0.07, 0.055, 0.99), (width_m / 2 - 0.18, 0.055, 0.99), 0.009, "brass")
     room.rod(at, (width_m / 2 - 0.07, 0.024, 0.99), (width_m / 2 - 0.07, 0.06, 0.99), 0.008, "brass")
+
+
+def doorway(room: Room, at: Frame, width_m: float, depth_m: float, height_m: float, lining_m: float) -> None:
+    """An open doorway in a wall: jambs, a head, an architrave on both sides, and what stops light and bodies above.
+
+    What hides the way from above is in the group of the ceiling.
+
+    Args:
+        room: where to.
+        at: the middle of its floor; one walks through along y.
+        width_m: between the walls at its sides.
+        depth_m: thickness of the wall.
+        height_m: of the opening.
+        lining_m: thickness of jambs and head, within the width.
+    """
+    lintel_m = room.height_m - height_m
+    room.block(at, (0, 0, height_m + lintel_m / 2), (width_m, depth_m, lintel_m), f"{SHELL_NAME} {_title(at)} lintel")
+    for side in (-1, 1):
+        middle_m = side * (width_m - lining_m) / 2
+        room.block(
+            at, (middle_m, 0, height_m / 2), (lining_m, depth_m, height_m), f"{SHELL_NAME} {_title(at)} jamb {side}"
+        )
+    if not room.looks:
+        return
+    room.shadow_box(at.moved(0, 0, height_m + lining_m), (width_m, depth_m, lintel_m - lining_m))
+    proud_m = depth_m + 0.01
+    for side in (-1, 1):
+        room.box(at, (side * (width_m - lining_m) / 2, 0, 0), (lining_m, proud_m, height_m + lining_m), "trim", 0.004)
+    room.box(at, (0, 0, height_m), (width_m - 2 * lining_m, proud_m, lining_m), "trim", 0.004, group=CEILING_GROUP)
+    broad_m, thick_m = ARCHITRAVE_M
+    inner_m = width_m / 2 - lining_m + REVEAL_M
+    for front in (at.moved(0, depth_m / 2), at.moved(0, -depth_m / 2, 0, 180.0)):
+        for side in (-1, 1):
+            place = (side * (inner_m + broad_m / 2), thick_m / 2, 0)
+            room.box(front, place, (broad_m, thick_m, height_m + REVEAL_M), "trim", 0.006)
+        size = (2 * (inner_m + broad_m), thick_m, broad_m)
+        room.box(front, (0, thick_m / 2, height_m + REVEAL_M), size, "trim", 0.006, group=CEILING_GROUP)
+
+
+def _title(at: Frame) -> str:
+    """A name that no other doorway has."""
+    return f"door {at.x_m:.3f} {at.y_m:.3f}"

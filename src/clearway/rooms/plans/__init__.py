@@ -1,4 +1,5 @@
 """Rooms from floor plans: walls round the cells that can be entered, furniture on those that cannot.
 
-`layout` says where everything stands, `pieces`, `decoration` and `finish` how it looks, `plan_room` puts it together.
+`layout` says where everything stands, with `cell_map` and `walls` for plans that name their walls; `pieces`,
+`decoration` and `finish` say how it looks, `plan_room` puts it together.
 """

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from clearway.rooms.camera import CAMERA_HEIGHT_M, VERTICAL_FOV_DEG
 from clearway.rooms.frame import Frame
-from clearway.rooms.furniture import beds, decor, kitchen, lamps, seating, storage, tables_and_desks
+from clearway.rooms.furniture import bathroom, beds, decor, kitchen, lamps, seating, storage, tables_and_desks
 from clearway.rooms.plans.layout import Piece
 from clearway.rooms.room import Room
 
+HEADBOARD_M = 1.05  # what hangs over a bed hangs higher
 OVERHANG_M = 0.05  # how far a bed's covers reach beyond it
 BLOCK_HEIGHT_M = 0.4  # of the obstacle that fills a place whatever stands there
 
@@ -25,7 +26,7 @@ class Kind:
         widths_m, depths_m: least and most.
         top_m: height.
         at_wall: True only before a wall, False only elsewhere, None anywhere.
-        once: at most one in a room.
+        once: at most one in a room or area.
     """
 
     place: Callable[[Room, Frame, float, float], None]
@@ -60,6 +61,10 @@ def _wardrobe(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
 
 def _pantry(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
     storage.wardrobe(room, at, width_m, 2.0, depth_m, "cabinet")
+
+
+def _white_cupboard(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    storage.wardrobe(room, at, width_m, 2.0, depth_m, "white")
 
 
 def _chest(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
@@ -148,6 +153,98 @@ def _cupboard(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
     decor.stack_of_books(room, at, height_m)
 
 
+def _vanity(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    bathroom.vanity(room, at, width_m, depth_m)
+
+
+def _bathtub(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    bathroom.bathtub(room, at, width_m, depth_m)
+
+
+def _toilet(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """A toilet, and what fits beside it: a bin, or a shelf with towels."""
+    bathroom.toilet(room, at.moved(-max(width_m - 1.0, 0.0) / 2, 0), min(depth_m, 0.75))
+    if width_m > 1.0:
+        _towels(room, at.moved(width_m / 2 - 0.2, 0), 0.36, min(depth_m, 0.45))
+
+
+def _shower(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    bathroom.shower(room, at, width_m, depth_m)
+
+
+def _washing_machine(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """A washing machine with its back at the wall, and a cupboard where there is room beside it."""
+    spare_m = width_m - 0.6
+    bathroom.washing_machine(room, at.moved(spare_m / 2, 0.28 - depth_m / 2))
+    if spare_m > 0.2:
+        room.box(at.moved(-0.31, 0), (0, -0.01, 0), (spare_m - 0.02, depth_m - 0.02, 0.85), "white", 0.01)
+        room.ball(at.moved(-0.31, depth_m / 2), (0.3 * spare_m, -0.01, 0.6), (0.014, 0.014, 0.014), "chrome", slices=8)
+
+
+def _towels(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """An open rack with folded towels."""
+    for x in (-1, 1):
+        for y in (-1, 1):
+            room.box(
+                at, (x * (width_m / 2 - 0.015), y * (depth_m / 2 - 0.015), 0), (0.025, 0.025, 1.2), "chrome", 0.003
+            )
+    for number, z_m in enumerate((0.12, 0.5, 0.88, 1.18)):
+        room.box(at, (0, 0, z_m), (width_m, depth_m, 0.02), "white", 0.004)
+        if number < 3:
+            material = ("accent", "linen", "second accent")[(number + int(room.rng.integers(3))) % 3]
+            for layer in range(2):
+                size = (0.8 * width_m, 0.8 * depth_m, 0.07)
+                room.box(at, (0, 0, z_m + 0.02 + 0.072 * layer), size, material, 0.025, segments=2)
+
+
+def _fridge(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """A fridge, and a narrow worktop where there is room beside it."""
+    own_m = min(width_m, 0.7)
+    kitchen.fridge(room, at.moved((width_m - own_m) / 2, 0), own_m, depth_m)
+    if width_m - own_m > 0.2:
+        kitchen.counter(room, at.moved(-own_m / 2, 0), width_m - own_m - 0.01, "granite", depth_m)
+
+
+def _cooker(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """A worktop with four rings and a pot, over an oven."""
+    kitchen.counter(room, at, width_m, "granite", depth_m)
+    room.box(at, (0, 0, kitchen.WORKTOP_M - 0.002), (0.56, min(0.48, depth_m - 0.04), 0.012), "black", 0.004)
+    for x_m in (-0.14, 0.14):
+        for y_m in (-0.1, 0.1):
+            room.cylinder(at, (x_m, y_m, kitchen.WORKTOP_M + 0.009), 0.075, 0.004, "steel")
+    kitchen.pot(room, at.moved(-0.14, -0.1), kitchen.WORKTOP_M + 0.013)
+    front_m = depth_m / 2
+    room.box(at, (0, front_m - 0.016, 0.14), (0.56, 0.03, 0.66), "steel", 0.008)
+    room.box(at, (0, front_m - 0.002, 0.24), (0.42, 0.012, 0.32), "black", 0.005)
+    room.rod(at, (-0.22, front_m + 0.025, 0.66), (0.22, front_m + 0.025, 0.66), 0.01, "chrome")
+
+
+def _daybed(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """A bed along the wall."""
+    along = at.moved(0, 0, 0, 90.0 if room.layout_rng.random() < 0.5 else -90.0)
+    beds.double_bed(room, along.moved(0, 0.02), depth_m - 2 * OVERHANG_M, width_m - 2 * OVERHANG_M)
+
+
+def _coats(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
+    """A bench for shoes before a panel with coats on hooks."""
+    back_m = 0.015 - depth_m / 2
+    room.box(at, (0, back_m, 0.1), (width_m - 0.04, 0.03, 1.7), "pine", 0.006)
+    for z_m in (0.14, 0.42):
+        room.box(at, (0, 0, z_m), (width_m - 0.04, depth_m, 0.03), "pine", 0.006)
+    for side in (-1, 1):
+        room.box(at, (side * (width_m / 2 - 0.035), 0, 0), (0.03, depth_m - 0.01, 0.45), "pine", 0.005)
+    count = max(2, int(width_m / 0.24))
+    for number in range(count):
+        x_m = (number - (count - 1) / 2) * (width_m - 0.2) / count
+        room.rod(at, (x_m, back_m + 0.01, 1.62), (x_m, back_m + 0.08, 1.65), 0.008, "brass")
+        if room.rng.random() < 0.7:
+            material = ("accent", "linen", "second accent", "curtain")[int(room.rng.integers(4))]
+            room.cloth(at, (x_m, back_m + 0.07, 0.85), (0.2, 0.78), 3, material)
+    for x_m in (-0.25, 0.2):
+        if width_m > 0.8:
+            room.box(at, (x_m * width_m, 0.02, 0.17), (0.1, 0.26, 0.09), "black", 0.03, segments=2)
+
+
 KITCHEN: tuple[Kind, ...] = (
     Kind(_counter, (0.4, 2.4), (0.35, 0.85), 0.9, at_wall=True),
     Kind(_pantry, (0.5, 2.2), (0.35, 0.85), 2.0, at_wall=True),
@@ -181,23 +278,69 @@ ANYWHERE: tuple[Kind, ...] = (
 LAST_RESORT = Kind(_cupboard, (0.0, math.inf), (0.0, math.inf), 1.25)
 
 
+NARROW: tuple[Kind, ...] = (ANYWHERE[0], ANYWHERE[2])  # stands and low shelves
+BY_USE: dict[str, tuple[Kind, ...]] = {
+    "kitchen": (
+        *KITCHEN,
+        Kind(_fridge, (0.55, 1.4), (0.4, 0.85), 1.85, at_wall=True, once=True),
+        Kind(_cooker, (0.6, 1.6), (0.4, 0.85), 0.95, at_wall=True, once=True),
+        *NARROW,
+    ),
+    "living room": (*LIVING, *NARROW),
+    "bedroom": (
+        *(replace(kind, top_m=HEADBOARD_M) if kind.place is _bed else kind for kind in BEDROOM),
+        Kind(_daybed, (1.75, 2.4), (0.8, 1.3), HEADBOARD_M, at_wall=True, once=True),
+        *NARROW,
+    ),
+    "bathroom": (
+        Kind(_vanity, (0.55, 1.7), (0.4, 0.75), 1.0, at_wall=True, once=True),
+        Kind(_bathtub, (1.3, 2.2), (0.65, 1.1), 0.71, once=True),
+        Kind(_shower, (0.75, 1.3), (0.75, 1.3), 2.0, at_wall=True, once=True),
+        Kind(_toilet, (0.45, 1.7), (0.45, 0.9), 0.8, at_wall=True, once=True),
+        Kind(_washing_machine, (0.6, 1.3), (0.56, 0.8), 1.07, at_wall=True, once=True),
+        Kind(_towels, (0.2, 0.9), (0.2, 0.6), 1.2),
+        Kind(_white_cupboard, (0.4, 2.2), (0.3, 0.85), 2.0, at_wall=True),
+    ),
+    "corridor": (
+        Kind(_coats, (0.6, 2.2), (0.25, 0.6), 1.8, at_wall=True),
+        Kind(_chest, (0.35, 1.8), (0.2, 0.8), 1.05),
+        Kind(_sideboard, (0.8, 2.2), (0.35, 0.7), 0.9),
+        Kind(_bookcase, (0.35, 1.4), (0.15, 0.6), 1.9),
+        *NARROW,
+    ),
+}
+FIRST: dict[str, tuple[Kind, ...]] = {
+    use: tuple(kind for kind in kinds if kind.once and kind.place is not storage.fireplace)
+    for use, kinds in BY_USE.items()
+}  # what a room of a use must have, as far as it has places for it
+
+
 def furnish(room: Room, pieces: Sequence[Piece], nearest_m: float) -> list[float]:
     """Put a piece of furniture on every place; the room's layout generator chooses. Returns their heights.
+
+    In an area of a use they are of that use, and what makes a room of it (a bed, a bath) comes first. Elsewhere a theme
+    is drawn for each room.
 
     Args:
         room: to be furnished.
         pieces: the places.
         nearest_m: how near the agent's camera comes to furniture.
     """
-    kinds = THEMES[int(room.layout_rng.integers(len(THEMES)))] + ANYWHERE
-    used: set[Kind] = set()
+    themes = {0: THEMES[int(room.layout_rng.integers(len(THEMES)))] + ANYWHERE}
+    used: set[tuple[Kind, object]] = set()
     tops_m = []
     for piece in pieces:
+        if piece.area is None and piece.room not in themes:
+            themes[piece.room] = THEMES[int(room.layout_rng.integers(len(THEMES)))] + ANYWHERE
+        kinds = themes[piece.room] if piece.area is None else BY_USE[piece.area.use]
+        where = piece.area or piece.room
         lowest_m = _lowest_seen_m(nearest_m + min(piece.width_m, piece.depth_m) / 2)
-        fitting = [kind for kind in kinds if kind not in used and kind.fits(piece, lowest_m)] or [LAST_RESORT]
+        fitting = [kind for kind in kinds if (kind, where) not in used and kind.fits(piece, lowest_m)]
+        first = [] if piece.area is None else [kind for kind in fitting if kind in FIRST[piece.area.use]]
+        fitting = first or fitting or [LAST_RESORT]
         kind = fitting[int(room.layout_rng.integers(len(fitting)))]
         if kind.once:
-            used.add(kind)
+            used.add((kind, where))
         kind.place(room, piece.at, piece.width_m, piece.depth_m)
         room.block(piece.at, (0, 0, BLOCK_HEIGHT_M / 2), (piece.width_m, piece.depth_m, BLOCK_HEIGHT_M))
         tops_m.append(kind.top_m)

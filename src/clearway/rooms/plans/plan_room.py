@@ -6,15 +6,17 @@ import zlib
 
 import numpy as np
 
+from clearway.rooms.furniture import openings
 from clearway.rooms.light import bake
 from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
 from clearway.rooms.plans.buildable import check_can_be_rendered
 from clearway.rooms.plans.decoration import decorate
 from clearway.rooms.plans.finish import finish_of
-from clearway.rooms.plans.layout import GAP, Layout, lay_out
+from clearway.rooms.plans.layout import Layout, lay_out
 from clearway.rooms.plans.pieces import furnish
+from clearway.rooms.plans.walls import DOOR_HEIGHT_M, GAP, LINING_M
 from clearway.rooms.room import Room
-from clearway.rooms.shell import add_surfaces, add_walls
+from clearway.rooms.shell import add_faces, add_surfaces, add_walls
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import neighbour_pairs
 
@@ -43,7 +45,12 @@ def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True, loose
     columns = layout.walls + layout.partitions
     add_walls(room, columns)
     if looks:
-        add_surfaces(room, finish_of(room, layout), columns)
+        finish = finish_of(room, layout)
+        add_surfaces(room, finish, layout.partitions if layout.has_walls else columns)
+        if layout.has_walls:
+            add_faces(room, layout.faces, layout.cornices, layout.walls, finish)
+    for doorway in layout.doorways:
+        openings.doorway(room, doorway.at, doorway.width_m, doorway.depth_m, DOOR_HEIGHT_M, LINING_M)
     tops_m = furnish(room, layout.pieces, first_m)
     decorate(room, layout, tops_m)
     cells, edges = open_plan(room, layout)

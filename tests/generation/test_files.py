@@ -1,0 +1,172 @@
+"""What is there is kept, what is missing is made, what is wrong is told. One room is rendered."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from clearway.errors import SceneError
+from clearway.generation import files
+from clearway.generation.files import SOURCE, Seen, generate_scenes, notes_of, plan_of, request_of, scene_path
+from clearway.generation.plans import generated_plan
+from clearway.generation.request import Request
+from clearway.scenes.floor_plans import floor_plan_scene
+from clearway.scenes.scene import EncoderRecord, Provenance, Scene
+from clearway.scenes.sensors import Readings, depth
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.spread.workers import Workers
+
+REQUESTS = [Request("room", "train", 0, number) for number in (3, 7)]
+SEEN = Seen(size_px=(24, 32))
+RECORD = EncoderRecord("random-resnet50", "abc", {"seed": 0})
+
+
+def stand_in(request: Request, seen: Seen = SEEN, record: EncoderRecord | None = None) -> Scene:
+    """The scene of a request with grey pictures."""
+    scene = floor_plan_scene(generated_plan(request), 4)
+    pictures = np.full((scene.state_count, *seen.size_px, 3), 99, np.uint8)
+    made_by = Provenance(SOURCE, seed=request.seed, notes=notes_of(request))
+    features = None if record is None else scene.features
+    return replace(scene, observations=pictures, made_by=made_by, encoder=record, features=features)
+
+
+class Made(list[str]):
+    """Names of what is made, and of what cannot be."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.failing: set[str] = set()
+
+
+@pytest.fixture
+def made(monkeypatch) -> Made:
+    """Names of what is made; workers are stood in for by this process, and rooms by grey ones."""
+    names = Made()
+
+    @contextmanager
+    def workers_for(work, *, workers, ray) -> Iterator[Workers]:
+        def submit(request: Request) -> Future:
+            if request.name in names.failing:
+                raise SceneError(request.name, "cannot be written (No space left on device)", "Make room")
+            names.append(request.name)
+            write_scene(stand_in(request), scene_path(request, work.set_up().folder))
+            done: Future = Future()
+            done.set_result(request.name)
+            return done
+
+        yield Workers(submit, here=True)
+
+    monkeypatch.setattr(files, "workers_for", workers_for)
+    monkeypatch.setattr(files, "check_mujoco", lambda: None)
+    return names
+
+
+make = partial(generate_scenes, seen=SEEN, encoder="none")
+
+
+def test_what_is_there_is_not_made_again(made, tmp_path) -> None:
+    told: list[int] = []
+    assert make(REQUESTS[:1], tmp_path / "rooms") == [tmp_path / "rooms/room-train-000003-bathroom.h5"]
+    first = (tmp_path / "rooms/room-train-000003-bathroom.h5").stat()
+    paths = make(REQUESTS, tmp_path / "rooms", done=told.append)
+    assert [path.name for path in paths] == ["room-train-000007-bathroom.h5"]
+    assert made == ["room-train-000003-bathroom", "room-train-000007-bathroom"] and told == [1, 2]
+    assert (tmp_path / "rooms/room-train-000003-bathroom.h5").stat().st_mtime_ns == first.st_mtime_ns
+    assert make(REQUESTS, tmp_path / "rooms") == [] and len(made) == 2
+
+
+def test_an_interrupted_generation_goes_on(made, tmp_path) -> None:
+    made.failing.add("room-train-000007-bathroom")
+    with pytest.raises(SceneError, match="No space left"):
+        make(REQUESTS, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["room-train-000003-bathroom.h5"]
+    made.failing.clear()
+    make(REQUESTS, tmp_path)
+    assert made == ["room-train-000003-bathroom", "room-train-000007-bathroom"]
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        (lambda path: path.write_bytes(b"no scene"), "is not an HDF5 file. Remove it, and the same command makes it"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-2000]), "Remove it, and the same command makes it again"),
+        (lambda path: write_scene(another(generator=0), path), "made by version 0 of the generator.* has version 1"),
+        (lambda path: write_scene(another(source="floor_plan"), path), "made from floor_plan"),
+        (lambda path: write_scene(another(split="test"), path), "is no room-train-000003-bathroom of seed 0"),
+        (lambda path: write_scene(another(seed=4), path), "is no room-train-000003-bathroom of seed 0"),
+        (
+            lambda path: write_scene(stand_in(REQUESTS[0], Seen(size_px=(30, 40))), path),
+            r"has rgb \(30 x 40\), asked for rgb \(24 x 32\)",
+        ),
+        (lambda path: write_scene(with_depth(), path), r"has rgb \(24 x 32\), depth \(24 x 32\), asked for rgb"),
+        (
+            lambda path: write_scene(stand_in(REQUESTS[0], record=RECORD), path),
+            r"has features of random-resnet50 \(abc\), asked for none",
+        ),
+    ],
+)
+def test_a_file_that_is_not_what_is_asked_for_is_told(made, tmp_path, kept, said) -> None:
+    path = tmp_path / "room-train-000003-bathroom.h5"
+    write_scene(stand_in(REQUESTS[0]), path)
+    kept(path)
+    before = path.read_bytes()
+    with pytest.raises(SceneError, match=said) as refused:
+        make(REQUESTS, tmp_path)
+    assert str(refused.value).startswith(str(path))
+    assert made == [] and path.read_bytes() == before
+
+
+def another(source: str = SOURCE, seed: int = 0, **notes: object) -> Scene:
+    changed = {**notes_of(REQUESTS[0]), **notes}
+    return replace(stand_in(REQUESTS[0]), made_by=Provenance(source, seed=seed, notes=changed))
+
+
+def with_depth() -> Scene:
+    scene = stand_in(REQUESTS[0])
+    return replace(scene, further=(Readings(depth(24, 32), np.ones((scene.state_count, 24, 32), np.uint16)),))
+
+
+def test_features_go_on_with_the_encoder_of_the_files_that_are_there(tmp_path) -> None:
+    there = {REQUESTS[0]: stand_in(REQUESTS[0], record=RECORD)}
+    for asked in ("auto", "random-resnet50"):
+        assert files._record_of(there, tmp_path, asked, 0) is RECORD
+    assert files._record_of({}, tmp_path, "auto", 0) is None
+    with pytest.raises(SceneError, match="has no features, asked for auto"):
+        files._record_of({REQUESTS[0]: stand_in(REQUESTS[0])}, tmp_path, "auto", 0)
+    with pytest.raises(SceneError, match="asked for random-resnet50"):
+        files._record_of(there, tmp_path, "random-resnet50", 1)
+    both = {**there, REQUESTS[1]: stand_in(REQUESTS[1], record=replace(RECORD, identity="def"))}
+    with pytest.raises(SceneError, match=r"000007-bathroom.h5: has .*\(def\), asked for those of the other files"):
+        files._record_of(both, tmp_path, "auto", 0)
+
+
+def test_a_scene_gives_its_plan_back() -> None:
+    request = Request("flat", "train", 2, 5)
+    scene = stand_in(request)
+    plan = plan_of(scene)
+    assert request_of(scene.made_by) == request
+    assert plan is not None and len(plan.walls) and plan.areas == generated_plan(request).areas
+    assert plan_of(floor_plan_scene(plan, 4)) is None
+    with pytest.raises(SceneError, match="version 0 of the generator"):
+        plan_of(another(generator=0))
+    with pytest.raises(SceneError, match="has other cells than room-train-000007-bathroom"):
+        plan_of(another(number=7))
+
+
+def test_a_room_is_rendered_in_a_worker_of_its_own(tmp_path) -> None:
+    request = min((Request("room", "train", 0, n) for n in range(3, 40, 4)), key=lambda r: len(generated_plan(r).cells))
+    seen = Seen(("rgb", "depth"), (24, 32))
+    (path,) = generate_scenes([request], tmp_path, seen, "none", workers=1)
+    scene = read_scene(path)
+    assert request_of(scene.made_by) == request and {"clearway", "mujoco"} <= set(scene.made_by.versions)
+    assert scene.observations[:].shape[1:] == (24, 32, 3) and scene.observations[:].std() > 10
+    assert scene.seen_by("depth")[0].shape == (24, 32)
+    np.testing.assert_array_equal(scene.locations_m[::4], generated_plan(request).cells * 0.5)
+    assert scene.features is None and int(scene.components.max()) == 0
+    assert generate_scenes([request], tmp_path, seen, "none", workers=1) == []
