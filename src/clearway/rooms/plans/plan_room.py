@@ -6,6 +6,7 @@ import zlib
 
 import numpy as np
 
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.light import bake
 from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
 from clearway.rooms.plans.buildable import check_can_be_rendered
@@ -24,13 +25,16 @@ CLEARANCE = 0.02  # cells
 LAYOUT_STREAM = 3  # of random numbers, beside the room's own
 
 
-def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True) -> tuple[Room, Layout]:
+def build_plan_room(
+    plan: FloorPlan, seed: int = 0, *, looks: bool = True, detail: Detail = FULL
+) -> tuple[Room, Layout]:
     """The room of a plan, and where its parts stand. Its obstacles leave the plan's cells and edges open, no others.
 
     Args:
         plan: the plan. Its name and the seed choose furniture, colours and textures.
         seed: 0 or more.
         looks: bake the light, so that `room.spec.compile()` is ready to render (seconds); False gives obstacles only.
+        detail: how finely it is modelled and lit; `detail.SMALL` is for small pictures.
 
     Raises:
         SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
@@ -38,7 +42,7 @@ def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True) -> tu
     check_can_be_rendered(plan, seed)
     layout = lay_out(plan, np.random.default_rng([seed, zlib.crc32(plan.name.encode()), LAYOUT_STREAM]))
     first_m = (0.5 + GAP) * plan.cell_size_m
-    room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks)
+    room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks, detail=detail)
     columns = layout.walls + layout.partitions
     add_walls(room, columns)
     if looks:
