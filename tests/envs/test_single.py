@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
@@ -12,7 +13,8 @@ from clearway.envs.registration import ENV_ID
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import EnvError
-from clearway.scenes.actions import Action
+from clearway.reward import BUMP, Moves, Reward, Term
+from clearway.scenes.actions import STOP, Action
 from helpers.made import corridor_scene, grid_scene, with_depth
 
 
@@ -80,6 +82,52 @@ def test_the_shortest_path_earns_what_it_should() -> None:
     assert ends == [(False, False)] * 3 + [(True, False)]
     with pytest.raises(ResetNeeded, match="are over: call reset"):
         env.step(0)
+
+
+def test_with_stop_the_agent_says_where_the_episode_ends() -> None:
+    """In a corridor of five cells: on to the last but one, whose pose is the target, past it and back."""
+    env = ImageGoalEnv(corridor_scene(5), targets={"corridor": [12]}, stop=True)
+    assert env.action_space.n == 5
+    env.reset(options={"start": 8})
+    _, reward, *ends, info = env.step(Action.MOVE_FORWARD)
+    assert (reward, ends, info["distance_to_go"]) == (-0.011, [False, False], 0)  # in the target, and on its way
+    _, reward, *ends, info = env.step(STOP)
+    assert (reward, ends, info["distance_to_go"], info["collision"]) == (10.0, [True, False], 0, False)
+    with pytest.raises(ResetNeeded):
+        env.step(STOP)
+    for start, ordinary in ((8, -0.01), (4, -0.011), (0, -0.02)):
+        env.reset(options={"start": start})
+        _, reward, *ends, info = env.step(STOP)
+        assert (reward, ends, info["state"], info["collision"]) == (ordinary, [True, False], start, False)
+    check_env(env, skip_render_check=True)
+
+
+def test_stopping_costs_no_bump_and_fits_terms_for_four_actions() -> None:
+    @dataclass(frozen=True)
+    class Turning(Term):
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned - 0.5 * np.isin(np.arange(4), (1, 2))
+
+    reward = Reward("turning", (*BUMP.terms[:2], Turning(), BUMP.terms[2]))
+    env = ImageGoalEnv(corridor_scene(5), targets={"corridor": [4]}, reward=reward, stop=True)
+    earned = []
+    for action in (Action.MOVE_FORWARD, Action.TURN_LEFT, STOP):
+        env.reset(options={"start": 16})
+        earned.append(env.step(action)[1])
+    assert earned == [-0.1, -0.51, -0.01]
+
+
+def test_in_a_batch_each_stops_for_itself() -> None:
+    envs = ImageGoalVectorEnv(corridor_scene(5), targets={"corridor": [12]}, num_envs=3, stop=True, max_episode_steps=1)
+    envs.reset(seed=0, options={"start": [8, 8, 0]})
+    _, reward, terminated, truncated, _ = envs.step(np.array([Action.MOVE_FORWARD, STOP, STOP]))
+    assert terminated.tolist() == [False, True, True] and truncated.tolist() == [True, False, False]
+    assert reward.tolist() == [-0.011, -0.01, -0.02]
+
+
+def test_stop_is_yes_or_no() -> None:
+    with pytest.raises(EnvError, match="stop=2: expected True or False"):
+        ImageGoalEnv(corridor_scene(5), stop=2)
 
 
 def test_it_lives_the_episodes_of_the_batch() -> None:

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from clearway.rooms.camera import View, first_person_view
+from clearway.rooms.camera import Sight, View, eye_view, first_person_shot, first_person_view, two_thirds
 from clearway.rooms.render import render
 from clearway.rooms.topview import render_top_view
 from clearway.scenes.sensors import SENSORS
@@ -129,3 +129,73 @@ def test_depth_leaves_colour_as_it_is():
     alone = render(model, view, workers=1)
     render(model, replace(view, sensor="depth"), workers=1)
     np.testing.assert_array_equal(render(model, view, workers=1), alone)
+
+
+def sight_of(model: mujoco.MjModel, view: View) -> Sight:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return Sight(model, data, view)
+
+
+def test_what_is_behind_or_beside_the_camera_is_hidden_while_the_picture_is_taken():
+    model, view = lit(coloured_room()), eye_view(height_px=96, width_px=128, fast=True)
+    sight = sight_of(model, view)
+    for heading_deg, seen in ((0, [0]), (90, [1]), (20, [0, 1]), (315, [0, 3])):  # walls in the order of WALLS
+        with sight.of(first_person_shot(2.0, 2.0, heading_deg)):
+            assert np.flatnonzero(model.geom_group == 2).tolist() == seen
+        assert np.all(model.geom_group == 2)
+    with sight.of(first_person_shot(2.0, 2.0, 0, pitch_deg=85)):
+        assert not np.any(model.geom_group == 2)
+
+
+def test_a_mirror_may_show_everything():
+    room = coloured_room()
+    room.spec.add_material(name="glass", reflectance=0.5)
+    room.spec.geoms[0].material = "glass"
+    model = lit(room)
+    with sight_of(model, eye_view(fast=True)).of(first_person_shot(2.0, 2.0, 0)):
+        assert np.all(model.geom_group == 2)
+
+
+def fast_and_not(model: mujoco.MjModel, view: View) -> tuple[np.ndarray, np.ndarray]:
+    return render(model, replace(view, fast=True), workers=1), render(model, view, workers=1)
+
+
+def test_fast_pictures_look_the_same():
+    rng, room = np.random.default_rng(3), coloured_room()
+    for x_m, z_m in rng.uniform(0, 4, (30, 2)):
+        room.add_box((x_m, x_m + 0.1), (z_m, z_m + 0.1), (0.2, 1.5), group=2, rgb=tuple(rng.random(3)))
+    shots = [
+        first_person_shot(x_m, z_m, heading_deg, pitch_deg=pitch_deg)
+        for x_m, z_m, heading_deg, pitch_deg in rng.uniform((0.5, 0.5, 0, -30), (3.5, 3.5, 360, 30), (20, 4))
+    ]
+    view, model = eye_view(shots, height_px=96, width_px=128), lit(room)
+    fast, plain = fast_and_not(model, view)
+    assert fast.shape == plain.shape == (20, 96, 128, 3)
+    off = np.abs(fast.astype(int) - plain).max(axis=3)
+    assert np.mean(off) < 2 and np.mean(off > 60) < 0.006  # edges are smooth in both
+    np.testing.assert_array_equal(*fast_and_not(model, replace(view, sensor="depth")))  # nothing in sight is left out
+
+
+def test_a_piece_that_is_moved_into_sight_is_seen():
+    room = coloured_room()
+    body = room.spec.worldbody.add_body(name="piece", mocap=True)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=[2, 0.5, 1], size=[0.3] * 3, rgba=[0.9, 0.1, 0.9, 1], group=2)
+    shots = [first_person_shot(2.0, 2.0, 0, moved_m=(moved_m,)) for moved_m in ((0.0, 0.0, 0.0), (0.0, 2.7, 0.0))]
+    behind, ahead = render(lit(room), eye_view(shots, height_px=96, width_px=128, fast=True), workers=1)
+    assert_colour(behind[48, 64], WALLS[0][2])
+    assert_colour(ahead[48, 64], (0.9, 0.1, 0.9))
+
+
+def test_two_thirds_of_a_picture_are_means_of_its_areas():
+    row = np.array([[0, 90, 30, 9, 9, 9]], np.uint8)  # (2 x 0 + 90) / 3, (90 + 2 x 30) / 3, 9, 9
+    picture = np.repeat(np.repeat(row, 3, axis=0)[..., None], 3, axis=2)
+    assert two_thirds(picture)[..., 0].tolist() == [[30, 50, 9, 9]] * 2
+    assert two_thirds(picture.swapaxes(0, 1))[..., 2].tolist() == [[30] * 2, [50] * 2, [9] * 2, [9] * 2]
+    assert two_thirds(np.full((3, 6, 3), 255, np.uint8)).min() == 255
+
+
+@pytest.mark.parametrize("change", [{"height_px": 95}, {"width_px": 127}, {"orthographic": True}])
+def test_fast_pictures_have_even_sides_and_perspective(change):
+    with pytest.raises(ValueError, match="even number of rows and columns"):
+        replace(eye_view(height_px=96, width_px=128, fast=True), **change)

@@ -50,6 +50,15 @@ def test_rays_stop_at_walls_and_boxes():
     ]
 
 
+def test_rays_stop_where_they_have_come_far_enough():
+    solid = occupancy_of((4.0, 3.0, 2.4), [])
+    start, ray = np.array([[1.0, 1.5, 0.5]] * 3), np.array([[1.0, 0, 0]] * 3)
+    to_wall, short, shorter = solid.distance_m(start, ray, np.array([9.0, 1.0, 0.2]))
+    assert to_wall == solid.distance_m(start, ray)[0] == pytest.approx(3.0, abs=1.5 * VOXEL_M)
+    assert 1.0 <= short < to_wall
+    assert 0.2 <= shorter <= short
+
+
 def test_light_passes_glass_and_fills_a_thin_board():
     room = empty_room()
     room.box(Frame(2.0, 1.5), (0, 0, 0.5), (0.01, 1.0, 1.0), "glass", segments=0)

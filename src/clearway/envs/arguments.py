@@ -54,6 +54,12 @@ def check_numbers(num_envs: int, history_length: int, max_episode_steps: int | N
         raise EnvError(f"render_mode={render_mode!r} is unknown. Use one of {', '.join(RENDER_MODES)}, or None")
 
 
+def check_switch(name: str, value: object) -> None:
+    """Raise EnvError where a value is neither True nor False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise EnvError(f"{name}={value!r:.40}: expected True or False")
+
+
 def chosen_targets(targets: Mapping[str, Sequence[int]] | None, scenes: Sequence[Scene]) -> dict[str, Sequence[int]]:
     """Targets by scene name, the scenes' default ones for None; EnvError where they are nothing of the kind."""
     if targets is None:

@@ -32,7 +32,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
 
     ## Action Space
 
-    `Discrete(4)`
+    `Discrete(4)`, or with `stop=True` `Discrete(5)`
 
     | Num | Action        |
     |-----|---------------|
@@ -40,6 +40,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | 1   | turn right    |
     | 2   | turn left     |
     | 3   | move backward |
+    | 4   | stop          |
 
     A move into an obstacle is blocked: the agent stays, the step counts, and so does one collision.
 
@@ -74,7 +75,9 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
 
     ## Episode End
 
-    1. Termination: the agent is in the target's pose, position and heading. There is no action to stop.
+    1. Termination: the agent is in the target's pose, position and heading. As in the paper there is no action to stop.
+       With `stop=True` instead: the agent stops, which earns the target's reward in the target's pose
+       (`info["distance_to_go"]` is 0) and elsewhere what a step earns that ends where it began.
     2. Truncation: after `max_episode_steps` steps (500 through `gymnasium.make`). Where the last of them reaches the
        target, `gymnasium.make`'s time limit says both, the vector environment termination alone.
 
@@ -95,6 +98,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | `zone_level`        | `"pose"`            | or `"cell"`: a cell is in a zone where any of its headings is      |
     | `max_episode_steps` | `None`              | steps until truncation; None for no limit (`make` sets 500)        |
     | `history_length`    | `4`                 | K                                                                  |
+    | `stop`              | `False`             | a fifth action ends the episode, nothing else does                 |
     | `render_mode`       | `None`              | `"rgb_array"` (view, target and map side by side) or `"ansi"`      |
 
     ```python
@@ -122,6 +126,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         zone_level: ZoneLevel = "pose",
         max_episode_steps: int | None = None,
         history_length: int = HISTORY_LENGTH,
+        stop: bool = False,
         render_mode: str | None = None,
     ) -> None:
         self._batch = ImageGoalVectorEnv(
@@ -133,6 +138,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
             zone_level=zone_level,
             max_episode_steps=max_episode_steps,
             history_length=history_length,
+            stop=stop,
             autoreset_mode=AutoresetMode.DISABLED,
             render_mode=render_mode,
         )
@@ -160,7 +166,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         return _first(observation), _first_info(info)
 
     def step(self, action: int) -> tuple[Observation, float, bool, bool, Info]:
-        """Take one action, 0 to 3.
+        """Take one action, 0 to 3, or 4 to stop where there is that action.
 
         Raises:
             EnvError: the action is not one of them.

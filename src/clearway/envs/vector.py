@@ -20,6 +20,7 @@ from clearway.envs.arguments import (
     SceneSource,
     Seeds,
     check_numbers,
+    check_switch,
     checked_actions,
     chosen_autoreset,
     chosen_targets,
@@ -48,7 +49,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     observations, rewards, starting states and episode ends.
 
     ## Action Space
-    `MultiDiscrete([4] * N)`: one action an agent.
+    `MultiDiscrete([4] * N)`: one action an agent; with `stop=True` `MultiDiscrete([5] * N)`.
 
     ## Observation Space
     `Dict(observation, target)`, and two boxes more for each further sensor, with a leading axis N.
@@ -99,11 +100,13 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         zone_level: ZoneLevel = "pose",
         max_episode_steps: int | None = None,
         history_length: int = HISTORY_LENGTH,
+        stop: bool = False,
         num_envs: int = 1,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
     ) -> None:
         check_numbers(num_envs, history_length, max_episode_steps, render_mode)
+        check_switch("stop", stop)
         loaded = loaded_scenes(scenes)
         chosen = chosen_targets(targets, loaded)
         self.num_envs, self.render_mode = num_envs, render_mode
@@ -116,7 +119,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._sources = observation_sources(loaded, observations, sensors, self._world)
         self.single_observation_space = observation_space(self._sources, history_length)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.single_action_space = Discrete(ACTION_COUNT)
+        self.single_action_space = Discrete(ACTION_COUNT + stop)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
         self._navigation = Navigation(
@@ -126,6 +129,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             step_limit=None if max_episode_steps == NO_LIMIT else max_episode_steps,
             history_length=history_length,
             reward_dtype=torch.float64,
+            stop=stop,
         )
         self._started = False
         self._ended = np.zeros(num_envs, bool)
@@ -167,12 +171,12 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             EnvError: the actions are of another shape or type, or out of range.
             ResetNeeded: before the first reset, and in the mode DISABLED where an episode is over.
         """
-        action = checked_actions(actions, self.num_envs)
+        action = checked_actions(actions, self.num_envs, ACTION_COUNT + self._navigation.stop)
         self._check_ready()
         resting = self._ended  # all False but in the mode NEXT_STEP: these reset now, their actions are ignored
         step = self._navigation.step(torch.from_numpy(action))
         reward = np.where(resting, 0.0, step.reward.numpy())
-        terminated, truncated = step.reached.numpy() & ~resting, step.truncated.numpy() & ~resting
+        terminated, truncated = (step.ended & ~step.truncated).numpy() & ~resting, step.truncated.numpy() & ~resting
         blocked = step.blocked.numpy() & ~resting
         if self._record:
             self._record.add(step.state.numpy(), action, blocked)

@@ -17,6 +17,7 @@ from clearway.envs.arguments import (
     RESET_MASK,
     Seeds,
     check_numbers,
+    check_switch,
     checked_actions,
     chosen_autoreset,
     environments_to_reset,
@@ -349,9 +350,8 @@ def _observation_space(sensors: Sequence[Sensor], leading: tuple[int, ...]) -> s
 
 
 def _check_switches(continuous: bool, stop: bool, render_mode: str | None, sensors: Sequence[Sensor]) -> None:
-    for name, value in (("continuous", continuous), ("stop", stop)):
-        if not isinstance(value, (bool, np.bool_)):
-            raise EnvError(f"{name}={value!r:.40}: expected True or False")
+    check_switch("continuous", continuous)
+    check_switch("stop", stop)
     if continuous and stop:
         raise EnvError("stop=True is a fifth discrete action. Leave out stop or continuous")
     if render_mode is not None and render_mode not in LIVE_RENDER_MODES:

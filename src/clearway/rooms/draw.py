@@ -26,7 +26,9 @@ NOT_SET = (0.5, 0.5, 0.5, 1.0)
 def draw_surface(spec: mujoco.MjSpec, surface: Surface, light: np.ndarray) -> None:
     """Add a surface, its picture multiplied by its (rows, columns, 3) light map."""
     rows, columns = surface.albedo.shape[:2]
-    lit = _soft_limit(surface.albedo * _enlarged(light, rows, columns))
+    lit = surface.albedo * _enlarged(light, rows, columns)
+    bright = lit >= 0.7
+    lit[bright] = _soft_limit(lit[bright])
     # The light is in the picture already: nearly black to MuJoCo's lights, and shining by itself.
     material = spec.add_material(name=surface.name, emission=GLOW, specular=0.0, shininess=0.0)
     material.rgba[:] = [1 / GLOW, 1 / GLOW, 1 / GLOW, 1]
@@ -48,9 +50,9 @@ def _enlarged(light: np.ndarray, rows: int, columns: int) -> np.ndarray:
     return light
 
 
-def _soft_limit(picture: np.ndarray) -> np.ndarray:
-    """Brightness that bends gently towards 1 above 0.7."""
-    return np.where(picture < 0.7, picture, 0.7 + 0.3 * np.tanh((picture - 0.7) / 0.3))
+def _soft_limit(bright: np.ndarray) -> np.ndarray:
+    """Brightness above 0.7, bent gently towards 1."""
+    return 0.7 + 0.3 * np.tanh((bright - 0.7) / 0.3)
 
 
 def draw_parts(
@@ -62,7 +64,8 @@ def draw_parts(
 ) -> None:
     """Add the parts under (N, 3) brightness; those alike in material and brightness become one geom.
 
-    See-through parts stay single, because MuJoCo sorts whole geoms by their distance.
+    Where the room's detail has blocks, they become one in each block. See-through parts stay single, because MuJoCo
+    sorts whole geoms by their distance.
 
     Args:
         room: where to.
@@ -84,10 +87,18 @@ def draw_parts(
         rgba[:3] *= brightness[members].mean(axis=0)
         if np.abs(rgba - NOT_SET).max() < 1e-3:
             rgba[0] += 0.002
-        for piece in np.unique(pieces[members]).tolist():
-            arrays = _merged([parts[number] for number in members if pieces[number] == piece])
-            name = f"furniture {serial}" if piece == FIXED else f"furniture {serial} of {BODY_NAME} {piece}"
-            add_mesh_geom(room.spec, name, arrays, material, group, bodies[piece]).rgba[:] = rgba
+        together: dict[tuple, list[Part]] = defaultdict(list)
+        for number in members:
+            together[int(pieces[number]), *_block_of(parts[number], room.detail.block_m)].append(parts[number])
+        for (piece, *block), some in sorted(together.items(), key=lambda item: item[0]):
+            name = " ".join(map(str, ["furniture", serial, *block]))
+            name = name if piece == FIXED else f"{name} of {BODY_NAME} {piece}"
+            add_mesh_geom(room.spec, name, _merged(some), material, group, bodies[piece]).rgba[:] = rgba
+
+
+def _block_of(part: Part, block_m: float | None) -> tuple[int, ...]:
+    """Numbers along x and y of the square of floor that a part is drawn with; none where the room is not divided."""
+    return () if block_m is None else tuple((part.centre_m[:2] // block_m).astype(int).tolist())
 
 
 def _merged(parts: list[Part]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -13,15 +13,14 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
+from clearway.rooms.detail import Detail
 from clearway.rooms.draw import draw_parts, draw_surface
-from clearway.rooms.occupancy import Occupancy, occupancy_of
+from clearway.rooms.occupancy import VOXEL_M, Occupancy, occupancy_of
 from clearway.rooms.parts import Lamp, Part, Window
 from clearway.rooms.pieces import loose_obstacles, pieces_of_parts
 from clearway.rooms.room import Room
 from clearway.rooms.surfaces import Surface
 
-TEXEL_M = 0.11
-AMBIENT_RAYS = 24
 AMBIENT_REACH_M = 0.5
 AMBIENT_LIMIT_M = 2.5
 DEEPEST_SHADE = 0.22
@@ -35,6 +34,7 @@ FURNITURE_FLOOR, FURNITURE_GAIN = 0.42, 0.95
 WEAK_LIGHT = 0.003
 RAYS_AT_ONCE = 1_500_000
 OFF_SURFACE_M = 0.06
+SOURCE_SPARE_M = 0.3  # light that comes so near to its source is not shaded: lamps are solid
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +48,14 @@ class _Source:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What light meets: the solid parts, the sources, the windows that the sun shines through, the floor's tint."""
+    """What light meets (solid parts, sources, windows with sun, the floor's tint), and how closely it is looked at."""
 
     solid: Occupancy
     sources: Sequence[_Source]
     windows: Sequence[Window]
     sun: np.ndarray | None
     floor_tint: np.ndarray
+    detail: Detail
 
 
 def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
@@ -71,8 +72,8 @@ def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
     shown = []
     for light, surface in zip(maps, room.surfaces, strict=True):
         if surface.name != "ceiling":
-            texels = light.reshape(-1, 3)
-            shown.append(texels if count_hidden else texels[~scene.solid.is_solid(_texel_points(surface))])
+            texels, places_m = light.reshape(-1, 3), _texel_points(surface, room.detail.texel_m)
+            shown.append(texels if count_hidden else texels[~scene.solid.is_solid(places_m)])
     exposure = MEAN_EXPOSURE / float(np.concatenate(shown).mean())
     for surface, light in zip(room.surfaces, maps, strict=True):
         draw_surface(room.spec, surface, light * exposure)
@@ -92,7 +93,12 @@ def _scene_of(room: Room) -> _Scene:
     floor = next(surface for surface in room.surfaces if surface.name == "floor")
     tint = floor.albedo[::8, ::8].mean(axis=(0, 1))
     return _Scene(
-        occupancy_of(size, room.parts), sources, room.windows, _sun_direction(room.windows), tint / tint.max()
+        occupancy_of(size, room.parts),
+        sources,
+        room.windows,
+        _sun_direction(room.windows),
+        tint / tint.max(),
+        room.detail,
     )
 
 
@@ -127,9 +133,9 @@ def _sun_direction(windows: Sequence[Window]) -> np.ndarray | None:
 
 
 def _light_map(scene: _Scene, surface: Surface, rng: np.random.Generator) -> np.ndarray:
-    """Light on a grid of texels of about TEXEL_M, (rows, columns, 3), row 0 at the bottom."""
-    rows, columns = _texel_counts(surface)
-    points = _texel_points(surface)
+    """Light on a grid of texels, (rows, columns, 3), row 0 at the bottom."""
+    rows, columns = _texel_counts(surface, scene.detail.texel_m)
+    points = _texel_points(surface, scene.detail.texel_m)
     normals = np.broadcast_to(surface.normal, points.shape)
     light = _irradiance(scene, points, normals, rng)
     if scene.sun is not None:
@@ -137,14 +143,14 @@ def _light_map(scene: _Scene, surface: Surface, rng: np.random.Generator) -> np.
     return ndimage.gaussian_filter(light.reshape(rows, columns, 3), (0.7, 0.7, 0), mode="nearest")
 
 
-def _texel_counts(surface: Surface) -> tuple[int, int]:
-    """Rows and columns of a surface's light map."""
-    return max(4, round(surface.height_m / TEXEL_M)), max(4, round(surface.width_m / TEXEL_M))
+def _texel_counts(surface: Surface, texel_m: float) -> tuple[int, int]:
+    """Rows and columns of a surface's light map, of texels of about that size."""
+    return max(4, round(surface.height_m / texel_m)), max(4, round(surface.width_m / texel_m))
 
 
-def _texel_points(surface: Surface) -> np.ndarray:
+def _texel_points(surface: Surface, texel_m: float) -> np.ndarray:
     """The middles of a light map's texels, a little before the surface, (rows x columns, 3), row 0 at the bottom."""
-    rows, columns = _texel_counts(surface)
+    rows, columns = _texel_counts(surface, texel_m)
     u = (np.arange(columns) + 0.5) / columns
     v = (np.arange(rows) + 0.5) / rows
     v, u = np.meshgrid(v, u, indexing="ij")
@@ -154,7 +160,7 @@ def _texel_points(surface: Surface) -> np.ndarray:
 
 def _irradiance(scene: _Scene, points_m: np.ndarray, normals: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Ambient light and the light of lamps and windows on (N, 3) points that face (N, 3) normals, (N, 3)."""
-    per_point = AMBIENT_RAYS + len(scene.sources)
+    per_point = scene.detail.ambient_rays + len(scene.sources)
     chunk = max(1, RAYS_AT_ONCE // per_point)
     parts = [
         _ambient(scene, points_m[i : i + chunk], normals[i : i + chunk], rng)
@@ -166,9 +172,9 @@ def _irradiance(scene: _Scene, points_m: np.ndarray, normals: np.ndarray, rng: n
 
 def _ambient(scene: _Scene, points_m: np.ndarray, normals: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Light from all around, less where something is near; from below it carries the floor's colour."""
-    count = len(points_m)
-    share = (np.arange(AMBIENT_RAYS) + 0.5) / AMBIENT_RAYS
-    angle = np.arange(AMBIENT_RAYS) * 2.399963 + rng.uniform(0, 2 * np.pi, (count, 1))
+    count, ray_count = len(points_m), scene.detail.ambient_rays
+    share = (np.arange(ray_count) + 0.5) / ray_count
+    angle = np.arange(ray_count) * 2.399963 + rng.uniform(0, 2 * np.pi, (count, 1))
     flat, up = np.sqrt(share), np.sqrt(1 - share)
     tangent = np.where(np.abs(normals[:, 2:]) > 0.9, [[1.0, 0, 0]], [[0, 0, 1.0]])
     right = np.cross(tangent, normals)
@@ -179,8 +185,8 @@ def _ambient(scene: _Scene, points_m: np.ndarray, normals: np.ndarray, rng: np.r
         + (flat * np.sin(angle))[..., None] * forward[:, None]
         + up[:, None] * normals[:, None]
     )
-    reach = scene.solid.distance_m(np.repeat(points_m, AMBIENT_RAYS, axis=0), rays.reshape(-1, 3), AMBIENT_LIMIT_M)
-    openness = 1 - (1 - DEEPEST_SHADE) * np.exp(-reach.reshape(count, AMBIENT_RAYS, 1) / AMBIENT_REACH_M)
+    reach = scene.solid.distance_m(np.repeat(points_m, ray_count, axis=0), rays.reshape(-1, 3), AMBIENT_LIMIT_M)
+    openness = 1 - (1 - DEEPEST_SHADE) * np.exp(-reach.reshape(count, ray_count, 1) / AMBIENT_REACH_M)
     from_above = rays[..., 2:] / 2 + 0.5
     tint = from_above + (1 - from_above) * (0.35 + 0.65 * scene.floor_tint)
     return AMBIENT * (openness * tint).mean(axis=1)
@@ -189,17 +195,40 @@ def _ambient(scene: _Scene, points_m: np.ndarray, normals: np.ndarray, rng: np.r
 def _direct(scene: _Scene, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Light of lamps and windows that nothing shades."""
     light = np.zeros((len(points_m), 3))
-    for source in scene.sources:
-        offset = source.place_m - points_m
-        distance = np.linalg.norm(offset, axis=1)
-        direction = offset / distance[:, None]
-        strength = np.maximum(np.einsum("ij,ij->i", direction, normals), 0) / (distance**2 + 0.6)
-        if source.normal is not None:
-            strength *= np.maximum(-direction @ source.normal, 0)
-        lit = np.nonzero(strength * source.light.max() > WEAK_LIGHT)[0]
-        clear = scene.solid.distance_m(points_m[lit], direction[lit]) > distance[lit] - 0.3
-        light[lit] += (strength[lit] * clear)[:, None] * source.light
+    if not scene.sources:
+        return light
+    reaching = [_unshaded(source, points_m, normals) for source in scene.sources]
+    lit = np.concatenate([one.points for one in reaching])
+    directions = np.concatenate([one.directions for one in reaching])
+    enough_m = np.concatenate([one.distances_m for one in reaching]) - SOURCE_SPARE_M
+    # a voxel more than enough, so that rounding decides nothing
+    clear = scene.solid.distance_m(points_m[lit], directions, enough_m + VOXEL_M) > enough_m
+    ends = np.cumsum([len(one.points) for one in reaching])
+    for source, one, unblocked in zip(scene.sources, reaching, np.split(clear, ends[:-1]), strict=True):
+        light[one.points] += (one.strengths * unblocked)[:, None] * source.light
     return light
+
+
+@dataclass(frozen=True, eq=False)
+class _Beams:
+    """Light of one source on those points that it is not too weak for: their numbers, (N,); and the way back to it."""
+
+    points: np.ndarray
+    directions: np.ndarray
+    distances_m: np.ndarray
+    strengths: np.ndarray
+
+
+def _unshaded(source: _Source, points_m: np.ndarray, normals: np.ndarray) -> _Beams:
+    """What a source sends to (N, 3) points that face (N, 3) normals, whatever is in between."""
+    offset = source.place_m - points_m
+    distance = np.linalg.norm(offset, axis=1)
+    direction = offset / distance[:, None]
+    strength = np.maximum(np.einsum("ij,ij->i", direction, normals), 0) / (distance**2 + 0.6)
+    if source.normal is not None:
+        strength *= np.maximum(-direction @ source.normal, 0)
+    lit = np.nonzero(strength * source.light.max() > WEAK_LIGHT)[0]
+    return _Beams(lit, direction[lit], distance[lit], strength[lit])
 
 
 def _sunlight(scene: _Scene, surface: Surface, points_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -210,7 +239,7 @@ def _sunlight(scene: _Scene, surface: Surface, points_m: np.ndarray, rng: np.ran
         return np.zeros((len(points_m), 3))
     hits = np.zeros(len(points_m))
     for _ in range(4):
-        jitter = rng.uniform(-0.5, 0.5, (len(points_m), 2)) * TEXEL_M
+        jitter = rng.uniform(-0.5, 0.5, (len(points_m), 2)) * scene.detail.texel_m
         right, up = surface.right_m / surface.width_m, surface.up_m / surface.height_m
         start = points_m + jitter[:, :1] * right + jitter[:, 1:] * up
         direction = np.broadcast_to(scene.sun, start.shape)

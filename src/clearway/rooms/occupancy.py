@@ -25,29 +25,33 @@ class Occupancy:
 
     free_voxels: np.ndarray
 
-    def distance_m(self, points_m: np.ndarray, directions: np.ndarray, limit_m: float = np.inf) -> np.ndarray:
+    def distance_m(
+        self, points_m: np.ndarray, directions: np.ndarray, limit_m: float | np.ndarray = np.inf
+    ) -> np.ndarray:
         """How far light travels from (N, 3) points along (N, 3) unit vectors, (N,) float32 metres.
 
-        Rays that have come farther than `limit_m` stop there.
+        Rays that have come farther than `limit_m`, one for all or (N,), stop there.
         """
         field = self.free_voxels.reshape(-1)
-        limits = np.array(self.free_voxels.shape, np.float32) - 1
+        last = np.array(self.free_voxels.shape, np.float32)[:, None] - 1
         _, size_y, size_z = self.free_voxels.shape
         travelled = np.zeros(len(points_m), np.float32)
+        limits = np.broadcast_to(np.asarray(limit_m / VOXEL_M, np.float32), len(points_m))
         active = np.arange(len(points_m))
-        here = points_m.astype(np.float32) / np.float32(VOXEL_M) + np.float32(1)
-        step_by = directions.astype(np.float32)
+        here = np.ascontiguousarray((points_m.astype(np.float32) / np.float32(VOXEL_M) + np.float32(1)).T)
+        step_by = np.ascontiguousarray(directions.astype(np.float32).T)
         for _ in range(MAX_STEPS):
-            np.clip(here, 0, limits, out=here)
-            x, y, z = here.astype(np.int32).T
+            np.clip(here, 0, last, out=here)
+            x, y, z = here.astype(np.int32)
             free = field[(x * size_y + y) * size_z + z]
-            moving = (free > 0) & (travelled[active] < limit_m / VOXEL_M)
-            if not moving.all():
-                active, here, step_by, free = active[moving], here[moving], step_by[moving], free[moving]
+            moving = np.flatnonzero((free > 0) & (travelled[active] < limits[active]))
+            if len(moving) < len(active):
+                active, free = active[moving], free[moving]
+                here, step_by = here.take(moving, axis=1), step_by.take(moving, axis=1)
             if not len(active):
                 break
             step = np.maximum(free.astype(np.float32) - np.float32(0.9), np.float32(0.6))
-            here += step_by * step[:, None]
+            here += step_by * step
             travelled[active] += step
         return travelled * VOXEL_M
 

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from clearway.rooms import meshes
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.frame import UPRIGHT, Frame, along, rotation
 from clearway.rooms.groups import OBSTACLE_GROUP, SEEN_GROUP
 from clearway.rooms.materials import SCHEMES, Look, look_of
@@ -40,6 +41,7 @@ class Room:
         seed: what the generators start from.
         looks: False builds the obstacles alone, in milliseconds.
         mirrored: swap left and right (x to width_m - x) in everything that is placed.
+        detail: how finely it is modelled and lit.
         spec: the MuJoCo model so far.
         rng: for looks: colours, textures, ornaments without obstacles.
         layout_rng: for everything that moves an obstacle; the same with and without looks.
@@ -55,6 +57,7 @@ class Room:
     seed: int = 0
     looks: bool = True
     mirrored: bool = False
+    detail: Detail = FULL
     spec: mujoco.MjSpec = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -142,7 +145,7 @@ class Room:
         """A bevelled box; `position_m` is the middle of its underside, `size_m` its full size."""
         if self.looks:
             size = tuple(round(float(side), 4) for side in size_m)
-            mesh = meshes.bevelled_box(size, bevel_m, segments, grain_up)
+            mesh = meshes.bevelled_box(size, bevel_m, self.detail.segments(bevel_m, segments), grain_up)
             x, y, z = position_m
             self._add(mesh, frame, (x, y, z + size_m[2] / 2), material, tilt, group)
 
@@ -159,7 +162,8 @@ class Room:
     ) -> None:
         """A lathed shape from (radius, height) points; heights count from `position_m`."""
         if self.looks:
-            mesh = meshes.lathe(tuple((float(r), float(z)) for r, z in profile_m), slices, scale_xy)
+            profile = tuple((float(r), float(z)) for r, z in profile_m)
+            mesh = meshes.lathe(profile, min(slices, self.detail.most_slices), scale_xy)
             self._add(mesh, frame, position_m, material, tilt, group, round_shape=True)
 
     def cylinder(

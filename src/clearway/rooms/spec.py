@@ -27,7 +27,8 @@ def empty_spec(name: str, middle_m: tuple[float, float, float]) -> mujoco.MjSpec
 
 def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> str:
     """The name of a new texture from a (height, width, 3) picture in [0, 1], row 0 at the bottom."""
-    pixels = np.clip(np.round(image * 255), 0, 255).astype(np.uint8)
+    scaled = image * 255
+    pixels = np.clip(np.round(scaled, out=scaled), 0, 255, out=scaled).astype(np.uint8)
     texture = spec.add_texture(
         name=f"{name} texture",
         type=mujoco.mjtTexture.mjTEXTURE_2D,

@@ -6,6 +6,7 @@ Every function gives a tileable (height, width, 3) float64 picture in [0, 1], ro
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 
 import numpy as np
 from scipy import ndimage
@@ -26,17 +27,24 @@ def noise(
 
     A stretch above 1 makes the pattern finer along that axis' frequencies, so streaks run along the other one.
     """
+    amplitude = _amplitude(height, width, exponent, stretch_x, stretch_y)
+    spectrum = amplitude * np.exp(2j * np.pi * rng.random(amplitude.shape))
+    field = np.fft.irfft2(spectrum, s=(height, width))
+    field -= field.mean()
+    field /= field.std() + 1e-9
+    return np.clip(field / 5 + 0.5, 0, 1)
+
+
+@lru_cache(maxsize=64)
+def _amplitude(height: int, width: int, exponent: float, stretch_x: float, stretch_y: float) -> np.ndarray:
+    """Strength of each frequency in `noise`, (height, width // 2 + 1)."""
     fy = np.fft.fftfreq(height)[:, None] * height * stretch_y
     fx = np.fft.rfftfreq(width)[None] * width * stretch_x
     frequency = np.hypot(fx, fy)
     frequency[0, 0] = 1.0
     amplitude = frequency**-exponent
     amplitude[0, 0] = 0.0
-    spectrum = amplitude * np.exp(2j * np.pi * rng.random(amplitude.shape))
-    field = np.fft.irfft2(spectrum, s=(height, width))
-    field -= field.mean()
-    field /= field.std() + 1e-9
-    return np.clip(field / 5 + 0.5, 0, 1)
+    return amplitude
 
 
 def mix(low: np.ndarray | Colour, high: np.ndarray | Colour, share: np.ndarray) -> np.ndarray:

@@ -5,16 +5,18 @@ Axis letters: N environments, K poses of history (newest last), M targets, G gro
 An episode starts in a pose drawn uniformly from those that can reach the target, itself excluded; its history is that
 pose K times. A blocked move leaves the agent where it is, and its repeated pose enters the history like any other. The
 episode ends in the exact target pose (`reached`), or is cut at the step limit (`truncated`); see Zhu et al., ICRA 2017.
+Where agents stop by themselves, it ends by the action `STOP`, in the target or elsewhere (`gave_up`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from clearway.reward import Reward
+from clearway.scenes.actions import STOP
 from clearway.world.streams import Streams
 from clearway.world.world import World
 
@@ -33,6 +35,7 @@ class Transition:
         truncated: (N,) bool, the step limit was met first.
         blocked: (N,) bool, the move was blocked: one collision.
         zone: (N,) int64, zone of the pose arrived in.
+        gave_up: (N,) bool, the agent stopped elsewhere than in the target; None where there is no action to stop.
     """
 
     state: Tensor
@@ -41,11 +44,13 @@ class Transition:
     truncated: Tensor
     blocked: Tensor
     zone: Tensor
+    gave_up: Tensor | None = None
 
     @property
     def ended(self) -> Tensor:
         """(N,) bool: the episode is over, either way."""
-        return self.reached | self.truncated
+        ended = self.reached | self.truncated
+        return ended if self.gave_up is None else ended | self.gave_up
 
 
 class TargetChoice:
@@ -101,6 +106,8 @@ class Navigation:
         step_limit: steps after which an episode is truncated; None for no limit.
         history_length: K.
         reward_dtype: precision of the rewards.
+        stop: a fifth action, `STOP`, ends an episode, and reaches the target where that is; nothing else does. It earns
+            what a step earns that ends where it began.
     """
 
     def __init__(
@@ -113,12 +120,23 @@ class Navigation:
         step_limit: int | None = None,
         history_length: int = HISTORY_LENGTH,
         reward_dtype: torch.dtype = torch.float32,
+        stop: bool = False,
     ) -> None:
         count = len(seeds)
         self.world, self.reward, self.step_limit = world, reward, step_limit
         self.choice = choice or TargetChoice.uniform(world, count)
-        moves = world.moves()
-        self.reward_table = torch.from_numpy(reward.table(moves)).to(world.device, reward_dtype)
+        moves, self.stop = world.moves(), stop
+        table = torch.from_numpy(reward.table(moves))
+        self._next_state, self._blocked = world.next_state, world.blocked
+        if stop:
+            stay = torch.arange(len(world.next_state), device=world.device)[:, None].to(world.next_state.dtype)
+            self._next_state = torch.cat([world.next_state, stay], 1)
+            self._blocked = torch.cat([world.blocked, torch.zeros_like(stay, dtype=torch.bool)], 1)
+            staying = replace(
+                moves, next_state=stay.expand(world.next_state.shape).cpu().numpy(), blocked=moves.blocked & False
+            )
+            table = torch.cat([table, torch.from_numpy(reward.table(staying))[..., :1]], 2)
+        self.reward_table = table.to(world.device, reward_dtype)
         seeds = seeds.to(world.device)
         self.start_stream, self.target_stream = Streams(seeds, START_STREAM), Streams(seeds, TARGET_STREAM)
         self.history = torch.zeros(count, history_length, dtype=torch.int64, device=world.device)
@@ -180,15 +198,20 @@ class Navigation:
     def step(self, action: Tensor) -> Transition:
         """Move every agent by its action (N,) int64 and say what happened. Ended episodes wait for their `reset`."""
         here = self.state
-        arrived = self.world.next_state[here, action]
-        blocked = self.world.blocked[here, action]
+        arrived = self._next_state[here, action]
+        blocked = self._blocked[here, action]
         reached = arrived == self.world.target_state[self.target]
+        gave_up = None
+        if self.stop:
+            stopped = action == STOP
+            reached, gave_up = reached & stopped, stopped & ~reached
         zone = self.world.zone[arrived]
         self.history = torch.cat([self.history[:, 1:], arrived[:, None]], 1)
         self.elapsed += 1
         limit_met = torch.zeros_like(reached) if self.step_limit is None else self.elapsed >= self.step_limit
         reward = self.earned(here, action, reached)
-        return Transition(arrived, reward, reached, limit_met & ~reached, blocked, zone)
+        over = reached if gave_up is None else reached | gave_up
+        return Transition(arrived, reward, reached, limit_met & ~over, blocked, zone, gave_up)
 
     def earned(self, state: Tensor, action: Tensor, reached: Tensor) -> Tensor:
         """What actions (B,) earn in states (B,) int64, both, where they reach the target or not, (B,) bool."""

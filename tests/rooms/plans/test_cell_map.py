@@ -50,7 +50,16 @@ def test_a_door_between_walls_on_all_sides_leads_where_one_can_walk() -> None:
     assert cell_map(dead_end).openings == (Opening((1, 0, 2, 1), False),)
 
 
-@pytest.mark.parametrize("lines", [("...", ".D.", "..."), ("W..", "WD.", "W.."), ("#D#", "..."), ("WDW", "DD.", "...")])
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("...", ".D.", "..."),
+        ("W..", "WD.", "W.."),
+        ("#D#", "..."),
+        ("WDW", "DD.", "..."),
+        ("W..W", "WDWW", "WDDW", "W..W"),
+    ],
+)
 def test_a_door_in_no_wall_is_refused(lines: tuple[str, ...]) -> None:
     plan = FloorPlan.of_text("flat", lines, source="flat.txt")
     with pytest.raises(SceneError, match=r"^flat.txt: has a door in the cell \(\d, \d\) that is in no wall. Put walls"):

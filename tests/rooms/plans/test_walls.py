@@ -65,6 +65,13 @@ def test_faces_run_straight_on_with_one_above_the_door() -> None:
     assert low.ends == (-1, 0)  # its board stops before the board of the outer wall, and runs into the door's frame
 
 
+def test_the_face_above_a_door_reaches_from_wall_to_wall_either_way() -> None:
+    for plan in (PLAN, walled("across", ("...", "WDW", "..."))):
+        cells = cell_map(plan)
+        above = [face for face in faces_of(cells, parts_of(cells), 1.0) if face.bottom_m]
+        assert [face.length_m for face in above] == pytest.approx([1.4, 1.4])
+
+
 def test_under_the_ceiling_a_face_goes_on_over_the_door() -> None:
     cells = cell_map(PLAN)
     over = faces_of(cells, parts_of(cells), 1.0, under_ceiling=True)

@@ -6,6 +6,7 @@ import zlib
 
 import numpy as np
 
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.furniture import openings
 from clearway.rooms.light import bake
 from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
@@ -26,7 +27,9 @@ CLEARANCE = 0.02  # cells
 LAYOUT_STREAM = 3  # of random numbers, beside the room's own
 
 
-def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True, loose: bool = False) -> tuple[Room, Layout]:
+def build_plan_room(
+    plan: FloorPlan, seed: int = 0, *, looks: bool = True, loose: bool = False, detail: Detail = FULL
+) -> tuple[Room, Layout]:
     """The room of a plan, and where its parts stand. Its obstacles leave the plan's cells and edges open, no others.
 
     Args:
@@ -34,6 +37,7 @@ def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True, loose
         seed: 0 or more.
         looks: bake the light, so that `room.spec.compile()` is ready to render (seconds); False gives obstacles only.
         loose: every piece of furniture hangs on a body of its own, so that it can be moved (`pieces`).
+        detail: how finely it is modelled and lit; `detail.SMALL` is for small pictures.
 
     Raises:
         SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
@@ -41,7 +45,7 @@ def build_plan_room(plan: FloorPlan, seed: int = 0, *, looks: bool = True, loose
     check_can_be_rendered(plan, seed)
     layout = lay_out(plan, np.random.default_rng([seed, zlib.crc32(plan.name.encode()), LAYOUT_STREAM]))
     first_m = (0.5 + GAP) * plan.cell_size_m
-    room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks)
+    room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks, detail=detail)
     columns = layout.walls + layout.partitions
     add_walls(room, columns)
     if looks:

@@ -1,0 +1,36 @@
+"""How finely a room is modelled and lit: `FULL` for pictures of any size, `SMALL` for small ones, at less cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Detail:
+    """What may be left out where pictures are too small to show it.
+
+    Attributes:
+        least_bevel_m: edges rounded by less than this are sharp; those of more have one strip, unless it is 0.
+        most_slices: flat sides of round shapes, at most.
+        texel_m: size of a light map's texels.
+        ambient_rays: rays that ask each texel's surroundings for light.
+        block_m: furniture that is alike is drawn together within squares of this size, so that those out of sight can
+            be left out of a picture; None: within the whole room.
+    """
+
+    least_bevel_m: float = 0.0
+    most_slices: int = 1000
+    texel_m: float = 0.11
+    ambient_rays: int = 24
+    block_m: float | None = None
+
+    def segments(self, bevel_m: float, segments: int) -> int:
+        """Roundness of a box's edges, as of `meshes.bevelled_box`, where `segments` is asked for."""
+        if bevel_m < self.least_bevel_m:
+            return 0
+        return min(segments, 1) if self.least_bevel_m else segments
+
+
+FULL = Detail()
+SMALL = Detail(least_bevel_m=0.02, most_slices=10, texel_m=0.16, ambient_rays=16, block_m=2.0)
+"""For pictures of up to about 150 x 200: a bevel of a centimetre is a pixel at one metre's distance."""
