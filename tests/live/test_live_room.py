@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
+from clearway.generation.files import notes_of
+from clearway.generation.plans import generated_plan
+from clearway.generation.request import Request
 from clearway.live.body import Body
 from clearway.live.live_room import live_room, live_room_named
 from clearway.scenes.actions import BLOCKED, Action
@@ -16,7 +19,7 @@ from helpers.made import corridor_scene
 
 def test_a_scene_that_is_no_room_of_ours_is_refused():
     scene = replace(corridor_scene(), made_by=Provenance("thor_v1"))
-    with pytest.raises(SceneError, match=r"corridor: .*comes from thor_v1.*scenes build"):
+    with pytest.raises(SceneError, match=r"corridor: .*comes from thor_v1.*Walk live in a room"):
         live_room(scene)
 
 
@@ -46,6 +49,24 @@ def test_a_floor_plan_is_a_room_to_walk_in_whose_moves_are_those_of_the_plan():
             body.stand_at(np.array([x_m, z_m]))
             step = body.move(sign * scene.cell_size_m, heading_deg)
             assert step.contact == (scene.graph[state, action] == BLOCKED), (state, action)
+
+
+def test_a_generated_room_is_one_to_walk_in_and_another_plan_is_not_taken_for_it():
+    request = Request("room", "test", 0, 0)
+    plan = generated_plan(request)
+    made_by = Provenance("generated", seed=0, notes=notes_of(request))
+    scene = replace(floor_plan_scene(plan, feature_count=4), made_by=made_by)
+    live = live_room(scene)
+    body = Body(live.room, live.agent)
+    for state in range(0, scene.state_count, 7):
+        x_m, z_m, heading_deg = live.pose_of(state)
+        body.stand_at(np.array([x_m, z_m]))
+        blocked = scene.graph[state, Action.MOVE_FORWARD] == BLOCKED
+        assert body.move(scene.cell_size_m, heading_deg).contact == blocked, state
+    moves = scene.graph.copy()
+    moves[0, Action.MOVE_FORWARD] = BLOCKED if moves[0, Action.MOVE_FORWARD] != BLOCKED else 0
+    with pytest.raises(SceneError, match="its moves are not those of its floor plan"):
+        live_room(replace(scene, graph=moves))
 
 
 @pytest.mark.slow

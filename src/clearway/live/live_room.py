@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from clearway.live.arrangement import Arrangement
     from clearway.rooms.obstacles import AgentShape, CollisionRoom
+    from clearway.scenes.floor_plans import FloorPlan
 
 NEW_OBSTACLE_RGBA = (0.72, 0.36, 0.24, 1.0)
 
@@ -49,16 +50,16 @@ def live_room(scene: Scene) -> LiveRoom:
     """Build the room of a scene again, some seconds.
 
     Raises:
-        SceneError: the scene is none of our rooms or floor plans, or this version builds the room differently.
+        SceneError: the scene is no room of ours, floor plan or generated one, or this version builds it differently.
     """
     made = scene.made_by
     if made.source in floor_plans.SOURCES and made.seed is not None:
-        return _live_plan(scene, made.seed)
+        return _live_plan(scene, floor_plans.plan_of(scene), made.seed)
     if made.source != "room" or made.room is None or made.seed is None:
         raise SceneError(
             scene.name,
             f"there is no room to walk in: the scene comes from {made.source}",
-            "Walk live in a scene that clearway scenes build made",
+            "Walk live in a room, a floor plan or a generated scene of clearway's own",
         )
     grid = room_scene(made.room, made.seed)
     if not np.array_equal(grid.graph, scene.graph) or not np.allclose(grid.locations_m, scene.locations_m):
@@ -105,11 +106,12 @@ def room_scene(name: str, seed: int = 0) -> Scene:
     return Scene(scene_name(name, seed), None, None, places_m, headings_deg, grid.graph, made_by)
 
 
-def _live_plan(scene: Scene, seed: int) -> LiveRoom:
+def _live_plan(scene: Scene, plan: FloorPlan, seed: int) -> LiveRoom:
     """The room of a floor plan, and the scene moved to where the room's corner is the origin."""
     from clearway.rooms.build import check_mujoco
 
-    plan = floor_plans.plan_of(scene)
+    if not np.array_equal(floor_plans.plan_poses(plan)[2], scene.graph):
+        raise SceneError(scene.name, "its moves are not those of its floor plan", floor_plans.REBUILD, "graph")
     check_mujoco()
     from clearway.rooms.plans.plan_room import agent_for, build_plan_room
 

@@ -99,7 +99,7 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
 
     | Parameter           | Default             | Description                                                          |
     |---------------------|---------------------|----------------------------------------------------------------------|
-    | `room`              | required            | a room's name, a scene file or `Scene` of a room or floor plan       |
+    | `room`              | required            | a room's name, a scene file or `Scene` that clearway built           |
     | `room_seed`         | `0`                 | of a room by name: another has other colours and small furniture     |
     | `targets`           | `None`              | state ids to draw targets from; None: all                            |
     | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name   |
