@@ -74,6 +74,7 @@ def test_every_room_between_walls_has_a_lamp_and_a_window(seed: int) -> None:
         places = [np.asarray(thing.centre_m)[:2] / layout.cell_size_m - GAP for thing in things]
         cells = [tuple(np.clip(place, 0, np.array(layout.rooms.shape) - 1).astype(int)) for place in places]
         assert {int(layout.rooms[cell]) for cell in cells} == rooms
+    assert all(window.width_m > 0.55 for window in room.windows)  # rather without curtains than too narrow
     for window in room.windows:
         x_m, y_m, _ = window.centre_m
         assert min(abs(gap) for gap in (x_m, y_m, layout.width_m - x_m, layout.depth_m - y_m)) < 1e-6
@@ -113,9 +114,9 @@ def test_the_front_door_is_in_the_corridor_if_there_is_one(monkeypatch) -> None:
     at = []
     monkeypatch.setattr(openings, "door", lambda room, frame: at.append(frame))
     lines = ("WWWWWWWWWW", "W........W", "W........W", "WWDWWWWWWW", "W........W", "W........W", "WWWWWWWWWW")
-    decorated(0.9, 0, walled("flat", lines, (Area("corridor", (1, 1), (8, 2)), Area("bedroom", (1, 4), (8, 5)))))
+    decorated(0.9, 0, walled("flat", lines, (Area("bedroom", (1, 1), (8, 2)), Area("corridor", (1, 4), (8, 5)))))
     (frame,) = at
-    assert frame.y_m < 1.2  # the corridor's two rows of cells
+    assert frame.y_m > 1.6  # the corridor's two rows of cells, of 2.7 m in all
 
 
 def test_lamps_hang_over_free_cells() -> None:

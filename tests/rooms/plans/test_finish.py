@@ -57,6 +57,7 @@ def test_areas_have_floors_of_their_own_that_meet_in_the_wall(monkeypatch) -> No
     [
         (("W" * 10, *["W" + "." * 8 + "W"] * 5, "W" * 10), 1.0),  # 4.2 x 2.7 m
         (("W" * 5, *["W...W"] * 3, "WWDWW", "W...W", "W" * 5), 0.7),  # 1.7 m square
+        (("W" * 9, *["W.W...W.W"] * 3, "W" * 9), 0.7),  # the room in the middle, 1.7 m wide
         (("W" * 7, "W.....W", "WWWWDWW", "W.....W", "W" * 7), None),  # 0.7 m deep
     ],
 )

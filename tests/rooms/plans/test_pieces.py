@@ -92,6 +92,12 @@ def test_what_makes_a_room_of_a_use_is_in_each_area_once(use: str, material: str
         assert any(part.material == material for part in room.parts)
 
 
+def test_every_bedroom_has_a_bed_and_one_only() -> None:
+    areas = [Area("bedroom", (0, 0), (4, 4)), Area("bedroom", (5, 0), (9, 4))]
+    room, _ = room_with([replace(place(1.6, 2.0, True), area=area) for area in areas for _ in range(2)], looks=True)
+    assert sum(part.material == "duvet" for part in room.parts) == 2
+
+
 def test_rooms_between_walls_have_themes_of_their_own() -> None:
     def themes_in(seed: int) -> set[bool]:
         rooms = []
