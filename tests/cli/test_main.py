@@ -25,6 +25,7 @@ from clearway.perception import EncoderWarning
 COMMANDS = {
     "demo",
     "scenes build",
+    "scenes generate",
     "scenes import thor-v1",
     "scenes import floor-plan",
     "scenes import images",

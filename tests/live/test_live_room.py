@@ -19,7 +19,7 @@ from helpers.made import corridor_scene
 
 def test_a_scene_that_is_no_room_of_ours_is_refused():
     scene = replace(corridor_scene(), made_by=Provenance("thor_v1"))
-    with pytest.raises(SceneError, match=r"corridor: .*comes from thor_v1.*Walk live in a room"):
+    with pytest.raises(SceneError, match=r"corridor: .*comes from thor_v1.*Walk live in a scene"):
         live_room(scene)
 
 

@@ -59,7 +59,7 @@ def live_room(scene: Scene) -> LiveRoom:
         raise SceneError(
             scene.name,
             f"there is no room to walk in: the scene comes from {made.source}",
-            "Walk live in a room, a floor plan or a generated scene of clearway's own",
+            "Walk live in a scene that clearway scenes build, generate or import floor-plan made",
         )
     grid = room_scene(made.room, made.seed)
     if not np.array_equal(grid.graph, scene.graph) or not np.allclose(grid.locations_m, scene.locations_m):
