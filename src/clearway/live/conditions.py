@@ -70,6 +70,10 @@ MOST = {
 """Of every magnitude: at light 1 an episode may be black, and no room is longer than 10 m."""
 
 
+REARRANGING = ("move_furniture", "new_obstacle")
+"""Of these, what changes where things stand: there is nothing to move in MuJoCo models of others."""
+
+
 @dataclass(frozen=True)
 class Condition:
     """A row of a sweep: its label and what is changed."""

@@ -18,7 +18,7 @@ from clearway.live.result_tables import markdown_tables
 from clearway.live.results import LiveResult, summarise
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
-from clearway.rooms.camera import eye_view
+from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
@@ -84,8 +84,18 @@ def stages(agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene]) -> Ite
             live = live_room(scene)
             encoder = encoder_from_record(record_of_encoder)
             world = make_world([scene], {scene.name: record.targets[scene.name]}, record.zone_level)
-            found.append(LiveScene(live, world, encoder, opened.enter_context(studio(live.model, eye_view()))))
+            found.append(
+                LiveScene(live, world, encoder, opened.enter_context(studio(live.model, live.lens(*_size_px(scene)))))
+            )
         yield found
+
+
+def _size_px(scene: Scene) -> tuple[int, int]:
+    """Height and width of the pictures that the scene's features were made of."""
+    if scene.observations is None:
+        return PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
+    height_px, width_px = scene.observations.shape[1:3]
+    return height_px, width_px
 
 
 def _encoder_record(scene: Scene) -> EncoderRecord:
