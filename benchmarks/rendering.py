@@ -28,17 +28,21 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from multiprocessing import get_context
+from functools import partial
+from multiprocessing import Queue, get_context
+from multiprocessing.synchronize import Barrier
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from clearway.rooms import camera
-from clearway.rooms.camera import View, first_person_view, take_pictures
+from clearway.rooms.camera import View, first_person_view
 from clearway.rooms.detail import FULL, SMALL, Detail
 from clearway.rooms.plans import plan_room
 from clearway.rooms.plans.plan_room import build_plan_room
 from clearway.rooms.render_worker import binary_model, model_of_binary
+from clearway.rooms.taking import SPARE_GEOMS, _free_camera, take_pictures
 from clearway.scenes.floor_plans import FloorPlan
 
 HALL = (
@@ -105,7 +109,7 @@ def view_of(size: tuple[int, int], count: int, seed: int = 1, fast: bool = False
 
 def picture_ms(room: bytes, view: View) -> float:
     """Processor milliseconds a picture; the first, which compiles shaders, does not count."""
-    taking = take_pictures(model_of_binary(room), view, (view.shots[0], *view.shots))
+    taking = pictures_of(room, view)
     next(taking)
     return 1000 * used(lambda: [None for _ in taking]) / len(view.shots)
 
@@ -134,14 +138,14 @@ class Stages:
         view, spent = self.view, np.zeros(4)
         box = mujoco.MjrRect(0, 0, view.width_px, view.height_px)
         out = np.empty((view.height_px, view.width_px, 3), np.uint8)
-        spare = self.model.ngeom + camera.SPARE_GEOMS
+        spare = self.model.ngeom + SPARE_GEOMS
         with mujoco.Renderer(self.model, view.height_px, view.width_px, max_geom=spare) as renderer:
             for flag, value in self.flags.items():
                 renderer.scene.flags[flag] = value
             context = renderer._mjr_context
             for number, shot in enumerate((view.shots[0], *view.shots)):
                 times = [time.process_time()]
-                renderer.update_scene(self.data, camera._free_camera(shot, False), self.shown)
+                renderer.update_scene(self.data, _free_camera(shot, False), self.shown)
                 renderer.scene.nlight = min(renderer.scene.nlight, int(self.change.get("lights", 99)))
                 times.append(time.process_time())
                 mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
@@ -255,49 +259,61 @@ def cut_out(faces: np.ndarray, where: tuple[np.ndarray, ...]) -> np.ndarray:
     return (above * (1 - v) + below * v + 0.5).astype(np.uint8)
 
 
-def take_all(room: bytes, view: View, ready: object, seconds: object) -> None:
-    """One of the processes that render side by side; sends its processor seconds."""
-    taking = take_pictures(model_of_binary(room), view, (view.shots[0], *view.shots))
-    next(taking)
+def take_all(taking: Callable[[], Iterator[object]], ready: Barrier, seconds: Queue) -> None:
+    """One of the processes that render side by side; sends its pictures a processor second."""
+    pictures = taking()
+    next(pictures)  # compiles shaders
     ready.wait()
-    seconds.put(used(lambda: [None for _ in taking]))
+    begun = time.process_time()
+    count = sum(1 for _ in pictures)
+    seconds.put(count / (time.process_time() - begun))
 
 
-def two_processes(room: bytes, view: View) -> float:
+def two_processes(taking: Callable[[], Iterator[object]]) -> float:
     """Pictures a second of two processes that begin together, by what each uses of the processor."""
     context = get_context("spawn")
     ready, seconds = context.Barrier(2), context.Queue()
-    crew = [context.Process(target=take_all, args=(room, view, ready, seconds), daemon=True) for _ in range(2)]
+    crew = [context.Process(target=take_all, args=(taking, ready, seconds), daemon=True) for _ in range(2)]
     for process in crew:
         process.start()
-    taken = [seconds.get(timeout=300) for _ in crew]
+    rates = [seconds.get(timeout=300) for _ in crew]
     for process in crew:
         process.join(30)
-    return sum(len(view.shots) / one for one in taken)
+    return sum(rates)
 
 
-def miniworld_ms(size: tuple[int, int], count: int) -> float | None:
-    """Processor milliseconds of one of MiniWorld's pictures of its four rooms; None where it is not installed."""
+def pictures_of(room: bytes, view: View) -> Iterator[object]:
+    """A room's pictures one by one, the first of them twice."""
+    return take_pictures(model_of_binary(room), view, (view.shots[0], *view.shots))
+
+
+def miniworld_pictures(size: tuple[int, int], count: int) -> Iterator[object]:
+    """MiniWorld's pictures of its four rooms, and one more before them."""
+    import pyglet
+
+    pyglet.options["headless"] = True
+    import gymnasium
+    import miniworld  # noqa: F401
+
+    world = gymnasium.make("MiniWorld-FourRooms-v0", obs_height=size[0], obs_width=size[1])
+    world.reset(seed=0)
+    shoot: Any = world.unwrapped
+    for number in range(count + 1):
+        shoot.agent.dir = number * 0.7
+        yield shoot.render_obs()
+
+
+def miniworld_row(size: tuple[int, int], count: int) -> Row | None:
+    """What MiniWorld's pictures cost; None where it is not installed."""
     try:
-        import pyglet
-
-        pyglet.options["headless"] = True
-        import gymnasium
-        import miniworld  # noqa: F401
+        taking = miniworld_pictures(size, count)
+        next(taking)
     except Exception as error:
         print(f"MiniWorld left out: {type(error).__name__}", file=sys.stderr)
         return None
-    world = gymnasium.make("MiniWorld-FourRooms-v0", obs_height=size[0], obs_width=size[1])
-    world.reset(seed=0)
-    shoot = world.unwrapped
-    shoot.render_obs()
-
-    def walk() -> None:
-        for number in range(count):
-            shoot.agent.dir = number * 0.7
-            shoot.render_obs()
-
-    return 1000 * used(walk) / count
+    ms = 1000 * used(lambda: [None for _ in taking]) / count
+    many = two_processes(partial(miniworld_pictures, size, count))
+    return {"ms": ms, "pictures/s": 1000 / ms, "2 processes/s": many}
 
 
 def sizes(words: Sequence[str]) -> Iterator[tuple[int, int]]:
@@ -339,15 +355,11 @@ def main() -> None:
                 taken[room, fast].append({"ms": ms, "pictures/s": 1000 / ms})
         for room, fast in WAYS:
             label = f"{size[0]} x {size[1]} {room}{', fast' if fast else ''}"
-            many = two_processes(rooms[room], views[fast])
+            many = two_processes(partial(pictures_of, rooms[room], views[fast]))
             pictures[label] = {**medians(taken[room, fast]), "2 processes/s": many}
-        worlds = miniworld_ms(size, options.pictures)
+        worlds = miniworld_row(size, options.pictures)
         if worlds is not None:
-            pictures[f"{size[0]} x {size[1]} MiniWorld"] = {
-                "ms": worlds,
-                "pictures/s": 1000 / worlds,
-                "2 processes/s": float("nan"),
-            }
+            pictures[f"{size[0]} x {size[1]} MiniWorld"] = worlds
     smallest = next(sizes(options.sizes))
     report = {
         "seconds": {name: medians(rows) for name, rows in built.items()},

@@ -6,8 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from clearway.rooms.camera import Sight, View, eye_view, first_person_shot, first_person_view, two_thirds
+from clearway.rooms.camera import View, eye_view, first_person_shot, first_person_view
+from clearway.rooms.frustum import Frustum
 from clearway.rooms.render import render
+from clearway.rooms.taking import two_thirds
 from clearway.rooms.topview import render_top_view
 from clearway.scenes.sensors import SENSORS
 from helpers.small_rooms import SmallRoom
@@ -131,30 +133,33 @@ def test_depth_leaves_colour_as_it_is():
     np.testing.assert_array_equal(render(model, view, workers=1), alone)
 
 
-def sight_of(model: mujoco.MjModel, view: View) -> Sight:
+def frustum_of(model: mujoco.MjModel, view: View) -> Frustum:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    return Sight(model, data, view)
+    return Frustum(model, data, view)
 
 
 def test_what_is_behind_or_beside_the_camera_is_hidden_while_the_picture_is_taken():
     model, view = lit(coloured_room()), eye_view(height_px=96, width_px=128, fast=True)
-    sight = sight_of(model, view)
+    frustum = frustum_of(model, view)
     for heading_deg, seen in ((0, [0]), (90, [1]), (20, [0, 1]), (315, [0, 3])):  # walls in the order of WALLS
-        with sight.of(first_person_shot(2.0, 2.0, heading_deg)):
+        with frustum.of(first_person_shot(2.0, 2.0, heading_deg)):
             assert np.flatnonzero(model.geom_group == 2).tolist() == seen
         assert np.all(model.geom_group == 2)
-    with sight.of(first_person_shot(2.0, 2.0, 0, pitch_deg=85)):
+    with frustum.of(first_person_shot(2.0, 2.0, 0, pitch_deg=85)):
         assert not np.any(model.geom_group == 2)
 
 
-def test_a_mirror_may_show_everything():
+def test_a_mirror_in_sight_may_show_everything():
     room = coloured_room()
     room.spec.add_material(name="glass", reflectance=0.5)
     room.spec.geoms[0].material = "glass"
     model = lit(room)
-    with sight_of(model, eye_view(fast=True)).of(first_person_shot(2.0, 2.0, 0)):
+    frustum = frustum_of(model, eye_view(fast=True))
+    with frustum.of(first_person_shot(2.0, 2.0, 0)):
         assert np.all(model.geom_group == 2)
+    with frustum.of(first_person_shot(2.0, 2.0, 180)):  # it is behind the camera
+        assert np.flatnonzero(model.geom_group == 2).tolist() == [2]
 
 
 def fast_and_not(model: mujoco.MjModel, view: View) -> tuple[np.ndarray, np.ndarray]:

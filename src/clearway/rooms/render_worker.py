@@ -59,7 +59,8 @@ def open_camera(lens: Mapping[str, Any], room: bytes) -> Camera:
     """
     asked: deque[Shot] = deque()
     with _one_kind_of_error():
-        from clearway.rooms.camera import View, take_pictures
+        from clearway.rooms.camera import View
+        from clearway.rooms.taking import take_pictures
 
         view = View(shots=(), **lens)
         pictures = take_pictures(model_of_binary(room), view, iter(asked.popleft, None))
