@@ -104,6 +104,8 @@ def sweep_settings(strengths: tuple[float, ...], reference: Perturbations = REFE
     """Nothing changed; every perturbation alone, then all together, at every strength (a share of `reference`)."""
     settings = [Condition("none", Perturbations())]
     for name, value in reference.to_json().items():
+        if not value:
+            continue
         for scaled in (reference.scaled(strength) for strength in strengths):
             single = scaled.alone(name)
             settings.append(Condition(label_of(single), single))
