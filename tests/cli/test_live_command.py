@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
+from clearway.importers.mjcf import read_mjcf
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import train
 from clearway.live.walks import walk_setting
+from clearway.perception.preprocess import Preprocessing
+from clearway.perception.random_resnet import fit_record, from_record
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from helpers.small_live import walkable_room, walkable_scene
+from helpers.small_live import TINY, walkable_room, walkable_scene
+from helpers.small_model import AGENT, CHOICE, PLANE, written
 from helpers.small_runs import small_request
 
 
@@ -57,7 +61,7 @@ def test_two_runs_are_compared_and_the_run_folder_keeps_the_tables(clearway, run
     (result,) = answer.json["results"]
     assert answer.json["episodes_per_target"] == 2 and answer.json["step_limit"] == 4
     assert result["setting"] == "new obstacle"
-    assert set(result["agents"]) == {"shortest", "collision-aware"}
+    assert set(result["agents"]) == {"shortest", "collision-aware"} == set(answer.json["grid"]["agents"])
     assert result["comparison"]["first"] == "shortest"
     assert result["agents"]["shortest"]["rearranged"] > 0
     assert json.loads((runs.bold / "live.json").read_text()) == answer.json
@@ -70,6 +74,14 @@ def test_one_run_alone_is_a_table(clearway, runs):
     answer = clearway("evaluate", runs.bold, *SHORT, "--selection", "argmax")
     assert answer.code == 0, answer
     assert "none" in answer.out and "Actions argmax" in answer.out and "less" not in answer.out
+    assert "on the grid" in answer.out
+
+
+def test_the_grid_beside_it_is_the_evaluation_on_the_grid(clearway, runs):
+    live = clearway("evaluate", runs.bold, *SHORT, "--json").json["grid"]["agents"]["shortest"]
+    grid = clearway("evaluate", runs.bold, *SHORT[1:], "--json").json["average"]
+    for name, own in (("success", "success"), ("steps", "steps"), ("contacts", "collisions")):
+        assert live[name] == grid[own] and live["intervals"][name] == grid["intervals"][own]
 
 
 @pytest.mark.slow
@@ -155,3 +167,39 @@ def test_the_same_run_twice_is_refused(clearway, runs):
 
 def test_a_run_on_an_imported_scene_is_refused(clearway, trained):
     assert clearway("evaluate", trained.run, "--live").refusal("bathroom_02", "thor_v1", "scenes build")
+
+
+@pytest.fixture(scope="module")
+def run_in_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run in a MuJoCo model of somebody's."""
+    folder = tmp_path_factory.mktemp("model")
+    seen = read_mjcf(written(folder, PLANE), CHOICE, AGENT, height_px=18, width_px=24, workers=1)
+    record = fit_record([seen.observations], shape=TINY, preprocessing=Preprocessing(16, 16), sample_pictures=32)
+    path = folder / "hall.h5"
+    write_scene(replace(seen, features=from_record(record).encode(seen.observations), encoder=record), path)
+    scene = read_scene(path)
+    request = small_request(scenes=[scene], targets={"hall": (8, 41)}, paths={"hall": path}, reward=SHORTEST)
+    return train(request, folder / "run").path
+
+
+def test_a_run_in_a_mujoco_model_walks_there(clearway, run_in_model, tmp_path):
+    short = ("evaluate", run_in_model, "--live", "--episodes", 1, "--step-limit", 2)
+    answer = clearway(*short, "--distance-noise", 0.05, "--camera-height-jitter", 0.1, "--light", 0.3, "--json",
+                      "--pictures", tmp_path)  # fmt: skip
+    assert answer.code == 0, answer
+    (result,) = answer.json["results"]
+    assert result["agents"]["shortest"]["rearranged"] == 0
+    assert 0 <= result["agents"]["shortest"]["min_clearance_m"] < 1
+    assert (tmp_path / "live-hall.png").read_bytes()[:4] == b"\x89PNG"
+    clearway(*short, "--new-obstacle").refusal("hall: nothing can be moved in a MuJoCo model", "Leave out")
+    sweep = clearway(*short, "--sweep", "--strengths", 1, "--json")
+    assert "the sweep leaves out move_furniture and new_obstacle" in sweep.err
+    labels = [found["setting"] for found in sweep.json["results"]]
+    assert len(labels) == 8 and not any("furniture" in label or "obstacle" in label for label in labels)
+
+
+def test_a_model_that_is_gone_is_one_line(clearway, run_in_model, tmp_path):
+    model = run_in_model.parent / "hall.xml"
+    model.rename(tmp_path / "hall.xml")
+    clearway("evaluate", run_in_model, "--live").refusal("hall: its MuJoCo model", "hall.xml is missing", "Put it back")
+    (tmp_path / "hall.xml").rename(model)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clearway.live.around import RoomAround
 from clearway.live.body import REACH_M, SAMPLES, Body
 from clearway.rooms import ROOM_NAMES, build_room
 from clearway.rooms.navigation import find_grid
@@ -13,7 +14,7 @@ from helpers.small_rooms import SmallRoom
 
 
 def body_at(room: SmallRoom, x_m: float, z_m: float) -> Body:
-    body = Body(room)
+    body = Body(RoomAround(room))
     body.stand_at(np.array([x_m, z_m]))
     return body
 
@@ -79,7 +80,7 @@ def test_gaps_are_distances_between_surfaces_at_equal_moments():
     assert body.gap_m() == pytest.approx(0.8)  # 1 m less the radius
     gaps_m = body.move(0.5, 0.0).gaps_m
     assert gaps_m == pytest.approx(0.8 - 0.5 * np.arange(1, SAMPLES + 1) / SAMPLES)
-    assert Body(large_room()).gap_m() < 0  # at the origin, in the corner of the floor
+    assert Body(RoomAround(large_room())).gap_m() < 0  # at the origin, in the corner of the floor
 
 
 @pytest.mark.parametrize(("ahead_m", "steps"), [(0.4, 0), (0.69, 0), (0.71, 1), (1.19, 1), (1.21, 2)])
@@ -93,7 +94,7 @@ def test_free_steps_are_those_that_would_end_without_a_contact(ahead_m, steps):
 
 def test_free_steps_find_what_moves_find_at_any_pose():
     room = large_room().add_box((2.0, 2.4), (3.3, 3.4)).add_box((4.0, 4.02), (1.0, 5.0)).add_box((1.0, 1.3), (1.0, 1.3))
-    rng, body, found = np.random.default_rng(0), Body(room), []
+    rng, body, found = np.random.default_rng(0), Body(RoomAround(room)), []
     for _ in range(400):
         place_m, heading_deg = rng.uniform(0.3, 5.7, 2), float(rng.uniform(0, 360))
         body.stand_at(place_m)
@@ -127,7 +128,7 @@ def test_every_move_of_the_grid_has_the_same_outcome(name):
     assert name in ROOM_NAMES
     room = build_room(name, looks=False)
     grid = find_grid(room)
-    body = Body(room)
+    body = Body(RoomAround(room))
     places_m, headings_deg = grid.state_locations_m, grid.state_headings_deg
     for state in range(len(grid.graph)):
         for action, sign in ((Action.MOVE_FORWARD, 1), (Action.MOVE_BACKWARD, -1)):

@@ -9,6 +9,7 @@ from clearway.errors import SceneError
 from clearway.generation.files import notes_of
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
+from clearway.live.around import RoomAround
 from clearway.live.body import Body
 from clearway.live.live_room import live_room, live_room_named
 from clearway.scenes.actions import BLOCKED, Action
@@ -41,7 +42,7 @@ def test_a_floor_plan_is_a_room_to_walk_in_whose_moves_are_those_of_the_plan():
     reachable[1, 1] = False
     scene = floor_plan_scene(FloorPlan.of_map("ring", reachable, np.array([[[2, 0], [3, 0]]])), feature_count=4)
     live = live_room(scene)
-    body = Body(live.room, live.agent)
+    body = Body(RoomAround(live.room, live.agent))
     np.testing.assert_allclose(live.scene.locations_m + live.origin_m, scene.locations_m)
     for state in range(scene.state_count):
         x_m, z_m, heading_deg = live.pose_of(state)
@@ -57,7 +58,7 @@ def test_a_generated_room_is_one_to_walk_in_and_another_plan_is_not_taken_for_it
     made_by = Provenance("generated", seed=0, notes=notes_of(request))
     scene = replace(floor_plan_scene(plan, feature_count=4), made_by=made_by)
     live = live_room(scene)
-    body = Body(live.room, live.agent)
+    body = Body(RoomAround(live.room, live.agent))
     for state in range(0, scene.state_count, 7):
         x_m, z_m, heading_deg = live.pose_of(state)
         body.stand_at(np.array([x_m, z_m]))

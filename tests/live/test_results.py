@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from clearway.evaluation.episodes import EpisodeTable
 from clearway.live.arrangement import Arrangement
 from clearway.live.conditions import Perturbations
 from clearway.live.episodes import LiveProtocol, LiveTable
 from clearway.live.result_tables import agent_rows, compared_rows, markdown_tables, rich_tables
-from clearway.live.results import LiveResult, summarise
+from clearway.live.results import LiveReport, LiveResult, grid_figures, summarise
 
 PROTOCOL = LiveProtocol(2, 10, 0, "sampled")
 
@@ -48,6 +49,22 @@ def wary() -> LiveTable:
 @pytest.fixture(scope="module")
 def result() -> LiveResult:
     return summarise("none", Perturbations(), {"bold": [table()], "wary": [wary()]}, seed=0)
+
+
+@pytest.fixture(scope="module")
+def report(result: LiveResult) -> LiveReport:
+    """Beside "wary" on the grid: of four episodes three succeed."""
+    grid = EpisodeTable(
+        target=np.array([0, 0, 1, 1]),
+        start=np.zeros(4, int),
+        steps=np.array([10, 4, 5, 5]),
+        collisions=np.array([6, 0, 0, 1]),
+        reached=np.array([False, True, True, True]),
+        shortest_path_steps=np.array([4, 4, 5, 5]),
+        zone_steps=np.zeros((4, 3), int),
+        looped=np.zeros(4, bool),
+    )
+    return LiveReport((result,), {"wary": grid_figures(grid, np.array([0, 0]), seed=0)}, PROTOCOL, "tiny")
 
 
 def test_values_are_means_over_targets(result):
@@ -87,23 +104,35 @@ def test_scenes_count_alike():
     assert both.comparison is None and compared_rows([both]) == []
 
 
-def test_tables_show_figures_with_intervals_and_say_what_success_means(result):
-    (_, name, cells), *_ = agent_rows([result])
+def test_tables_show_figures_with_intervals_and_say_what_success_means(report):
+    (place, agent, on_grid), (_, name, cells), *_ = agent_rows(report)
+    assert (place, agent) == ("on the grid", "wary")
+    assert [value for value, _ in on_grid] == ["75", "6.0", "1.75", "–", "–", "–", "–"]
     assert name == "bold" and cells[0][0] == "75" and cells[1][0] == "6.0"
-    ((_, _, differences),) = compared_rows([result])
+    ((_, _, differences),) = compared_rows(report.results)
     assert differences[1][0] == "-1.00" and " to " in differences[1][1]
-    text = markdown_tables([result], PROTOCOL, "tiny")
+    text = markdown_tables(report)
+    assert "| on the grid | wary | 75 (" in text and "| – | – | – | – |" in text
     assert "| none | wary | 100 (100–100) |" in text
     assert "wary less bold" in text and "within 25 cm and 45°" in text and "Encoder: tiny" in text
 
 
-def test_a_terminal_of_80_columns_shows_every_figure_whole(result):
+def test_a_terminal_of_80_columns_shows_every_figure_whole(report):
     console = Console(width=80, record=True)
-    console.print(rich_tables([result], PROTOCOL, "tiny"))
+    console.print(rich_tables(report))
     text = console.export_text()
     assert "…" not in text and max(map(len, text.splitlines())) <= 80
-    for _, _, cells in (*agent_rows([result]), *compared_rows([result])):
+    for _, _, cells in (*agent_rows(report), *compared_rows(report.results)):
         assert all(word in text for value, ends in cells for word in (value, *ends.split(" to ")))
+
+
+def test_the_grid_stands_in_one_place_of_the_json(report):
+    content = json.loads(json.dumps(report.to_json()))
+    found = content["grid"]["agents"]["wary"]
+    assert (found["success"], found["steps"], found["contacts"], found["contact_free"]) == (0.75, 6.0, 1.75, 0.5)
+    assert found["contacts_per_100_steps"] == pytest.approx((600 / 14 + 10) / 2)
+    assert set(found) == {*found["intervals"], "intervals"} and "min_clearance_m" not in found
+    assert [one["setting"] for one in content["results"]] == ["none"]
 
 
 def test_results_are_json(result):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clearway.live.around import RoomAround
 from clearway.live.body import Body
 from clearway.live.conditions import Perturbations
 from clearway.live.draws import Draws
@@ -21,7 +22,7 @@ WIDE = SmallRoom(width_m=6.0, depth_m=6.0)
 
 def walker_at(x_m: float, z_m: float, heading_deg: float, room: SmallRoom = WIDE, **strengths: float) -> Walker:
     draws = Draws(0, Perturbations(**strengths))
-    return Walker(Body(room), (x_m, z_m, heading_deg), draws, step_m=0.5, turn_deg=90.0)
+    return Walker(Body(RoomAround(room)), (x_m, z_m, heading_deg), draws, step_m=0.5, turn_deg=90.0)
 
 
 @pytest.mark.parametrize("room", ["walkable", "bathroom"])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
 from clearway.cli.console import print_json, say, stderr_console, stdout_console
 from clearway.errors import ClearwayError
-from clearway.live.conditions import MOST, REFERENCE, Perturbations
+from clearway.live.conditions import MOST, REARRANGING, REFERENCE, Perturbations
 
 if TYPE_CHECKING:
     from clearway.learn.load import TrainedNetwork
@@ -89,27 +89,39 @@ def evaluate_live(
     _check_rooms_can_be_built()
     from clearway.live.episodes import LiveProtocol
     from clearway.live.result_tables import rich_tables
-    from clearway.live.walks import check_alike, finish_live, live_json, stages, walk_setting, write_live_part
+    from clearway.live.results import LiveReport
+    from clearway.live.walks import check_alike, finish_live, stages, walk_on_grid, walk_setting, write_live_part
 
     check_alike(agents)
     one = Condition(label_of(options.perturbations), options.perturbations)
-    settings = sweep_settings(options.strengths) if options.sweep else [one]
     protocol = LiveProtocol(episodes, step_limit, seed, options.selection)
     encoder = encoder_names(scenes)
     with stages(agents, scenes) as places:
+        settings = sweep_settings(options.strengths, _reference(places)) if options.sweep else [one]
         outcomes: list[LiveOutcome] = []
         with _status() as show:
+            show("on the grid")
+            report = LiveReport((), walk_on_grid(agents, scenes, protocol), protocol, encoder)
             for setting in settings:
                 outcomes.append(walk_setting(places, agents, setting, protocol, show))
-                results = [outcome.result for outcome in outcomes]
-                write_live_part(folder, results, protocol, encoder)  # what is complete outlives an interruption
+                report = replace(report, results=tuple(outcome.result for outcome in outcomes))
+                write_live_part(folder, report)  # what is complete outlives an interruption
         finish_live(folder)
         if pictures is not None:
             _draw(pictures, places, outcomes)
     if json:
-        print_json(live_json(results, protocol, encoder))
+        print_json(report.to_json())
         return
-    stdout_console().print(rich_tables(results, protocol, encoder))
+    stdout_console().print(rich_tables(report))
+
+
+def _reference(places: list[LiveScene]) -> Perturbations:
+    """Full strength in a sweep: of what can be changed in every room."""
+    fixed = [place.live.scene.name for place in places if place.live.room is None]
+    if not fixed:
+        return REFERENCE
+    say(f"the sweep leaves out {' and '.join(REARRANGING)}: nothing can be moved in the MuJoCo model of {fixed[0]}")
+    return replace(REFERENCE, **{name: type(getattr(REFERENCE, name))() for name in REARRANGING})
 
 
 def _draw(folder: Path, places: list[LiveScene], outcomes: list[LiveOutcome]) -> None:

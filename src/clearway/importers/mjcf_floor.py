@@ -104,7 +104,7 @@ def find_cells(
         Obstacles(model, agent, floor_m=world.floor_m, unfelt_too=world.unfelt_too),
         agent,
         from_origin=world.spawn_m is not None,
-        carries=lambda points_m: _on_floor(model, data, points_m, world.floor_m),
+        carries=lambda points_m: on_floor(model, data, points_m, world.floor_m),
     )
     if grid is not None:
         return grid
@@ -115,7 +115,7 @@ def find_cells(
     raise SceneError(path, f"{body} fits {where} on a floor at a height of {world.floor_m:g} m", remedy)
 
 
-def _on_floor(model: mujoco.MjModel, data: mujoco.MjData, points_m: np.ndarray, floor_m: float) -> np.ndarray:
+def on_floor(model: mujoco.MjModel, data: mujoco.MjData, points_m: np.ndarray, floor_m: float) -> np.ndarray:
     """Whether there is a floor at each of (N, 2) points, (N,) bool."""
     down, hit = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
     depths_m = np.array(

@@ -70,6 +70,10 @@ MOST = {
 """Of every magnitude: at light 1 an episode may be black, and no room is longer than 10 m."""
 
 
+REARRANGING = ("move_furniture", "new_obstacle")
+"""Of these, what changes where things stand: there is nothing to move in MuJoCo models of others."""
+
+
 @dataclass(frozen=True)
 class Condition:
     """A row of a sweep: its label and what is changed."""
@@ -100,6 +104,8 @@ def sweep_settings(strengths: tuple[float, ...], reference: Perturbations = REFE
     """Nothing changed; every perturbation alone, then all together, at every strength (a share of `reference`)."""
     settings = [Condition("none", Perturbations())]
     for name, value in reference.to_json().items():
+        if not value:
+            continue
         for scaled in (reference.scaled(strength) for strength in strengths):
             single = scaled.alone(name)
             settings.append(Condition(label_of(single), single))

@@ -20,14 +20,14 @@ from clearway.agents.agent import FEATURES, Agent, Observation, rows
 from clearway.agents.selection import Argmax
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds
-from clearway.live.arrangement import Arrangement, arranged, as_built
-from clearway.live.body import SAMPLES, Body, Motion
+from clearway.live.arrangement import Arrangement
+from clearway.live.body import SAMPLES, Motion
 from clearway.live.conditions import Perturbations
 from clearway.live.draws import Draws
 from clearway.live.live_room import LiveRoom, layout_of_episode
 from clearway.live.walker import Walker
 from clearway.reward import COLLISION_AWARE
-from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
+from clearway.rooms.camera import Shot, first_person_shot
 from clearway.rooms.render import Camera
 from clearway.scenes.actions import Action
 from clearway.scenes.sensors import RGB
@@ -120,8 +120,10 @@ def run_live_episodes(
 
     Raises:
         AgentError: the agent sees something else than colour pictures.
+        SceneError: perturbations move what cannot be moved in the room.
     """
     _check_sight(agent)
+    live.check_can_be_rearranged(perturbations)
     target = torch.arange(world.target_count).repeat_interleave(protocol.episodes_per_target)
     seeds = episode_seeds(world, protocol.episodes_per_target, protocol.seed)
     env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
@@ -153,12 +155,12 @@ class _Walker:
 
     def __init__(self, live: LiveRoom, start: int, target: int, draws: Draws) -> None:
         scene = live.scene
-        self.start, self.draws = start, draws
+        self.live, self.start, self.draws = live, start, draws
         self.layout = layout_of_episode(live, start, target, draws)
-        body = Body(arranged(live.room, self.layout), live.agent)
+        body = live.body(self.layout)
         self.walker = Walker(body, live.pose_of(start), draws, step_m=scene.cell_size_m, turn_deg=scene.turn_deg)
         self.target = live.pose_of(target)
-        self.changed = self.layout != as_built(live.room)
+        self.changed = self.layout != live.as_built()
         self.steps: list[Motion] = []
         self.walk = [self.walker.pose]
 
@@ -172,9 +174,11 @@ class _Walker:
         """The body is at the target and looks its way."""
         return self.walker.is_at(self.target, SUCCESS_M, SUCCESS_DEG)
 
-    def shot_arguments(self) -> tuple[tuple[float, float, float], float, float]:
-        """Pose, camera height and pitch of the next picture."""
-        return self.walker.pose, CAMERA_HEIGHT_M + self.draws.height_error_m(), self.draws.pitch_error_deg()
+    def shot(self) -> Shot:
+        """The next picture."""
+        height_m, pitch_deg = self.live.camera_m + self.draws.height_error_m(), self.draws.pitch_error_deg()
+        moved_m = self.live.bodies_m(self.layout)
+        return first_person_shot(*self.walker.pose, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m)
 
 
 def _check_sight(agent: Agent) -> None:
@@ -197,12 +201,7 @@ def _wanted(live: LiveRoom, world: World, target: Tensor) -> Observation:
 
 def _seen(walkers: Sequence[_Walker], camera: Camera) -> np.ndarray:
     """Pictures (B, height, width, 3) uint8 of what each sees."""
-    shots = []
-    for walker in walkers:
-        pose, height_m, pitch_deg = walker.shot_arguments()
-        moved_m = walker.layout.bodies_m
-        shots.append(first_person_shot(*pose, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m))
-    pictures = camera(shots)
+    pictures = camera([walker.shot() for walker in walkers])
     return np.stack([walker.draws.seen(picture) for walker, picture in zip(walkers, pictures, strict=True)])
 
 

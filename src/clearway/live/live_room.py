@@ -8,17 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.live.conditions import REARRANGING, Perturbations
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
+from clearway.rooms.camera import CAMERA_HEIGHT_M, View, eye_view
+from clearway.rooms.groups import CEILING_GROUP, SEEN_GROUP
 from clearway.scenes import floor_plans
 from clearway.scenes.scene import Provenance, Scene
 
 if TYPE_CHECKING:
     import mujoco
 
+    from clearway.importers.mjcf_world import ModelWorld
     from clearway.live.arrangement import Arrangement
+    from clearway.live.body import Body
+    from clearway.rooms.detail import Detail
     from clearway.rooms.obstacles import AgentShape, CollisionRoom
     from clearway.scenes.floor_plans import FloorPlan
 
+MODEL_SOURCE = "mjcf"
 NEW_OBSTACLE_RGBA = (0.72, 0.36, 0.24, 1.0)
 
 
@@ -28,38 +35,95 @@ class LiveRoom:
 
     Attributes:
         scene: the grid of it that the agent knows, its locations in the room's coordinates.
-        room: its obstacles.
-        model: what the camera sees; every piece of furniture, and last the new obstacle, is a mocap body.
+        room: its obstacles; None of a MuJoCo model of others, in which nothing can be moved.
+        model: what the camera sees; of a room of ours every piece of furniture, and last the new obstacle, is a mocap
+            body, if it was built `loose`.
         agent: the body that walks in it; None: the paper's capsule.
         origin_m: x and z of the room's origin in the coordinates of the scene as it is kept.
+        camera_m: height of the camera.
+        groups: the geom groups that it sees.
+        world: the MuJoCo model of others.
     """
 
     scene: Scene
-    room: CollisionRoom
+    room: CollisionRoom | None
     model: mujoco.MjModel
     agent: AgentShape | None = None
     origin_m: tuple[float, float] = (0.0, 0.0)
+    camera_m: float = CAMERA_HEIGHT_M
+    groups: tuple[int, ...] = (SEEN_GROUP, CEILING_GROUP)
+    world: ModelWorld | None = None
 
     def pose_of(self, state: int) -> tuple[float, float, float]:
         """x, z and heading of a state in the room."""
         x_m, z_m = self.scene.locations_m[state].tolist()
         return x_m, z_m, float(self.scene.headings_deg[state])
 
+    def as_built(self) -> Arrangement:
+        """Nothing moved, nothing new."""
+        from clearway.live.arrangement import Arrangement, as_built
 
-def live_room(scene: Scene) -> LiveRoom:
-    """Build the room of a scene again, some seconds.
+        return Arrangement(()) if self.room is None else as_built(self.room)
+
+    def bodies_m(self, layout: Arrangement) -> tuple[tuple[float, float, float], ...]:
+        """Where the bodies of the model are in a layout (`camera.Shot.moved_m`)."""
+        return () if self.room is None else layout.bodies_m
+
+    def body(self, layout: Arrangement) -> Body:
+        """A body of its own in the room in a layout."""
+        from clearway.live.around import RoomAround
+        from clearway.live.arrangement import arranged
+        from clearway.live.body import Body
+        from clearway.live.model_room import around_in
+
+        if self.room is None:
+            assert self.world is not None, "either a room or a model of others"
+            return Body(around_in(self.world))
+        return Body(RoomAround(arranged(self.room, layout), self.agent))
+
+    def is_on_floor(self, x_m: float, z_m: float) -> bool:
+        """Whether a point lies within the edges of the floor."""
+        if self.room is None:
+            assert self.world is not None, "either a room or a model of others"
+            (x_low_m, z_low_m), (x_high_m, z_high_m) = self.world.floor.low_m, self.world.floor.high_m
+            return x_low_m <= x_m <= x_high_m and z_low_m <= z_m <= z_high_m
+        return 0 <= x_m <= self.room.width_m and 0 <= z_m <= self.room.depth_m
+
+    def lens(self, height_px: int, width_px: int, *, fast: bool = False) -> View:
+        """Pictures of this size through the agent's lens, `fast` as of `camera.View`."""
+        return eye_view(height_px=height_px, width_px=width_px, groups=self.groups, fast=fast)
+
+    def check_can_be_rearranged(self, perturbations: Perturbations) -> None:
+        """Raise SceneError where perturbations move what cannot be moved here."""
+        wanted = [name for name in REARRANGING if getattr(perturbations, name)]
+        if self.room is None and wanted:
+            problem = f"nothing can be moved in a MuJoCo model, and {wanted[0]} is asked for"
+            raise SceneError(self.scene.name, problem, f"Leave out {' and '.join(REARRANGING)}")
+
+
+def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveRoom:
+    """Build the room of a scene again, some seconds; or open its MuJoCo model.
+
+    Args:
+        scene: of a room of ours, a floor plan, a generated room or flat, or a MuJoCo model.
+        small: modelled less finely, for small pictures (`rooms.detail.SMALL`), as far as the room can be.
+        loose: its furniture can be moved, and a new obstacle put into it.
 
     Raises:
-        SceneError: the scene is no room of ours, floor plan or generated one, or this version builds it differently.
+        SceneError: the scene is none of these, this version builds it differently, or its model is missing or changed.
     """
     made = scene.made_by
+    if made.source == MODEL_SOURCE:
+        from clearway.live.model_room import live_model_scene
+
+        return live_model_scene(scene)
     if made.source in floor_plans.SOURCES and made.seed is not None:
-        return _live_plan(scene, floor_plans.plan_of(scene), made.seed)
+        return _live_plan(scene, floor_plans.plan_of(scene), made.seed, small, loose)
     if made.source != "room" or made.room is None or made.seed is None:
         raise SceneError(
             scene.name,
             f"there is no room to walk in: the scene comes from {made.source}",
-            "Walk live in a scene that clearway scenes build, generate or import floor-plan made",
+            "Walk live in a scene that clearway scenes build, generate, import floor-plan or import mjcf made",
         )
     grid = room_scene(made.room, made.seed)
     if not np.array_equal(grid.graph, scene.graph) or not np.allclose(grid.locations_m, scene.locations_m):
@@ -69,23 +133,30 @@ def live_room(scene: Scene) -> LiveRoom:
             "Build the scene again and train on it",
             "graph",
         )
-    return _live_named(scene, made.room, made.seed)
+    return _live_named(scene, made.room, made.seed, small, loose)
 
 
-def live_room_named(name: str, seed: int = 0) -> LiveRoom:
-    """One of our own rooms, without a scene file; some seconds.
+def live_room_named(name: str, seed: int = 0, *, small: bool = False, loose: bool = True) -> LiveRoom:
+    """One of our own rooms, without a scene file; some seconds. `small` and `loose` as of `live_room`.
 
     Raises:
         SceneError: there is no such room, or the seed is negative.
     """
-    return _live_named(room_scene(name, seed), name, seed)
+    return _live_named(room_scene(name, seed), name, seed, small, loose)
 
 
-def _live_named(scene: Scene, name: str, seed: int) -> LiveRoom:
+def _live_named(scene: Scene, name: str, seed: int, small: bool, loose: bool) -> LiveRoom:
     from clearway.rooms import build_room
 
-    room = build_room(name, seed, loose=True)
-    return LiveRoom(scene, room, camera_model(room.spec))
+    room = build_room(name, seed, loose=loose, detail=_detail(small))
+    return LiveRoom(scene, room, camera_model(room.spec) if loose else room.spec.compile())
+
+
+def _detail(small: bool) -> Detail:
+    """How finely a room is modelled."""
+    from clearway.rooms.detail import FULL, SMALL
+
+    return SMALL if small else FULL
 
 
 def room_scene(name: str, seed: int = 0) -> Scene:
@@ -106,7 +177,7 @@ def room_scene(name: str, seed: int = 0) -> Scene:
     return Scene(scene_name(name, seed), None, None, places_m, headings_deg, grid.graph, made_by)
 
 
-def _live_plan(scene: Scene, plan: FloorPlan, seed: int) -> LiveRoom:
+def _live_plan(scene: Scene, plan: FloorPlan, seed: int, small: bool, loose: bool) -> LiveRoom:
     """The room of a floor plan, and the scene moved to where the room's corner is the origin."""
     from clearway.rooms.build import check_mujoco
 
@@ -115,7 +186,7 @@ def _live_plan(scene: Scene, plan: FloorPlan, seed: int) -> LiveRoom:
     check_mujoco()
     from clearway.rooms.plans.plan_room import agent_for, build_plan_room
 
-    room, layout = build_plan_room(plan, seed, loose=True)
+    room, layout = build_plan_room(plan, seed, loose=loose, detail=_detail(small))
     locations_m = scene.locations_m - np.array(layout.origin_m)
     x_m, z_m = layout.origin_m
     view = scene.top_view and replace(
@@ -126,14 +197,17 @@ def _live_plan(scene: Scene, plan: FloorPlan, seed: int) -> LiveRoom:
         z_max_m=scene.top_view.z_max_m - z_m,
     )
     moved = replace(scene, locations_m=locations_m, top_view=view)
-    return LiveRoom(moved, room, camera_model(room.spec), agent_for(plan.cell_size_m), layout.origin_m)
+    model = camera_model(room.spec) if loose else room.spec.compile()
+    return LiveRoom(moved, room, model, agent_for(plan.cell_size_m), layout.origin_m)
 
 
 def layout_of_episode(live: LiveRoom, start: int, target: int, draws: Draws) -> Arrangement:
     """The layout of the room in an episode between two states, as its perturbations ask for it."""
-    from clearway.live.arrangement import as_built, furniture_moved, with_obstacle_on_path
+    from clearway.live.arrangement import furniture_moved, with_obstacle_on_path
 
-    layout, wanted = as_built(live.room), draws.perturbations
+    layout, wanted = live.as_built(), draws.perturbations
+    if live.room is None:
+        return layout
     if wanted.move_furniture:
         rng = draws.generator(FURNITURE)
         layout = furniture_moved(live.room, live.scene, start, target, wanted.move_furniture, rng, live.agent)
@@ -146,7 +220,6 @@ def layout_of_episode(live: LiveRoom, start: int, target: int, draws: Draws) -> 
 def camera_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The compiled room with the new obstacle on a body of its own, out of sight."""
     from clearway.live.arrangement import OUT_OF_SIGHT_M, add_new_obstacle
-    from clearway.rooms.groups import SEEN_GROUP
 
     body = spec.worldbody.add_body(name="new obstacle", mocap=True, pos=OUT_OF_SIGHT_M)
     geom = add_new_obstacle(body, (0.0, 0.0, 0.0), SEEN_GROUP)

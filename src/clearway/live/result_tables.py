@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from clearway.live.episodes import SUCCESS_DEG, SUCCESS_M, LiveProtocol
-from clearway.live.results import Figures, LiveResult
+from clearway.live.episodes import SUCCESS_DEG, SUCCESS_M
+from clearway.live.results import Figures, LiveReport, LiveResult
 from clearway.markdown import table_lines
 from clearway.terminal import noted
 
@@ -27,7 +27,9 @@ class _Column:
     """Heading where there is little room; the heading itself by default."""
 
     def cell(self, figures: Figures) -> tuple[str, str]:
-        """The figure and its interval."""
+        """The figure and its interval; a dash alone where there is no such figure."""
+        if self.metric not in figures.values:
+            return "–", ""
         value, low, high = (
             f"{round(self.scale * number, self.digits) + 0.0:.{self.digits}f}"  # + 0.0: no "-0.0"
             for number in (figures.values[self.metric], *figures.intervals[self.metric])
@@ -54,15 +56,18 @@ COMPARED = (
 )
 LARGER = _Column("P(larger least clearance)", "probability_of_larger_clearance", 2, 1, "P\n(larger)")
 
+ON_GRID = "on the grid"
+
 Rows = list[tuple[str, str, list[tuple[str, str]]]]
 
 
-def agent_rows(results: Sequence[LiveResult]) -> Rows:
-    """Setting, agent and cells (figure, interval) of `COLUMNS`."""
+def agent_rows(report: LiveReport) -> Rows:
+    """Setting, agent and cells (figure, interval) of `COLUMNS`; first of all on the grid."""
+    settings = [(ON_GRID, report.grid), *((result.label, result.agents) for result in report.results)]
     return [
-        (result.label, name, [column.cell(figures) for column in COLUMNS])
-        for result in results
-        for name, figures in result.agents.items()
+        (label, name, [column.cell(figures) for column in COLUMNS])
+        for label, agents in settings
+        for name, figures in agents.items()
     ]
 
 
@@ -78,28 +83,35 @@ def compared_rows(results: Sequence[LiveResult]) -> Rows:
     return rows
 
 
-def notes(protocol: LiveProtocol, encoder: str) -> list[str]:
+def notes(report: LiveReport) -> list[str]:
     """What belongs under the tables."""
+    protocol = report.protocol
     return [
-        f"Encoder: {encoder}. Actions {protocol.selection}. {protocol.episodes_per_target} episodes a target from the "
-        f"starts of the grid's evaluation, at most {protocol.step_limit:,} steps, seed {protocol.seed}.",
+        f"Encoder: {report.encoder}. Actions {protocol.selection}. {protocol.episodes_per_target} episodes a target "
+        f"from the starts of the grid's evaluation, at most {protocol.step_limit:,} steps, seed {protocol.seed}.",
         f"Success: within {100 * SUCCESS_M:g} cm and {SUCCESS_DEG:g}° of the target's pose. Ranges: 95 % bootstrap "
         "intervals over episodes; differences are paired by episode.",
+        f"{ON_GRID.capitalize()}: the same agents, targets, starts and number of episodes on the scene's grid; success "
+        "is the target's very pose, a contact a blocked move, and there is no clearance.",
     ]
 
 
-def markdown_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> str:
+def markdown_tables(report: LiveReport) -> str:
     """Both tables in Markdown, notes under them."""
     headings = ["setting", "agent"]
-    lines = _markdown([*headings, *(column.heading for column in COLUMNS)], agent_rows(results))
-    if compared := compared_rows(results):
+    lines = _markdown([*headings, *(column.heading for column in COLUMNS)], agent_rows(report))
+    if compared := compared_rows(report.results):
         lines += ["", *_markdown([*headings, *(column.heading for column in (*COMPARED, LARGER))], compared)]
-    return "\n".join([*lines, "", *(f"{note}  " for note in notes(protocol, encoder))]) + "\n"
+    return "\n".join([*lines, "", *(f"{note}  " for note in notes(report))]) + "\n"
 
 
 def _markdown(headings: Sequence[str], rows: Rows) -> list[str]:
     return table_lines(
-        headings, [[label, name, *(f"{value} ({ends})" for value, ends in cells)] for label, name, cells in rows]
+        headings,
+        [
+            [label, name, *(f"{value} ({ends})" if ends else value for value, ends in cells)]
+            for label, name, cells in rows
+        ],
     )
 
 
@@ -110,22 +122,22 @@ TERMINAL_NOTE = (
 )
 
 
-def rich_tables(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> Group:
+def rich_tables(report: LiveReport) -> Group:
     """Both tables for a terminal of 80 columns, intervals dim below the figures, notes below the last."""
     from rich.console import Group
 
     of_agents = _rich("", COLUMNS)
-    rows = agent_rows(results)
+    rows = agent_rows(report)
     for number, (label, name, cells) in enumerate(rows):
         if not number or rows[number - 1][0] != label:
             of_agents.add_row(label, style="bold")
         of_agents.add_row(f" {name}", *_with_intervals(cells))
     tables = [of_agents]
-    if compared := compared_rows(results):
+    if compared := compared_rows(report.results):
         tables.append(_rich(f"\n{compared[0][1]}, shares in points", (*COMPARED, LARGER)))
         for label, _, cells in compared:
             tables[-1].add_row(label, *_with_intervals(cells))
-    return Group(*tables[:-1], noted(tables[-1], ["", TERMINAL_NOTE, *notes(protocol, encoder)]))
+    return Group(*tables[:-1], noted(tables[-1], ["", TERMINAL_NOTE, *notes(report)]))
 
 
 def _rich(title: str, columns: Sequence[_Column]) -> Table:
@@ -141,4 +153,4 @@ def _rich(title: str, columns: Sequence[_Column]) -> Table:
 def _with_intervals(cells: Sequence[tuple[str, str]]) -> list[Text]:
     from rich.text import Text
 
-    return [Text(value).append(f"\n{ends}", style="dim") for value, ends in cells]
+    return [Text(value).append(f"\n{ends}" if ends else "", style="dim") for value, ends in cells]

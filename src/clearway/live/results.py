@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.evaluation import bootstrap
+from clearway.evaluation.episodes import EpisodeTable
 from clearway.evaluation.metrics import Metric, average, by_scene, columns, quotients
 from clearway.live.conditions import Perturbations
-from clearway.live.episodes import STEP_S, LiveTable
+from clearway.live.episodes import STEP_S, LiveProtocol, LiveTable
 
 Interval = tuple[float, float]
 TIE_M = 0.001  # the body draws back a millimetre from what it touches
@@ -43,6 +44,16 @@ METRICS: dict[str, Metric[LiveTable]] = {
     "rearranged": Metric(lambda table: table.changed),
 }
 """docs/metrics.md explains each."""
+
+GRID_METRICS: dict[str, Metric[EpisodeTable]] = {
+    "success": Metric(lambda table: table.reached),
+    "steps": Metric(lambda table: table.steps),
+    "shortest_path_steps": Metric(lambda table: table.shortest_path_steps),
+    "contacts": Metric(lambda table: table.collisions),
+    "contacts_per_100_steps": Metric(lambda table: 100 * table.collisions, lambda table: table.steps),
+    "contact_free": Metric(lambda table: table.collisions == 0),
+}
+"""Those of them that the grid has too: a blocked move there is a contact here."""
 
 COMPARED = ("success", "contacts", "min_clearance_m", "mean_clearance_m", "share_within_10cm", "share_within_30cm")
 
@@ -109,6 +120,46 @@ class LiveResult:
             "agents": {name: figures.to_json() for name, figures in self.agents.items()},
             "comparison": None if self.comparison is None else self.comparison.to_json(),
         }
+
+
+@dataclass(frozen=True)
+class LiveReport:
+    """All settings, beside the same agents on the grid.
+
+    Attributes:
+        results: a setting each.
+        grid: figures (`GRID_METRICS`) by the agent's name, of as many episodes with the same starts and targets.
+        protocol: of both.
+        encoder: whose features the agents see.
+    """
+
+    results: tuple[LiveResult, ...]
+    grid: Mapping[str, Figures]
+    protocol: LiveProtocol
+    encoder: str
+
+    def to_json(self) -> dict[str, object]:
+        """As JSON values."""
+        return {
+            "encoder": self.encoder,
+            "episodes_per_target": self.protocol.episodes_per_target,
+            "step_limit": self.protocol.step_limit,
+            "seed": self.protocol.seed,
+            "action_selection": self.protocol.selection,
+            "grid": {"agents": {name: figures.to_json() for name, figures in self.grid.items()}},
+            "results": [result.to_json() for result in self.results],
+        }
+
+
+def grid_figures(table: EpisodeTable, target_scene: np.ndarray, seed: int) -> Figures:
+    """What an agent's episodes on the grid come to, in the words of live evaluation.
+
+    Args:
+        table: the episodes; every target occurs.
+        target_scene: (M,) scene of each target.
+        seed: of the bootstrap.
+    """
+    return _figures(list(GRID_METRICS), *columns(table, GRID_METRICS), (table.target, target_scene), seed)
 
 
 def summarise(

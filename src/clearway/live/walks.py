@@ -9,19 +9,21 @@ from pathlib import Path
 
 from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
+from clearway.evaluation.episodes import run_episodes
 from clearway.files import json_text, written_whole
-from clearway.learn.load import TrainedNetwork
+from clearway.learn.load import TrainedNetwork, run_world
 from clearway.live.conditions import Condition
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.live_room import LiveRoom, live_room
 from clearway.live.result_tables import markdown_tables
-from clearway.live.results import LiveResult, summarise
+from clearway.live.results import Figures, LiveReport, LiveResult, grid_figures, summarise
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
-from clearway.rooms.camera import eye_view
+from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
+from clearway.torch_threads import torch_threads
 from clearway.world.world import World, make_world
 
 JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
@@ -84,8 +86,18 @@ def stages(agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene]) -> Ite
             live = live_room(scene)
             encoder = encoder_from_record(record_of_encoder)
             world = make_world([scene], {scene.name: record.targets[scene.name]}, record.zone_level)
-            found.append(LiveScene(live, world, encoder, opened.enter_context(studio(live.model, eye_view()))))
+            found.append(
+                LiveScene(live, world, encoder, opened.enter_context(studio(live.model, live.lens(*_size_px(scene)))))
+            )
         yield found
+
+
+def _size_px(scene: Scene) -> tuple[int, int]:
+    """Height and width of the pictures that the scene's features were made of."""
+    if scene.observations is None:
+        return PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
+    height_px, width_px = scene.observations.shape[1:3]
+    return height_px, width_px
 
 
 def _encoder_record(scene: Scene) -> EncoderRecord:
@@ -132,24 +144,33 @@ def walk_setting(
     return LiveOutcome(setting, summarise(setting.label, setting.perturbations, tables, protocol.seed), tables)
 
 
-def live_json(results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> dict[str, object]:
-    """All results as JSON values."""
-    return {
-        "encoder": encoder,
-        "episodes_per_target": protocol.episodes_per_target,
-        "step_limit": protocol.step_limit,
-        "seed": protocol.seed,
-        "action_selection": protocol.selection,
-        "results": [result.to_json() for result in results],
-    }
+def walk_on_grid(
+    agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene], protocol: LiveProtocol
+) -> dict[str, Figures]:
+    """All agents' figures on the grid, in episodes with the same targets, starts and chances."""
+    found = {}
+    with torch_threads(1):
+        for name, agent in agents.items():
+            world = run_world(agent.record, scenes)
+            table = run_episodes(
+                world,
+                agent.on_poses(world),
+                scenes=scenes,
+                selection=protocol.selection,
+                episodes_per_target=protocol.episodes_per_target,
+                step_limit=protocol.step_limit,
+                seed=protocol.seed,
+            )
+            found[name] = grid_figures(table, world.target_scene.numpy(), protocol.seed)
+    return found
 
 
-def write_live_part(folder: Path, results: Sequence[LiveResult], protocol: LiveProtocol, encoder: str) -> None:
+def write_live_part(folder: Path, report: LiveReport) -> None:
     """Leave the settings walked so far in a run folder, as live.part.json and live.part.md."""
     with written_whole(folder / JSON_PART) as part:
-        part.write_text(json_text(live_json(results, protocol, encoder)), encoding="utf-8")
+        part.write_text(json_text(report.to_json()), encoding="utf-8")
     with written_whole(folder / MARKDOWN_PART) as part:
-        part.write_text(markdown_tables(results, protocol, encoder), encoding="utf-8")
+        part.write_text(markdown_tables(report), encoding="utf-8")
 
 
 def finish_live(folder: Path) -> None:

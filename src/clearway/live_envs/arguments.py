@@ -22,10 +22,17 @@ LIVE_RENDER_MODES = ("rgb_array",)
 CLEARANCE = "clearance"
 CLEARANCE_REACH_M = 5.0
 LEAST_PX, MOST_PX = 8, 4_096
+MODEL_SUFFIXES = (".xml", ".urdf")
 
 
-def opened_room(room: RoomSource, seed: int) -> LiveRoom:
-    """The room of a name, a scene file or a scene, built in some seconds; a `LiveRoom` is taken as it is.
+def opened_room(room: RoomSource, seed: int, *, small: bool, loose: bool) -> LiveRoom:
+    """The room of a name, a scene, a scene's file or a MuJoCo model's, in some seconds; a `LiveRoom` as it is.
+
+    Args:
+        room: the name, the scene, the file or the room.
+        seed: of a room by name.
+        small: for small pictures, see `live_room`.
+        loose: things in it can be moved.
 
     Raises:
         EnvError: there is no such room.
@@ -34,19 +41,23 @@ def opened_room(room: RoomSource, seed: int) -> LiveRoom:
     if isinstance(room, LiveRoom):
         return room
     if isinstance(room, Scene):
-        return live_room(room)
+        return live_room(room, small=small, loose=loose)
     if isinstance(room, str) and room in ROOM_NAMES:
         if not isinstance(seed, (int, np.integer)) or seed < 0:
             raise EnvError(f"room_seed={seed!r}: expected a whole number from 0 on")
-        return live_room_named(room, int(seed))
+        return live_room_named(room, int(seed), small=small, loose=loose)
     if not isinstance(room, (str, Path)):
-        kinds = "a room's name, a scene file or a scene"
+        kinds = "a room's name, a scene file or a scene, or a MuJoCo model's file"
         raise EnvError(f"room={room!r:.80}: expected {kinds}. Rooms: {', '.join(ROOM_NAMES)}")
     if isinstance(room, str) and not Path(room).suffix and not Path(room).exists():
         raise EnvError(f"room={room!r:.80} is unknown. Use one of {', '.join(ROOM_NAMES)}, or a scene file")
+    if Path(room).suffix.lower() in MODEL_SUFFIXES:
+        from clearway.live.model_room import live_model
+
+        return live_model(Path(room))
     from clearway.scenes.thor_v1 import read_scene
 
-    return live_room(read_scene(Path(room)))
+    return live_room(read_scene(Path(room)), small=small, loose=loose)
 
 
 def checked_sensors(names: Sequence[str], height_px: int, width_px: int) -> tuple[Sensor, ...]:

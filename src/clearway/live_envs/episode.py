@@ -12,15 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from clearway.errors import EnvError
-from clearway.live.arrangement import Arrangement, arranged, as_built
+from clearway.live.arrangement import Arrangement
 from clearway.live.body import Body
-from clearway.live.conditions import Perturbations
+from clearway.live.conditions import REARRANGING, Perturbations
 from clearway.live.draws import ENDS, Draws
 from clearway.live.live_room import LiveRoom, layout_of_episode
 from clearway.live.walker import Pose, Walker, near
 from clearway.live_envs.arguments import CLEARANCE_REACH_M
 from clearway.reward import Moves, Reward
-from clearway.rooms.camera import CAMERA_HEIGHT_M, Shot, first_person_shot
+from clearway.rooms.camera import Shot, first_person_shot
 from clearway.scenes.actions import ACTION_COUNT, STOP, Action
 from clearway.zones import Zone
 
@@ -115,9 +115,9 @@ class LiveEpisode:
         earned = self.rules.reward.table(moves)[int(success), LEFT, column]
         return LiveStep(float(earned), contact, success, success or stops)
 
-    def shot(self, moving: bool) -> Shot:
-        """The next picture; `moving` says that the room's pieces may stand elsewhere than they were built."""
-        height_m = CAMERA_HEIGHT_M + self.draws.height_error_m()
+    def shot(self, camera_m: float, moving: bool) -> Shot:
+        """The next picture, from a height; `moving`: the room's pieces may stand elsewhere than they were built."""
+        height_m = camera_m + self.draws.height_error_m()
         pitch_deg = self.draws.pitch_error_deg()
         moved_m = self.layout.bodies_m if moving else ()
         return first_person_shot(*self.walker.pose, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m)
@@ -137,21 +137,23 @@ class Episodes:
 
     Raises:
         EnvError: a target is no state of the component.
+        SceneError: the perturbations move what cannot be moved in the room.
     """
 
     def __init__(self, live: LiveRoom, rules: Rules, targets: np.ndarray | None = None) -> None:
+        live.check_can_be_rearranged(rules.perturbations)
         self.live, self.rules = live, rules
         self._states = np.flatnonzero(live.scene.components == 0)
         if targets is not None and not np.isin(targets, self._states).all():
             wrong = targets[~np.isin(targets, self._states)][0]
             raise EnvError(f"targets: {wrong} is not among the {len(self._states)} states of the scene's largest part")
         self._targets = self._states if targets is None else targets
-        self.as_built = as_built(live.room)
+        self.as_built = live.as_built()
 
     @property
     def moving(self) -> bool:
         """Whether the room's pieces may stand elsewhere than they were built."""
-        return bool(self.rules.perturbations.move_furniture or self.rules.perturbations.new_obstacle)
+        return any(getattr(self.rules.perturbations, name) for name in REARRANGING)
 
     @cached_property
     def _poses(self) -> np.ndarray:
@@ -209,7 +211,7 @@ class Episodes:
         return int(self._states[apart_m.argmin()])
 
     def _body(self, layout: Arrangement) -> Body:
-        return Body(arranged(self.live.room, layout), self.live.agent)
+        return self.live.body(layout)
 
     def _pose(self, name: str, end: End) -> Pose:
         """The pose in the room that an option means."""
@@ -220,9 +222,8 @@ class Episodes:
                 raise EnvError(f"options['{name}']: {problem}. Its states are among 0 to {count - 1}")
             return self.live.pose_of(end)
         pose = (end[0] - self.live.origin_m[0], end[1] - self.live.origin_m[1], end[2])
-        on_floor = 0 <= pose[0] <= self.live.room.width_m and 0 <= pose[1] <= self.live.room.depth_m
         self._measuring.stand_at(np.array(pose[:2]))
-        if not on_floor or self._measuring.touches:
+        if not self.live.is_on_floor(*pose[:2]) or self._measuring.touches:
             place = f"({end[0]:g}, {end[1]:g})"
             raise EnvError(f"options['{name}']: the body does not fit at {place} in {self.live.scene.name}")
         return pose

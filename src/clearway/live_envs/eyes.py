@@ -3,46 +3,69 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 
-from clearway.rooms.camera import Shot, eye_view
-from clearway.rooms.render import studio
+from clearway.live.live_room import LiveRoom
+from clearway.rooms.camera import Shot
+from clearway.rooms.render import core_count, photographers
 from clearway.scenes.sensors import Sensor
 
-if TYPE_CHECKING:
-    import mujoco
+Pictures = Callable[[], np.ndarray]
+"""Waits for pictures: (shots, *sensor.shape) in the sensor's unit."""
+
+SMALL_PX = 160 * 200  # above it, fast pictures cost no less
+MOST_SHARE = 8
+SHARES = 2  # for each process in a step: fewer, and it waits for the last agent's move
+
+
+def are_small(height_px: int, width_px: int) -> bool:
+    """Whether pictures of a size are taken the fast way, of rooms in small detail: the same to the eye alone."""
+    return height_px * width_px <= SMALL_PX and height_px % 2 == 0 and width_px % 2 == 0
 
 
 class Eyes:
     """What some cameras see of a room, from the same places.
 
     Args:
-        model: the compiled room.
+        live: the room.
         sensors: the cameras; all pictures have one size.
         workers: processes for each camera; None: one a core.
     """
 
-    def __init__(self, model: mujoco.MjModel, sensors: Sequence[Sensor], workers: int | None = None) -> None:
+    def __init__(self, live: LiveRoom, sensors: Sequence[Sensor], workers: int | None = None) -> None:
         self._sensors = tuple(sensors)
+        self._workers = workers or core_count()
         opened = ExitStack()
         height_px, width_px = self._sensors[0].shape[:2]
-        view = eye_view(height_px=height_px, width_px=width_px)
+        view = live.lens(height_px, width_px, fast=are_small(height_px, width_px))
         self._cameras = {
-            sensor.name: opened.enter_context(studio(model, replace(view, sensor=sensor.name), workers=workers))
+            sensor.name: opened.enter_context(
+                photographers(live.model, replace(view, sensor=sensor.name), workers=workers)
+            )
             for sensor in self._sensors
         }
         self.close = weakref.finalize(self, opened.close)
         """End the processes; a second call does nothing."""
 
-    def __call__(self, shots: Sequence[Shot]) -> dict[str, np.ndarray]:
-        """(shots, *sensor.shape) by each sensor's name, in its unit.
+    def shares(self, lookers: list[int]) -> list[list[int]]:
+        """Those who look, in groups that ask together, so that all processes have something to do."""
+        size = max(1, min(MOST_SHARE, -(-len(lookers) // (SHARES * self._workers))))
+        return [lookers[first : first + size] for first in range(0, len(lookers), size)]
 
-        Raises:
-            RenderError: this machine cannot render, or a renderer process died.
+    def ask(self, shots: Sequence[Shot]) -> dict[str, Pictures]:
+        """What waits for the pictures, by each sensor's name; they are being taken meanwhile.
+
+        It raises RenderError where this machine cannot render, or a renderer process died.
         """
-        return {sensor.name: sensor.values(self._cameras[sensor.name](shots)) for sensor in self._sensors}
+        taking = {name: camera.submit(shots) for name, camera in self._cameras.items()}
+        return {sensor.name: partial(_taken, taking[sensor.name], sensor) for sensor in self._sensors}
+
+
+def _taken(taking: Future[np.ndarray], sensor: Sensor) -> np.ndarray:
+    return sensor.values(taking.result())

@@ -33,7 +33,8 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
     The room of `Clearway/ImageGoal-v0` without its grid: the agent is a standing capsule that MuJoCo moves until it
     touches something, and every picture is rendered where it stands. Moves and turns can be inexact, camera, light and
     furniture can differ from episode to episode (`perturbations`). Without perturbations, and with moves and turns of
-    the default lengths, the agent stays on the grid until its first contact.
+    the default lengths, the agent stays on the grid until its first contact. In MuJoCo models of others nothing is
+    moved: `move_furniture` and `new_obstacle` are refused there.
 
     ## Action Space
 
@@ -62,6 +63,9 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
     | `depth`     | `depth`        | `(H, W)`    | float32, metres                                                   |
     |             | `target_depth` | `(H, W)`    | float32, metres                                                   |
     | `clearance` | `clearance`    | `(1,)`      | float32, metres from the body to the nearest obstacle, at most 5  |
+
+    Pictures of 160 x 200 pixels at most, and of even sides, are taken the fast way, of rooms in small detail: the same
+    to the eye as those of scene files, not bit for bit. Larger ones and those of odd sides are the same bits.
 
     With `history_length=K` all but the targets' are of the last K poses, newest last, `(K, H, W, 3)` and so on.
 
@@ -99,7 +103,8 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
 
     | Parameter           | Default             | Description                                                          |
     |---------------------|---------------------|----------------------------------------------------------------------|
-    | `room`              | required            | a room's name, a scene file or `Scene` that clearway built           |
+    | `room`              | required            | a room's name, a scene file or `Scene` that clearway built or        |
+    |                     |                     | imported from a MuJoCo model, or such a model's file (.xml, .urdf)   |
     | `room_seed`         | `0`                 | of a room by name: another has other colours and small furniture     |
     | `targets`           | `None`              | state ids to draw targets from; None: all                            |
     | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name   |

@@ -24,6 +24,7 @@ from clearway.envs.arguments import (
     seed_words,
 )
 from clearway.errors import EnvError
+from clearway.live.conditions import REARRANGING
 from clearway.live_envs.arguments import (
     CLEARANCE,
     LIVE_RENDER_MODES,
@@ -37,7 +38,7 @@ from clearway.live_envs.arguments import (
     opened_room,
 )
 from clearway.live_envs.episode import End, Episodes, LiveEpisode, Rules
-from clearway.live_envs.eyes import Eyes
+from clearway.live_envs.eyes import Eyes, Pictures, are_small
 from clearway.reward import Reward, reward_named
 from clearway.rooms.camera import first_person_shot
 from clearway.scenes.actions import ACTION_COUNT
@@ -45,6 +46,8 @@ from clearway.scenes.sensors import RGB, Sensor
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
+Asked = tuple[list[int], list[int], dict[str, Pictures]]
+"""Environments that look, those among them that begin, and what they will have seen."""
 
 SUCCESS_M, SUCCESS_DEG = 0.25, 30.0
 HEIGHT_PX, WIDTH_PX = 96, 128
@@ -128,7 +131,8 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         earned, perturbed = reward_named(reward), checked_perturbations(perturbations)
         within = checked_number("success_m", success_m, FARTHEST_M), checked_number("success_deg", success_deg, 180.0)
 
-        live = opened_room(room, room_seed)
+        moving = any(getattr(perturbed, name) for name in REARRANGING)
+        live = opened_room(room, room_seed, small=are_small(height_px, width_px), loose=moving)
         rules = Rules(
             earned,
             step_m=float(live.scene.cell_size_m if step_m is None else step_m),
@@ -144,7 +148,7 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._limit = None if max_episode_steps == NO_LIMIT else max_episode_steps
         self._episodes = Episodes(live, rules, _checked_targets(targets))
         cameras = [sensor for sensor in self._sensors if sensor.name != CLEARANCE]
-        self._eyes = Eyes(live.model, cameras, workers)
+        self._eyes = Eyes(live, cameras, workers)
 
         self._history = history_length or 1
         leading = () if history_length is None else (history_length,)
@@ -216,18 +220,21 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         resting = self._ended.copy()  # all False but in the mode NEXT_STEP: these reset now, actions are ignored
         reward = np.zeros(self.num_envs)
         terminated, contact, success = (np.zeros(self.num_envs, bool) for _ in range(3))
-        for env, action in enumerate(chosen):
-            if resting[env]:
-                self._begin(env)
-                continue
-            done = self._episode(env).step(action)
-            self._elapsed[env] += 1
-            reward[env], terminated[env] = done.reward, done.ended
-            contact[env], success[env] = done.contact, done.success
+        asked = []  # pictures are taken while others move
+        for envs in self._eyes.shares(list(range(self.num_envs))):
+            for env in envs:
+                if resting[env]:
+                    self._begin(env)
+                    continue
+                done = self._episode(env).step(chosen[env])
+                self._elapsed[env] += 1
+                reward[env], terminated[env] = done.reward, done.ended
+                contact[env], success[env] = done.contact, done.success
+            asked.append(self._asked(envs, resting))
+        self._see(asked, resting)
         limit_met = False if self._limit is None else self._elapsed >= self._limit
         truncated = np.asarray(limit_met & ~terminated & ~resting)
         everywhere = np.ones(self.num_envs, bool)
-        self._look(everywhere, resting)
         ended, info = terminated | truncated, Info()
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
             info = self._final(contact, success, ended)
@@ -274,25 +281,37 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     def _look(self, where: np.ndarray, begun: np.ndarray) -> None:
         """Let the agents in where (N,) bool see; those in begun (N,), among them, see their target too."""
-        looking, anew = np.flatnonzero(where).tolist(), np.flatnonzero(begun).tolist()
+        looking = self._eyes.shares(np.flatnonzero(where).tolist())
+        self._see([self._asked(envs, begun) for envs in looking], begun)
+
+    def _asked(self, envs: list[int], begun: np.ndarray) -> Asked:
+        """Ask for what some agents see, and for the targets of those that begin; `_see` waits for it."""
         moving = self._episodes.moving
-        shots = [self._episode(env).shot(moving) for env in looking]
+        anew = [env for env in envs if begun[env]]
+        shots = [self._episode(env).shot(self.live.camera_m, moving) for env in envs]
         unmoved_m = self._episodes.as_built.bodies_m if moving else ()
-        shots += [first_person_shot(*self._episode(env).target, moved_m=unmoved_m) for env in anew]
-        taken = self._eyes(shots)
-        for sensor in self._sensors:
-            pose_key, goal_key = _keys(sensor.name)
-            poses = self._poses[pose_key]
-            if sensor.name == CLEARANCE:
-                seen = np.array([[self._episode(env).clearance_m] for env in looking], sensor.dtype)
-            else:
-                seen = taken[sensor.name][: len(looking)]
-                if anew:
-                    self._goals[goal_key][anew] = taken[sensor.name][len(looking) :]
-            for env, now in zip(looking, seen, strict=True):
-                now = self._episode(env).draws.seen(now) if sensor.name == RGB else now
-                poses[env, :-1] = poses[env, 1:]
-                poses[env, slice(None) if begun[env] else -1] = now
+        for env in anew:
+            target = self._episode(env).target
+            shots.append(first_person_shot(*target, height_m=self.live.camera_m, moved_m=unmoved_m))
+        return envs, anew, self._eyes.ask(shots)
+
+    def _see(self, asked: list[Asked], begun: np.ndarray) -> None:
+        """Let agents see what was asked for."""
+        for envs, anew, pictures in asked:
+            for sensor in self._sensors:
+                pose_key, goal_key = _keys(sensor.name)
+                poses = self._poses[pose_key]
+                if sensor.name == CLEARANCE:
+                    seen = np.array([[self._episode(env).clearance_m] for env in envs], sensor.dtype)
+                else:
+                    taken = pictures[sensor.name]()
+                    seen = taken[: len(envs)]
+                    if anew:
+                        self._goals[goal_key][anew] = taken[len(envs) :]
+                for env, now in zip(envs, seen, strict=True):
+                    now = self._episode(env).draws.seen(now) if sensor.name == RGB else now
+                    poses[env, :-1] = poses[env, 1:]
+                    poses[env, slice(None) if begun[env] else -1] = now
 
     def _observation(self) -> Observation:
         poses = self._poses if self._stacked else {key: seen[:, -1] for key, seen in self._poses.items()}

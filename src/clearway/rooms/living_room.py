@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from clearway.rooms import finishes
+from clearway.rooms.detail import Detail
 from clearway.rooms.finishes import WHITE
 from clearway.rooms.frame import Frame
 from clearway.rooms.furniture import decor, lamps, openings, seating, storage, tables_and_desks
@@ -17,9 +18,11 @@ LIBRARY_WALL = Column(1.6, 4.69, 4.69, 4.81)
 COLUMNS = (DINING_WALL, LIBRARY_WALL)
 
 
-def build(seed: int, looks: bool) -> Room:
+def build(seed: int, looks: bool, detail: Detail) -> Room:
     """The living room without its light."""
-    room = Room("living_room", WIDTH_M, DEPTH_M, HEIGHT_M, (0.25, 0.25), seed, looks, mirrored=seed % 2 == 1)
+    room = Room(
+        "living_room", WIDTH_M, DEPTH_M, HEIGHT_M, (0.25, 0.25), seed, looks, mirrored=seed % 2 == 1, detail=detail
+    )
     add_walls(room, COLUMNS)
     if looks:
         add_surfaces(room, _finish(room), COLUMNS)

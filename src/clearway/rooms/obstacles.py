@@ -107,6 +107,9 @@ class Obstacles:
     """A world's obstacles and the agent's body, to measure the gaps between them with MuJoCo.
 
     The agent's geoms are put to their places by writing their world positions; nothing else in the model moves.
+
+    Attributes:
+        candidates: (O,) the geoms that can be in the way.
     """
 
     def __init__(
@@ -135,7 +138,7 @@ class Obstacles:
         felt = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
         in_reach &= felt | unfelt_too
         in_reach[body] = False
-        self._candidates = np.nonzero(in_reach)[0]
+        self.candidates = np.nonzero(in_reach)[0]
 
     def standing_gaps_m(self, points_m: np.ndarray) -> np.ndarray:
         """Gap between the agent at (N, 2) points and the nearest obstacle, (N,); negative: overlap."""
@@ -152,21 +155,21 @@ class Obstacles:
 
     def _gaps_m(self, points_m: np.ndarray, bodies: np.ndarray) -> np.ndarray:
         gaps_m = np.full(len(points_m), self._reach_m)
-        at_once = max(1, PAIRS_AT_ONCE // max(1, len(self._candidates)))
+        at_once = max(1, PAIRS_AT_ONCE // max(1, len(self.candidates)))
         for first in range(0, len(points_m), at_once):
             part = slice(first, first + at_once)
             near = self._near(points_m[part], bodies[part])
             for index, (point_m, body) in enumerate(zip(points_m[part], bodies[part], strict=True)):
                 self._data.geom_xpos[body] = (*point_m, self._centre_height_m)
-                for obstacle in self._candidates[near[index]]:
+                for obstacle in self.candidates[near[index]]:
                     gap_m = mujoco.mj_geomDistance(self._model, self._data, body, obstacle, self._reach_m, None)
                     gaps_m[first + index] = min(gaps_m[first + index], gap_m)
         return gaps_m
 
     def _near(self, points_m: np.ndarray, bodies: np.ndarray) -> np.ndarray:
         """Which obstacles may be within reach of each body at its point, (N, obstacles) bool."""
-        apart_m = np.abs(points_m[:, None] - self._centres_m[None, self._candidates, :2])
-        sum_m = self._halves_m[bodies, None, :2] + self._halves_m[None, self._candidates, :2]
+        apart_m = np.abs(points_m[:, None] - self._centres_m[None, self.candidates, :2])
+        sum_m = self._halves_m[bodies, None, :2] + self._halves_m[None, self.candidates, :2]
         return np.all(apart_m < sum_m + self._reach_m, axis=2)
 
 

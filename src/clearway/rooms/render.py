@@ -18,7 +18,7 @@ import numpy as np
 from clearway.errors import RenderError
 from clearway.progress import picture_progress
 from clearway.rooms.render_worker import Camera, binary_model, open_camera, renderer_environment, take
-from clearway.spread.workers import Work, workers_for
+from clearway.spread.workers import Work, Workers, workers_for
 
 if TYPE_CHECKING:
     import mujoco
@@ -85,10 +85,20 @@ def studio(model: mujoco.MjModel, view: View, *, workers: int | None = None) -> 
     """
     count = _process_count(workers, MOST_WORKERS)
     nothing = view.empty_pictures(0)
-    with workers_for(_work(model, view, count), workers=count) as crew:
+    with photographers(model, view, workers=workers) as crew:
         yield lambda shots: np.concatenate(
             [nothing, *crew.results(_shares(tuple(shots), _share_size(len(shots), count)))]
         )
+
+
+@contextmanager
+def photographers(
+    model: mujoco.MjModel, view: View, *, workers: int | None = None
+) -> Iterator[Workers[Sequence[Shot], np.ndarray]]:
+    """The processes of a `studio`: what is submitted is taken while the caller does other things."""
+    count = _process_count(workers, MOST_WORKERS)
+    with workers_for(_work(model, view, count), workers=count) as crew:
+        yield crew
 
 
 def _work(model: mujoco.MjModel, view: View, processes: int | None) -> Work[Camera, Sequence[Shot], np.ndarray]:

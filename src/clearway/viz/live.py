@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clearway import colours
+from clearway.live.arrangement import Arrangement
 from clearway.live.draws import Draws
+from clearway.live.live_room import LiveRoom
 from clearway.live.results import LiveResult
 from clearway.live.walks import LiveOutcome, LiveScene
-from clearway.rooms.camera import CAMERA_HEIGHT_M, first_person_shot
+from clearway.rooms.camera import first_person_shot
 from clearway.rooms.topview import render_top_view
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Scene, TopView
 from clearway.viz.figures import CURVES, LINES, Look, new_figure
 
 if TYPE_CHECKING:
@@ -127,9 +129,9 @@ def _moves_to(scene: Scene, state: int, place_m: np.ndarray) -> int:
 def _draw_from_above(axes: Axes, stage: LiveScene, scene_index: int, outcome: LiveOutcome, episode: int) -> None:
     live = stage.live
     first = next(iter(outcome.tables.values()))[scene_index]
-    moved_m = first.layouts[episode].bodies_m
-    view = render_top_view(live.model, live.room.width_m, live.room.depth_m, moved_m)
-    axes.imshow(view.image, extent=(view.x_min_m, view.x_max_m, view.z_min_m, view.z_max_m), alpha=0.75)
+    view = _from_above(live, first.layouts[episode])
+    if view is not None:
+        axes.imshow(view.image, extent=(view.x_min_m, view.x_max_m, view.z_min_m, view.z_max_m), alpha=0.75)
     for number, (name, tables) in enumerate(outcome.tables.items()):
         style, walk = LINES[number], tables[scene_index].walks[episode]
         axes.plot(walk[:, 0], walk[:, 1], color=style.halo, linewidth=3.4, solid_capstyle="round")
@@ -140,6 +142,13 @@ def _draw_from_above(axes: Axes, stage: LiveScene, scene_index: int, outcome: Li
     axes.plot(*goal, marker="*", color=colours.TARGET, markersize=11, label="target", **edge)
 
 
+def _from_above(live: LiveRoom, layout: Arrangement) -> TopView | None:
+    """The room in a layout; of a MuJoCo model of others what the scene has, where nothing is ever moved."""
+    if live.room is None:
+        return live.scene.top_view
+    return render_top_view(live.model, live.room.width_m, live.room.depth_m, layout.bodies_m)
+
+
 def _view(
     stage: LiveScene, scene_index: int, outcome: LiveOutcome, episode: int, pose: tuple[float, float, float]
 ) -> np.ndarray:
@@ -148,8 +157,8 @@ def _view(
     draws = Draws(int(table.seed[episode]), outcome.setting.perturbations)
     shot = first_person_shot(
         *pose,
-        height_m=CAMERA_HEIGHT_M + draws.height_error_m(),
+        height_m=stage.live.camera_m + draws.height_error_m(),
         pitch_deg=draws.pitch_error_deg(),
-        moved_m=table.layouts[episode].bodies_m,
+        moved_m=stage.live.bodies_m(table.layouts[episode]),
     )
     return draws.seen(stage.camera([shot])[0])
