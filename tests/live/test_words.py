@@ -23,6 +23,8 @@ def test_a_later_word_changes_what_an_earlier_one_asked_for():
     )
     assert perturbations_named(["all", "light=0", "pixel-noise=0"]) == GEOMETRY
     assert perturbations_named(["light=0.1", "geometry"]).light == 0.1
+    assert perturbations_named(["all", "new-obstacle=0"]).new_obstacle is False
+    assert perturbations_named(["new-obstacle=1"]) == REFERENCE.alone("new_obstacle")
     assert perturbations_named(["all", "none"]) == Perturbations()
 
 
@@ -35,7 +37,7 @@ def test_a_later_word_changes_what_an_earlier_one_asked_for():
         (["light=-1"], "expected a number from 0 to 1"),
         (["light=nan"], "expected a number from 0 to 1"),
         (["light="], "expected a number from 0 to 1"),
-        (["new-obstacle=1"], "it has no strength. Write new-obstacle"),
+        (["new-obstacle=0.5"], "it is there or not. Write new-obstacle, or new-obstacle=0"),
         ("light", "expected words"),
         ([3], "expected words"),
         (3, "expected words"),

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.live.arrangement import arranged
-from clearway.live.body import Body
 from clearway.live.conditions import Perturbations
 from clearway.live.live_room import LiveRoom
 from clearway.live.words import GEOMETRY
@@ -43,7 +41,7 @@ def test_poses_are_free_and_keep_to_their_cells(live, settings, monkeypatch):
     monkeypatch.setattr(poses, "_layouts", lambda *given: layouts.extend(found(*given)) or list(layouts))
     taken = drawn(live, settings)
     assert (held_out(live.scene)[nearest_states(live, taken)] == settings.held_out).all()
-    bodies = [Body(arranged(live.room, layout), live.agent) for layout in layouts]
+    bodies = [live.body(layout) for layout in layouts]
     table = taken.table
     for row, shot in enumerate(taken.shots):
         body = bodies[table.arrangement[row]]
@@ -68,6 +66,7 @@ def test_poses_are_anywhere_and_look_anywhere(live):
     assert np.abs(offsets_m).max() <= 0.25 and (offsets_m.std(axis=0) > 0.08).all()
     assert len(np.unique(taken.table.heading_deg // 45)) == 8
     assert (taken.table.height_m == 1).all() and (taken.table.pitch_deg == 0).all()
+    assert (drawn(replace(live, camera_m=0.7), STILL).table.height_m == 0.7).all()
     on_grid = drawn(live, replace(STILL, scene_headings=True))
     assert set(on_grid.table.heading_deg) == {0, 90, 180, 270}
 
@@ -119,7 +118,7 @@ def test_distances_are_the_body_s(live):
     """In the corner free of furniture, facing along z: walls at x = 0 and z = 0, 2.5."""
     table = drawn(live, replace(STILL, poses=400)).table
     row = int(np.flatnonzero((table.x_m > 1.3) & (table.z_m < 0.6))[0])
-    body = Body(live.room, live.agent)
+    body = live.body(live.as_built())
     draws = drawn(live, STILL).draws[0]
     felt = poses._felt(body, (table.x_m[row], table.z_m[row], 180.0), draws, live)
     zone, clearance_m, ahead_m, left_m, right_m, _ = felt
@@ -134,6 +133,27 @@ def test_distances_are_the_body_s(live):
     step_ahead = np.minimum(table.free_m[:, 0], table.free_m[:, 3])
     assert (table.zone[step_ahead < 0.49] == Zone.COLLISION).all()
     assert (table.zone[step_ahead > 1.01] == Zone.FREE).all()
+
+
+def test_parts_that_cannot_be_reached_have_no_poses(live):
+    """A cell that no move leads to or from, as another component."""
+    scene, alone = live.scene, live.scene.cells == live.scene.cells.max()
+    graph = scene.graph.copy()
+    moves = graph[:, [0, 3]]
+    moves[alone | (moves >= 0).any(axis=1) & np.isin(moves, np.flatnonzero(alone)).any(axis=1)] = -1
+    graph[:, [0, 3]] = moves
+    parted = replace(live, scene=replace(scene, graph=graph))
+    assert set(parted.scene.components[alone]) != {0}
+    held = np.zeros(scene.state_count, bool)
+    taken = draw_takes(parted, held, replace(STILL, poses=300))
+    assert not alone[nearest_states(parted, taken)].any()
+    assert alone[nearest_states(live, draw_takes(live, held, replace(STILL, poses=300)))].any()
+
+
+def test_nothing_is_moved_where_nothing_can_be(live):
+    """A MuJoCo model of others."""
+    with pytest.raises(SceneError, match="nothing can be moved in a MuJoCo model, and move_furniture is asked for"):
+        draw_takes(replace(live, room=None), held_out(live.scene), MOVING)
 
 
 def test_a_room_without_such_cells_is_told(live):

@@ -67,6 +67,10 @@ def test_rooms_and_poses_are_mixed_and_takes_stay_together(views) -> None:
     assert sum(one != other for one, other in pairwise(rooms)) > 10
     poses = [pose for room, pose, _ in order[::2] if room == 0]
     assert poses != sorted(poses)
+    blocks: dict[tuple[int, int], list[int]] = {}
+    for room, pose, _ in flat(views.batches(8, seed=1, blocks_at_once=1)):
+        blocks.setdefault((room, pose // 4), []).append(pose % 4)
+    assert len({tuple(poses) for poses in blocks.values() if len(poses) == 8}) > 1  # each in an order of its own
 
 
 def test_poses_of_a_room_come_together_where_that_is_asked_for(views) -> None:

@@ -33,7 +33,7 @@ def _small_room(live, monkeypatch) -> None:
         assert here
         return sense(*given, workers=1, **options)
 
-    monkeypatch.setattr(take, "live_room", lambda scene: live)
+    monkeypatch.setattr(take, "live_room", lambda scene, **options: live)
     monkeypatch.setattr(take, "sense", sense_in_a_process)
 
 

@@ -41,11 +41,13 @@ def perturbations_named(words: Sequence[str]) -> Perturbations:
     return found
 
 
-def _strength(name: str, text: str) -> float:
-    """The number after NAME=. Raises ArgumentError where it is none, out of range, or there is nothing to choose."""
+def _strength(name: str, text: str) -> float | bool:
+    """The number after NAME=, or whether it is to be at all. Raises ArgumentError where it is none, or out of range."""
     shown = name.replace("_", "-")
     if name not in MOST:
-        raise ArgumentError(f"perturb='{shown}={text:.40}': it has no strength. Write {shown}")
+        if text not in ("0", "1"):
+            raise ArgumentError(f"perturb='{shown}={text:.40}': it is there or not. Write {shown}, or {shown}=0")
+        return text == "1"
     try:
         value = float(text)
     except ValueError:

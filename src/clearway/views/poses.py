@@ -14,13 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.live.arrangement import Arrangement, arranged, as_built
+from clearway.live.arrangement import Arrangement
 from clearway.live.body import Body
+from clearway.live.conditions import REARRANGING, Perturbations
 from clearway.live.draws import Draws
 from clearway.live.live_room import LiveRoom, layout_of_episode
 from clearway.live.walker import Pose, Walker
 from clearway.live_envs.arguments import CLEARANCE_REACH_M
-from clearway.rooms.camera import CAMERA_HEIGHT_M, Shot, first_person_shot
+from clearway.rooms.camera import Shot, first_person_shot
 from clearway.views.settings import ViewSettings
 from clearway.views.table import COLUMNS, TURNS_DEG, ViewTable, table_of
 
@@ -47,6 +48,11 @@ class Taken:
     table: ViewTable
 
 
+def rearranges(perturbations: Perturbations) -> bool:
+    """Whether takes see the room's furniture elsewhere than it was built."""
+    return any(getattr(perturbations, name) for name in REARRANGING)
+
+
 def draw_takes(live: LiveRoom, held_out: np.ndarray, settings: ViewSettings) -> Taken:
     """Poses of a room and their takes, pose after pose.
 
@@ -56,11 +62,12 @@ def draw_takes(live: LiveRoom, held_out: np.ndarray, settings: ViewSettings) -> 
         settings: how many, and how they are drawn.
 
     Raises:
-        SceneError: the room has no cell to take them in.
+        SceneError: the room has no cell to take them in, or nothing that could be moved.
     """
+    live.check_can_be_rearranged(settings.perturbations)
     places = _Places(live, held_out == settings.held_out, settings)
     layouts = _layouts(live, settings)
-    bodies = [Body(arranged(live.room, layout), live.agent) for layout in layouts]
+    bodies = [live.body(layout) for layout in layouts]
     rows, shots, chances = [], [], []
     for number in range(settings.poses):
         rng = _stream(live, settings, POSES, number)
@@ -71,8 +78,8 @@ def draw_takes(live: LiveRoom, held_out: np.ndarray, settings: ViewSettings) -> 
             here = places.near(bodies[wanted], pose, draws)
             layout = wanted if here is not None else 0  # where furniture was moved to the pose, it is as it was built
             here = here or pose
-            height_m, pitch_deg = CAMERA_HEIGHT_M + draws.height_error_m(), draws.pitch_error_deg()
-            moved_m = layouts[layout].bodies_m if len(layouts) > 1 else ()
+            height_m, pitch_deg = live.camera_m + draws.height_error_m(), draws.pitch_error_deg()
+            moved_m = live.bodies_m(layouts[layout]) if len(layouts) > 1 else ()
             shots.append(first_person_shot(*here, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m))
             x_m, z_m = np.add(here[:2], live.origin_m).tolist()
             placed = (number, take, layout, x_m, z_m, here[2], height_m, pitch_deg)
@@ -133,8 +140,8 @@ def _is_free(body: Body, place_m: np.ndarray) -> bool:
 def _layouts(live: LiveRoom, settings: ViewSettings) -> list[Arrangement]:
     """The room as it was built, then its other layouts; no two takes of a pose are in the same of these."""
     wanted = settings.perturbations
-    found = [as_built(live.room)]
-    if not (wanted.move_furniture or wanted.new_obstacle):
+    found = [live.as_built()]
+    if not rearranges(wanted):
         return found
     states = np.flatnonzero(live.scene.components == 0)
     for number in range(max(LEAST_LAYOUTS, settings.takes)):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from clearway.live.live_room import live_room
-from clearway.rooms.camera import eye_view
+from clearway.live_envs.eyes import are_small
 from clearway.rooms.sense import sense
 from clearway.scenes.held_out import held_out
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import Readings
-from clearway.views.poses import draw_takes
+from clearway.views.poses import draw_takes, rearranges
 from clearway.views.settings import ViewSettings
 from clearway.views.table import ViewTable
 
@@ -36,14 +36,13 @@ def room_views(scene: Scene, settings: ViewSettings) -> RoomViews:
     """Build the room of a scene, and take its views here; this process needs `renderer_environment`.
 
     Raises:
-        SceneError: the scene is no room to walk in, or has no cell to take pictures in.
+        SceneError: the scene is no room to walk in, or has no cell to take pictures in, or nothing that could be moved.
         RenderError: this machine cannot render.
     """
-    live = live_room(scene)
+    small = are_small(*settings.size_px)
+    live = live_room(scene, small=small, loose=rearranges(settings.perturbations))
     taken = draw_takes(live, held_out(scene), settings)
-    height_px, width_px = settings.size_px
-    fast = height_px % 2 == 0 and width_px % 2 == 0
-    view = eye_view(taken.shots, height_px=height_px, width_px=width_px, fast=fast)
+    view = replace(live.lens(*settings.size_px, fast=small), shots=taken.shots)
     pictures, further = sense(live.model, view, settings.sensors, title=scene.name, here=True)
     for number, draws in enumerate(taken.draws):
         pictures[number] = draws.seen(pictures[number])
