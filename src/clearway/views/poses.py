@@ -30,7 +30,11 @@ LEAST_LAYOUTS = 4  # of a room in which furniture is moved: each takes some tent
 POSES, LAYOUTS = 0, 1  # streams of random numbers
 MOST_TRIES = 1000  # at a place for a pose
 TAKE_TRIES = 20  # at a free place for a take
-WAY_STEP_M = 0.01  # free ways are whole multiples of it
+WAY_STEPS = (
+    (0.5, 10),
+    (0.05, 9),
+    (0.01, 4),
+)  # lengths in metres and numbers that a free way is found by, up to REACH_M
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +159,20 @@ def _felt(body: Body, pose: Pose, draws: Draws, live: LiveRoom) -> Sequence[floa
     """Zone, clearance and the free ways of the body at a pose, the last columns of the table."""
     scene = live.scene
     walker = Walker(body, pose, draws, step_m=scene.cell_size_m, turn_deg=scene.turn_deg, measured=False)
-    ways_m = (
-        WAY_STEP_M * body.free_steps(WAY_STEP_M, pose[2] + turn_deg, round(REACH_M / WAY_STEP_M))
-        for turn_deg in TURNS_DEG
-    )
+    ways_m = (_free_way_m(body, pose[2] + turn_deg) for turn_deg in TURNS_DEG)
     return float(walker.zone()), max(0.0, body.gap_m(REACH_M)), *ways_m
+
+
+def _free_way_m(body: Body, heading_deg: float) -> float:
+    """How far a body could move along a heading until it touches something, in whole centimetres; it stays there."""
+    start_m, heading, way_m = body.place_m, np.radians(heading_deg), 0.0
+    for step_m, most in WAY_STEPS:
+        body.stand_at(start_m + way_m * np.array([np.sin(heading), np.cos(heading)]))
+        way_m += step_m * body.free_steps(step_m, heading_deg, most)
+        if way_m >= REACH_M:
+            break
+    body.stand_at(start_m)
+    return round(way_m, 2)
 
 
 def _stream(live: LiveRoom, settings: ViewSettings, kind: int, number: int) -> np.random.Generator:
