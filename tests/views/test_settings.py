@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import pytest
 
-from clearway.errors import ClearwayError
+from clearway.errors import ArgumentError, ClearwayError
 from clearway.live.conditions import Perturbations
-from clearway.views.settings import ViewSettings, differing
+from clearway.views.settings import ViewSettings, differing, settings_of
 
 
 @pytest.mark.parametrize(
@@ -33,10 +34,36 @@ def test_sound_settings_are_accepted():
 
 
 def test_what_differs_is_told():
-    one = ViewSettings().to_json()
+    one = ViewSettings()
     assert differing(one, one) == ""
-    other = replace(ViewSettings(), poses=5, held_out=True).to_json()
+    other = replace(one, poses=5, held_out=True)
     assert differing(other, one) == "poses 5 instead of 400, held out True instead of False"
-    lit = replace(ViewSettings(), perturbations=Perturbations(light=0.1)).to_json()
+    lit = replace(one, perturbations=Perturbations(light=0.1))
     assert differing(lit, one).startswith("perturbations {")
-    assert differing({}, one).startswith("poses None instead of 400")
+
+
+def test_a_record_gives_the_settings_back():
+    settings = ViewSettings(5, 3, 2, sensors=("rgb", "depth"), held_out=True)
+    assert settings_of(json.loads(json.dumps(settings.to_json()))) == settings
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"poses": 2.0},
+        {"takes": True},
+        {"takes": 10**9},
+        {"sensors": 3},
+        {"sensors": ["sonar", "rgb"]},
+        {"size_px": [16]},
+        {"size_px": [16, 10**6]},
+        {"perturbations": {"fog": 1}},
+        {"perturbations": None},
+        {"colour": "red"},
+    ],
+)
+def test_other_records_are_one_error(change):
+    with pytest.raises(ArgumentError, match="these are no settings of views"):
+        settings_of({**ViewSettings().to_json(), **change})
+    with pytest.raises(ArgumentError, match="these are no settings of views"):
+        settings_of({})

@@ -23,7 +23,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     made, path = made_views(), write_made(tmp_path, "one")
     shard = read_shard(path)
     assert is_shard(path) and len(shard) == 20 and shard.takes == 2 and shard.room == "one"
-    assert shard.settings == SETTINGS.to_json() and shard.sensors == SETTINGS.all_sensors
+    assert shard.settings == SETTINGS and shard.sensors == SETTINGS.all_sensors
     for field in fields(ViewTable):
         kept, given = getattr(shard.table, field.name), getattr(made.table, field.name)
         assert kept.dtype == given.dtype
@@ -108,21 +108,25 @@ FAULTS = {
     "no version": (lambda file: file.attrs.__delitem__("format_version"), "has version None"),
     "no pictures": (lambda file: file.__delitem__("rgb"), "dataset 'rgb': is missing"),
     "no table": (lambda file: file.__delitem__("table"), "dataset 'table': is missing"),
-    "no settings": (lambda file: file.attrs.__delitem__("settings"), "its settings say None x None"),
+    "no settings": (
+        lambda file: file.attrs.__delitem__("settings"),
+        "attribute 'settings': these are no settings of views",
+    ),
     "no room": (lambda file: file.attrs.__setitem__("room", "{}"), "does not say which room"),
-    "more poses": (settings_of(poses=11), "holds 20 pictures, its settings say 11 x 2"),
-    "takes that are none": (settings_of(poses=-10, takes=-2), "its settings say -10 x -2"),
-    "takes in words": (settings_of(takes="2"), "its settings say 10 x 2"),
-    "other size": (settings_of(size_px=[16, 20]), "has other sensors than its settings say"),
-    "other sensors": (settings_of(sensors=["rgb"]), "has other sensors than its settings say: rgb, depth"),
+    "more poses": (settings_of(poses=11), "has shape .20, 16, 16, 3., expected .22, 16, 16, 3."),
+    "takes that are none": (settings_of(poses=-10, takes=-2), "these are no settings of views"),
+    "takes in words": (settings_of(takes="2"), "these are no settings of views"),
+    "other size": (settings_of(size_px=[16, 20]), "has shape"),
+    "other sensors": (settings_of(sensors=["rgb"]), "has other sensors than its settings say: depth"),
     "float pictures": (other("rgb", data=np.zeros((20, 16, 16, 3), np.float32)), "expected numbers of kind 'u'"),
-    "wide pictures": (other("rgb", data=np.zeros((20, 16, 16, 3), np.uint16)), "in uint16, which no shard has"),
+    "wide pictures": (other("rgb", data=np.zeros((20, 16, 16, 3), np.uint16)), "holds uint16, expected uint8"),
     "other count": (other("rgb", data=np.zeros((21, 16, 16, 3), np.uint8)), "has shape"),
     "huge pictures": (
         other("rgb", shape=(20, HUGE, HUGE, 3), dtype="u1", chunks=(1, 64, 64, 3)),
-        "which no shard has",
+        "values were written",
     ),
-    "huge count": (other("rgb", shape=(HUGE, 16, 16, 3), dtype="u1", chunks=(1, 16, 16, 3)), "which no shard has"),
+    "huge count": (other("rgb", shape=(HUGE, 16, 16, 3), dtype="u1", chunks=(1, 16, 16, 3)), "values were written"),
+    "huge settings": (settings_of(size_px=[1024, 1024], poses=100_000), "would take 976.6 GiB"),
     "no values": (
         other("table", shape=(20, 14), dtype="f8", chunks=(20, 14)),
         "not all of its 280 values",

@@ -42,7 +42,7 @@ EVERY = [(room, pose, take) for room in range(3) for pose in range(10) for take 
 
 def test_what_is_there_is_told(views) -> None:
     assert len(views) == 60 and views.rooms == ROOMS and views.takes == 2
-    assert views.settings == SETTINGS.to_json() and [sensor.name for sensor in views.sensors] == ["rgb", "depth"]
+    assert views.settings == SETTINGS and [sensor.name for sensor in views.sensors] == ["rgb", "depth"]
 
 
 @pytest.mark.parametrize("blocks_at_once", [1, 2, 16])

@@ -89,7 +89,7 @@ def check_kept(path: Path, scene_file: Path, settings: ViewSettings) -> None:
         raise SceneError(path, fault.problem, again, fault.dataset) from fault
     if shard is None:
         raise SceneError(path, "is there, and holds no views", "Give another folder with --out")
-    if other := differing(shard.settings, settings.to_json()):
+    if other := differing(shard.settings, settings):
         raise SceneError(path, f"has {other}", OTHER_FOLDER)
     if shard.room_key != room_key(read_scene(scene_file, features_in_file=True)):
         raise SceneError(path, f"shows another room than {scene_file}", OTHER_FOLDER)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
-from clearway.errors import ArgumentError
+from clearway.errors import ArgumentError, SceneError
 from clearway.live.conditions import Perturbations
 from clearway.live.words import GEOMETRY
 from clearway.scenes.sensors import RGB, SENSORS, Sensor, check_names
@@ -77,10 +78,27 @@ class ViewSettings:
         return {**asdict(self), "sensors": list(self.sensors), "size_px": list(self.size_px)}
 
 
-def differing(kept: Mapping[str, object], asked: Mapping[str, object]) -> str:
-    """What is not as asked for, in words; empty where all is. Both as of `ViewSettings.to_json`."""
-    return ", ".join(
-        f"{key.replace('_', ' ')} {kept.get(key)} instead of {asked[key]}"
-        for key in asked
-        if kept.get(key) != asked[key]
-    )
+def settings_of(record: Mapping[str, Any]) -> ViewSettings:
+    """The settings that `ViewSettings.to_json` made a record of.
+
+    Raises:
+        ArgumentError: it is no such record, or there are no such pictures.
+    """
+    try:
+        sensors, size_px = tuple(record["sensors"]), tuple(record["size_px"])
+        changed = {"sensors": sensors, "size_px": size_px, "perturbations": Perturbations(**record["perturbations"])}
+        settings = ViewSettings(**{**record, **changed})
+        whole = (settings.poses, settings.takes, settings.seed, *size_px)
+        if len(size_px) != 2 or settings.to_json() != record or not all(type(number) is int for number in whole):
+            raise ValueError("a value is of another kind")
+        settings.check()
+    except (LookupError, TypeError, ValueError, SceneError) as fault:
+        raise ArgumentError(f"these are no settings of views ({fault}). Give what ViewSettings.to_json gave") from fault
+    return settings
+
+
+def differing(kept: ViewSettings, asked: ViewSettings) -> str:
+    """What is not as asked for, in words; empty where all is."""
+    found, wanted = kept.to_json(), asked.to_json()
+    changed = [key for key in wanted if found[key] != wanted[key]]
+    return ", ".join(f"{key.replace('_', ' ')} {found[key]} instead of {wanted[key]}" for key in changed)

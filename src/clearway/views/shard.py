@@ -17,17 +17,17 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import ArgumentError, SceneError
 from clearway.rooms.camera import VERTICAL_FOV_DEG
 from clearway.scenes import hdf5
 from clearway.scenes.file_pictures import FilePictures, file_stamp
-from clearway.scenes.memory_limits import array_limit
+from clearway.scenes.memory_limits import array_limit, memory_limit
 from clearway.scenes.records import SENSORS, read_readings, write_sensor
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import RGB, Readings, Sensor
-from clearway.scenes.sensors import rgb as colour_camera
+from clearway.scenes.storage import check_written
 from clearway.version import __version__
-from clearway.views.settings import SIDES_PX, ViewSettings
+from clearway.views.settings import ViewSettings, settings_of
 from clearway.views.table import COLUMNS, WHOLE, ViewTable, table_of
 from clearway.views.take import RoomViews
 
@@ -35,8 +35,6 @@ FORMAT = "clearway views"
 FORMAT_VERSION = 1
 TABLE = "table"
 CHUNK_BYTES = 512 * 1024
-MOST_PICTURES = 10_000_000  # of a shard, by MOST_POSES and MOST_TAKES
-MOST_SIDE_PX = SIDES_PX[1]
 LARGEST = 1e6  # of what the table holds
 COMPRESSION = {"compression": "lzf", "shuffle": True}  # half the size, and some five times as long to read
 
@@ -49,7 +47,7 @@ class Shard:
         path: the file.
         room: name of the scene whose room it shows.
         room_key: of that scene, see `room_key`.
-        settings: as `ViewSettings.to_json` gives them.
+        settings: which pictures of it these are.
         rgb: (N, height, width, 3) uint8.
         further: what other sensors measured.
     """
@@ -57,7 +55,7 @@ class Shard:
     path: Path
     room: str
     room_key: str
-    settings: Mapping[str, object]
+    settings: ViewSettings
     rgb: FilePictures
     further: tuple[Readings, ...]
 
@@ -68,14 +66,12 @@ class Shard:
     @property
     def takes(self) -> int:
         """Pictures of a pose."""
-        takes = self.settings["takes"]
-        assert isinstance(takes, int)
-        return takes
+        return self.settings.takes
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
         """What took the pictures, colour first."""
-        return (colour_camera(*self.rgb.shape[1:3]), *(readings.sensor for readings in self.further))
+        return self.settings.all_sensors
 
     @cached_property
     def table(self) -> ViewTable:
@@ -151,23 +147,31 @@ def read_shard(path: Path) -> Shard:
         if version != FORMAT_VERSION:
             problem = f"has version {version} of the format, this clearway ({__version__}) reads {FORMAT_VERSION}"
             raise SceneError(path, problem, "Take them again, or use the clearway that made them")
-        room, settings = (hdf5.read_record(file, name, path) or {} for name in ("room", "settings"))
-        pictures = hdf5.need_dataset(file, RGB, path)
-        hdf5.check_layout(pictures, path, shape=(None, None, None, 3), kinds="u")
-        count, *size, _ = pictures.shape
-        if pictures.dtype != np.uint8 or not 0 < count <= MOST_PICTURES or not all(s <= MOST_SIDE_PX for s in size):
-            problem = f"holds {count} pictures of {size[0]} x {size[1]} in {pictures.dtype}, which no shard has"
-            raise SceneError(path, problem, hdf5.MAKE_AGAIN, RGB)
-        table = hdf5.need_dataset(file, TABLE, path)
-        hdf5.check_layout(table, path, shape=(count, len(COLUMNS)), kinds="f", limit=array_limit(path))
+        room, record = (hdf5.read_record(file, name, path) or {} for name in ("room", "settings"))
+        settings = _settings(record, path)
+        count = settings.picture_count
+        limit = memory_limit(path.stat().st_size)
+        for name in (RGB, TABLE):
+            with hdf5.faults_named(path, name, "is damaged"):
+                check_written(hdf5.need_dataset(file, name, path))
+        colour = settings.all_sensors[0]
+        hdf5.check_layout(file[RGB], path, shape=(count, *colour.shape), kinds="u", limit=limit)
+        if file[RGB].dtype != np.uint8:
+            raise SceneError(path, f"holds {file[RGB].dtype}, expected uint8", hdf5.MAKE_AGAIN, RGB)
+        hdf5.check_layout(file[TABLE], path, shape=(count, len(COLUMNS)), kinds="f", limit=array_limit(path))
         further = read_readings(file, path, count)
-    sensors = [RGB, *sorted(readings.sensor.name for readings in further)]
-    poses, takes, kept = (settings.get(key) for key in ("poses", "takes", "sensors"))
-    if not isinstance(poses, int) or not isinstance(takes, int) or poses * takes != count or takes < 1:
-        raise SceneError(path, f"holds {count} pictures, its settings say {poses} x {takes}", hdf5.MAKE_AGAIN)
-    if settings.get("size_px") != size or not isinstance(kept, list) or sorted(map(str, kept)) != sorted(sensors):
-        raise SceneError(path, f"has other sensors than its settings say: {', '.join(sensors)}", hdf5.MAKE_AGAIN)
+    found = {colour, *(readings.sensor for readings in further)}
+    if found != set(settings.all_sensors):
+        shown = ", ".join(sorted(sensor.described() for sensor in found))
+        raise SceneError(path, f"has other sensors than its settings say: {shown}", hdf5.MAKE_AGAIN)
     if {"name", "key"} != set(room) or not all(isinstance(text, str) for text in room.values()):
         raise SceneError(path, "does not say which room it shows", hdf5.MAKE_AGAIN)
-    rgb = FilePictures(path.resolve(), RGB, (count, *size, 3), file_stamp(path))
+    rgb = FilePictures(path.resolve(), RGB, (count, *colour.shape), file_stamp(path))
     return Shard(path, str(room["name"]), str(room["key"]), settings, rgb, further)
+
+
+def _settings(record: Mapping[str, object], path: Path) -> ViewSettings:
+    try:
+        return settings_of(record)
+    except ArgumentError as fault:
+        raise SceneError(path, f"attribute 'settings': {str(fault).rpartition('. ')[0]}", hdf5.MAKE_AGAIN) from fault

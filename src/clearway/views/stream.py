@@ -18,7 +18,7 @@ import numpy as np
 from clearway.errors import ArgumentError, SceneError
 from clearway.scenes.scene_files import scene_files
 from clearway.scenes.sensors import Sensor
-from clearway.views.settings import differing
+from clearway.views.settings import ViewSettings, differing
 from clearway.views.shard import Shard, read_shard
 from clearway.views.table import ViewTable, joined
 
@@ -73,8 +73,8 @@ class Views:
         return self.shards[0].sensors
 
     @property
-    def settings(self) -> Mapping[str, object]:
-        """As `ViewSettings.to_json` gives them, of all rooms alike."""
+    def settings(self) -> ViewSettings:
+        """Which pictures these are, of all rooms alike."""
         return self.shards[0].settings
 
     def __len__(self) -> int:

@@ -35,19 +35,17 @@ def summary(views: Views) -> dict[str, object]:
             for first in range(0, len(shard), CHECKED_PICTURES):
                 shard.seen(sensor.name, slice(first, first + CHECKED_PICTURES))
     table = joined([shard.table for shard in views.shards])
-    settings = dict(views.settings)
-    perturbations = settings.pop("perturbations")
-    assert isinstance(perturbations, dict)
+    settings = views.settings
     return {
         "rooms": len(views.shards),
         "pictures": len(views),
-        "poses": settings["poses"],
-        "takes": settings["takes"],
+        "poses": settings.poses,
+        "takes": settings.takes,
         "sensors": tuple(sensor.described() for sensor in views.sensors),
-        "perturbations": {name: value for name, value in perturbations.items() if value},
-        "seed": settings["seed"],
-        "held_out": settings["held_out"],
-        "scene_headings": settings["scene_headings"],
+        "perturbations": {name: value for name, value in settings.perturbations.to_json().items() if value},
+        "seed": settings.seed,
+        "held_out": settings.held_out,
+        "scene_headings": settings.scene_headings,
         "bytes_a_picture": round(sum(shard.path.stat().st_size for shard in views.shards) / len(views)),
         "zones": {zone.name.lower(): int((table.zone == zone).sum()) for zone in Zone},
         "mean_clearance_m": round(float(table.clearance_m.mean()), 3),
