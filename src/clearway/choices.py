@@ -32,5 +32,11 @@ MatmulPrecision = Literal["highest", "medium"]
 PlanKind = Literal["room", "flat"]
 """See `clearway.generation`."""
 
+HELD_OUT = "held-out"
+"""In place of targets: some that are held out, see `clearway.scenes.targets`."""
+
+MODEL_SUFFIXES = (".xml", ".urdf")
+"""Of MuJoCo models' files."""
+
 SplitName = Literal["train", "validation", "test"]
 """See `clearway.generation.split`."""

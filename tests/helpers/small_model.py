@@ -17,7 +17,7 @@ MODEL = """<mujoco><visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="
   <body pos="-1 2.7 1.5" euler="0 0 30"><freejoint/><geom type="cylinder" size=".25 .5" rgba=".9 .9 .1 1"/></body>
 </worldbody></mujoco>"""  # the floor is 1 m up
 PLANE = {"floor": "plane", "size": "0 0 1", "down": 1}
-SLAB = {"floor": "box", "size": "2.3 3.3 .1", "down": 0.9}
+SLAB = {"floor": "box", "size": "2.1 3.3 .1", "down": 0.9}
 CHOICE = FloorChoice(floor_m=1.0, camera_m=0.8, spawn_m=(-1.0, -2.0), extent_m=(-2.5, 2.5, -3.5, 3.5))
 AGENT = AgentShape(step_m=1.0)
 

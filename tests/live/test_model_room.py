@@ -65,7 +65,7 @@ def test_where_the_floor_ends_the_move_ends(tmp_path: Path) -> None:
     body = live.body(live.as_built())
     body.stand_at(np.array([-2.0, -1.0]))
     assert body.move(0.5, 270.0).contact
-    assert body.place_m[0] == pytest.approx(-2.3, abs=0.002)
+    assert body.place_m[0] == pytest.approx(-2.1, abs=0.002)
 
 
 def test_the_edge_of_what_counts_as_floor_is_a_wall(live: LiveRoom) -> None:
@@ -99,8 +99,7 @@ def test_an_environment_sees_the_scene_s_pictures_there(scene: Scene) -> None:
     seen, info = env.reset(seed=0, options={"start": 5, "target": 9})
     assert (info["x_m"], info["z_m"]) == tuple(scene.locations_m[5])
     for key, state in (("observation", 5), ("target", 9)):
-        apart = np.abs(seen[key].astype(int) - scene.observations[state])
-        assert apart.max() <= 1  # an endless plane is drawn a level darker in the first picture of all
+        np.testing.assert_array_equal(seen[key], scene.observations[state])  # whatever was seen before
         assert np.abs(seen[key].astype(int) - scene.observations[state + 1]).max() > 100
     env.close()
 

@@ -64,7 +64,9 @@ def report(result: LiveResult) -> LiveReport:
         zone_steps=np.zeros((4, 3), int),
         looped=np.zeros(4, bool),
     )
-    return LiveReport((result,), {"wary": grid_figures(grid, np.array([0, 0]), seed=0)}, PROTOCOL, "tiny")
+    return LiveReport(
+        (result,), {"wary": grid_figures(grid, np.array([0, 0]), seed=0)}, {"room": (3, 9)}, PROTOCOL, "tiny"
+    )
 
 
 def test_values_are_means_over_targets(result):
@@ -132,6 +134,7 @@ def test_the_grid_stands_in_one_place_of_the_json(report):
     assert (found["success"], found["steps"], found["contacts"], found["contact_free"]) == (0.75, 6.0, 1.75, 0.5)
     assert found["contacts_per_100_steps"] == pytest.approx((600 / 14 + 10) / 2)
     assert set(found) == {*found["intervals"], "intervals"} and "min_clearance_m" not in found
+    assert content["targets"] == {"room": [3, 9]}
     assert [one["setting"] for one in content["results"]] == ["none"]
 
 

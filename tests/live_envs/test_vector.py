@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -13,11 +14,18 @@ from gymnasium.vector import AutoresetMode
 import clearway.envs
 from clearway.envs.registration import LIVE_ENV_ID
 from clearway.errors import EnvError
+from clearway.generation.files import notes_of
+from clearway.generation.plans import generated_plan
+from clearway.generation.request import Request
+from clearway.importers.mjcf import read_mjcf
 from clearway.live_envs.single import LiveImageGoalEnv
 from clearway.live_envs.vector import LiveImageGoalVectorEnv
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.rooms.camera import eye_view, first_person_shot
+from clearway.rooms.render import render
+from clearway.scenes.floor_plans import GENERATED, FloorPlan, floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 from helpers.imported import imported_by
+from helpers.small_model import AGENT, CHOICE, PLANE, written
 
 SMALL = {"height_px": 12, "width_px": 16}
 NOISY = {"distance_noise": 0.05, "angle_noise": 5.0, "light": 0.3}
@@ -137,20 +145,71 @@ def test_in_processes_it_lives_the_same_episodes(plan_file: str, context: str) -
         together.close()
 
 
+def test_small_pictures_are_those_of_the_scene_to_the_eye_and_others_to_the_bit(live) -> None:
+    pose = (0.25, 0.25, 45.0)
+    shots = (first_person_shot(*pose),)
+    for height_px, width_px, exact in ((60, 80, False), (61, 81, True), (300, 400, True)):
+        view = eye_view(shots, height_px=height_px, width_px=width_px)
+        (picture,) = render(live.model, view, workers=1)
+        env = LiveImageGoalEnv(live, height_px=height_px, width_px=width_px)
+        seen = env.reset(options={"start": pose, "target": TARGET})[0]["observation"]
+        apart = np.abs(seen.astype(int) - picture)
+        assert (apart.max() == 0) == exact and apart.mean() < 3.0
+        env.close()
+
+
 def test_importing_it_is_light() -> None:
     loaded = imported_by("import clearway.live_envs.single, clearway.live.arrangement")
     assert "clearway.live_envs.vector" in loaded
     assert not {"torch", "transformers"} & loaded
 
 
+@pytest.fixture(scope="module")
+def places(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Files of rooms that others have, or have drawn: a generated flat, and a MuJoCo model's scene."""
+    folder = tmp_path_factory.mktemp("places")
+    request = Request("flat", "test", 0, 0)
+    flat = floor_plan_scene(generated_plan(request), feature_count=4)
+    made_by = replace(flat.made_by, source=GENERATED, seed=0, notes={**flat.made_by.notes, **notes_of(request)})
+    write_scene(replace(flat, made_by=made_by), folder / f"{request.name}.h5")
+    write_scene(read_mjcf(written(folder, PLANE), CHOICE, AGENT, workers=1, **SMALL), folder / "hall.h5")
+    return {"flat": str(folder / f"{request.name}.h5"), "model": str(folder / "hall.h5")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", ["flat", "model"])
+def test_a_generated_flat_and_a_model_are_rooms_as_others(places: dict[str, str], place: str) -> None:
+    """Gymnasium's check, processes, and an agent of Stable-Baselines3."""
+    size = {"height_px": 36, "width_px": 36}
+    env = gymnasium.make(LIVE_ENV_ID, room=places[place], render_mode="rgb_array", **size)
+    check_env(env.unwrapped)
+    env.close()
+    arguments = {"num_envs": 2, "room": places[place], "perturbations": NOISY, **size}
+    together = gymnasium.make_vec(LIVE_ENV_ID, **arguments)
+    apart = gymnasium.make_vec(LIVE_ENV_ID, vectorization_mode="async", **arguments)
+    ours, theirs = together.reset(seed=0)[0], apart.reset(seed=0)[0]
+    for actions in np.random.default_rng(0).integers(4, size=(10, 2)):
+        for key in ours:
+            np.testing.assert_array_equal(ours[key], theirs[key])
+        (ours, reward, *_), (theirs, same, *_) = together.step(actions), apart.step(actions)
+        np.testing.assert_array_equal(reward, same)
+    apart.close()
+    together.close()
+    _check_that_sb3_learns(places[place])
+
+
 def test_sb3_learns_from_it(live) -> None:
+    _check_that_sb3_learns(live)
+
+
+def _check_that_sb3_learns(room) -> None:
     pytest.importorskip("stable_baselines3")
     from stable_baselines3 import PPO
 
     from clearway.envs.sb3 import SB3VecEnv
 
     size = {"height_px": 36, "width_px": 36}  # the least that SB3's network takes
-    envs = SB3VecEnv(LiveImageGoalVectorEnv(live, num_envs=2, autoreset_mode="SameStep", max_episode_steps=9, **size))
+    envs = SB3VecEnv(LiveImageGoalVectorEnv(room, num_envs=2, autoreset_mode="SameStep", max_episode_steps=9, **size))
     assert envs.num_envs == 2 and envs.action_space.n == 4
     model = PPO("MultiInputPolicy", envs, n_steps=16, batch_size=16, n_epochs=1, device="cpu", seed=0)
     model.learn(32)

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.scenes.scene import Scene
-from clearway.scenes.targets import ZHU_TARGETS, default_targets, seeded_targets, target_order
+from clearway.scenes.floor_plans import GENERATED
+from clearway.scenes.held_out import held_out
+from clearway.scenes.scene import Provenance, Scene
+from clearway.scenes.targets import ZHU_TARGETS, default_held_out_targets, default_targets, seeded_targets, target_order
 from helpers.made import grid_scene, scene_of_cells
 
 ROOM = [[x, z] for x in range(3) for z in range(2)]
@@ -56,3 +58,38 @@ def test_published_targets_are_for_scenes_of_published_names_and_sizes() -> None
     larger, smaller = rectangle(13, 14, "kitchen_02"), rectangle(10, 10, "kitchen_02")
     assert default_targets(larger) == seeded_targets(larger)
     assert default_targets(smaller) == seeded_targets(smaller)
+
+
+def generated(name: str = "room-train-000003-bathroom") -> Scene:
+    scene = rectangle(6, 5, name)
+    return replace(scene, made_by=Provenance(GENERATED, seed=0))
+
+
+def test_in_generated_rooms_none_that_is_held_out_is_drawn() -> None:
+    scene = generated()
+    held = set(np.flatnonzero(held_out(scene)).tolist())
+    assert len(held) == 12 and set(target_order(scene)) == set(range(120)) - held
+    for seed in range(40):
+        assert not set(default_targets(scene, seed)) & held
+        drawn = default_held_out_targets(scene, seed)
+        assert len(drawn) == 5 and set(drawn) <= held and len(set(scene.cells[list(drawn)])) == 3
+    ordinary = replace(scene, made_by=Provenance("floor-plan"))
+    assert any(set(default_targets(ordinary, seed)) & held for seed in range(40))
+
+
+def test_a_generated_room_of_few_poses_has_few_held_out_targets() -> None:
+    scene = replace(rectangle(2, 1, "small"), made_by=Provenance(GENERATED, seed=0))
+    assert len(default_held_out_targets(scene)) == len(default_targets(scene)) == 4
+    assert not set(default_held_out_targets(scene)) & set(default_targets(scene))
+    with pytest.raises(
+        SceneError, match=r"5 targets asked for, the largest component has 4 states that are held out\."
+    ):
+        seeded_targets(scene, 5, held_out=True)
+
+
+def test_where_nothing_is_held_out_a_line_says_so() -> None:
+    with pytest.raises(SceneError, match=r"nothing is held out in it: it is no generated room or flat\. Name targets"):
+        default_held_out_targets(rectangle(6, 5, "hall"))
+    alone = replace(rectangle(1, 1, "alone"), made_by=Provenance(GENERATED, seed=0))
+    with pytest.raises(SceneError, match="nothing is held out in it: it is too small"):
+        default_held_out_targets(alone)

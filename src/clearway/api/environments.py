@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,6 +11,7 @@ from gymnasium.vector import VectorEnv
 
 from clearway.api.arguments import as_whole
 from clearway.api.scenes import Scenes, load_scenes
+from clearway.choices import MODEL_SUFFIXES
 from clearway.envs.registration import ENV_ID, LIVE_ENV_ID
 from clearway.errors import ArgumentError
 from clearway.rooms import ROOM_NAMES
@@ -22,7 +24,8 @@ def make_env(
     """An environment of Gymnasium's, as `gymnasium.make("Clearway/ImageGoal-v0")` gives it; or a batch of them.
 
     Args:
-        scenes: a scene, a scene file, a folder of them, or several. Live: one of them, or the name of a room of ours.
+        scenes: a scene, a scene file, a folder of them, or several. Live: one of them, the name of a room of ours,
+            or a MuJoCo model's file.
         num_envs: None gives a single environment, a number a vector environment of so many.
         live: walk in the room itself, at any pose, with pictures rendered on the way: `Clearway/LiveImageGoal-v0`.
         options: `targets`, `reward`, `observations`, `sensors`, `max_episode_steps` (500 by default), `history_length`,
@@ -62,9 +65,11 @@ def _live_kind(num_envs: int | None) -> tuple[Any, str, str]:
     return LiveImageGoalEnv if num_envs is None else LiveImageGoalVectorEnv, LIVE_ENV_ID, "room"
 
 
-def _room(source: Scenes) -> str | Scene:
-    """The name of one of our rooms, or a scene."""
+def _room(source: Scenes) -> str | Path | Scene:
+    """The name of one of our rooms, a MuJoCo model's file, or a scene."""
     if isinstance(source, str) and source in ROOM_NAMES:
+        return source
+    if isinstance(source, (str, Path)) and Path(source).suffix.lower() in MODEL_SUFFIXES:
         return source
     scene, *others = load_scenes(source)
     if others:

@@ -15,6 +15,7 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.targets import Targets, chosen_targets
 from clearway.api.training import TrainResult
+from clearway.choices import HELD_OUT
 from clearway.deploy.card import Card
 from clearway.deploy.navigator import open_agent
 from clearway.errors import ArgumentError
@@ -43,11 +44,13 @@ class EvaluateResult:
         evaluations: of the agent with sampled actions, which is the paper's way, then of its other ways of choosing
             them, of the exact optima, a random walk and shortest paths.
         scenes: where it walked.
+        held_out: to targets that are held out of trainings.
     """
 
     agent: TrainedAgent | Agent
     evaluations: tuple[Evaluation, ...]
     scenes: tuple[Scene, ...]
+    held_out: bool = False
 
     def __repr__(self) -> str:
         average = self.evaluations[0].average
@@ -101,13 +104,17 @@ class EvaluateResult:
         return {**first, "others": others}
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Leave evaluation.json and evaluation.md in a folder, as `clearway evaluate` does in the run's."""
+        """Leave evaluation.json and evaluation.md in a folder, as `clearway evaluate` does in the run's.
+
+        Where targets are held-out ones, held-out.json and held-out.md.
+        """
         path = as_path("folder", folder)
         try:
             path.mkdir(parents=True, exist_ok=True)
         except OSError as fault:
             raise ArgumentError(f"folder={path}: not a folder to write to ({fault.strerror}). Give another") from fault
-        write_evaluations(path, self.to_json(), self.evaluations)
+        name = HELD_OUT if self.held_out else "evaluation"
+        write_evaluations(path, self.to_json(), self.evaluations, name)
 
     def _repr_markdown_(self) -> str:
         return self.markdown()
@@ -150,7 +157,7 @@ def evaluate(
         scenes: files, folders of them, or scenes. For a run those of its training; None: those that were trained on in
             memory, else the files that the run names. An agent without a run needs them.
         targets: state ids by scene name, of an agent without a run; None: those that an exported agent was trained on,
-            else five seeded ones. A run has its own.
+            else five seeded ones. A run has its own. Of either "held-out": five a scene that trainings leave out.
         beside: further agents to compare with: names of plugins or package.module:name, or such names, or what makes an
             agent for a `World`, by what tables are to call them.
         episodes: episodes a target.
@@ -173,14 +180,17 @@ def evaluate(
         agent = open_agent(as_path("agent", agent))
     if not isinstance(agent, TrainedAgent | TrainResult | str | os.PathLike):
         return _own(agent, found, targets, others, settings)
-    if targets is not None:
-        raise ArgumentError("targets: a run has its own. Leave them out, or give an agent without a run")
+    held_out = isinstance(targets, str) and targets == HELD_OUT
+    if targets is not None and not held_out:
+        problem = "targets: a run has its own. Leave them out"
+        raise ArgumentError(f"{problem}, give {HELD_OUT!r}, or an agent without a run")
     trained = _trained(agent)
     if found is None and isinstance(agent, TrainResult):
         found = list(agent.scenes)
     places = load.run_scenes(trained.record, found)
-    evaluations = evaluate_run(trained, places, beside=others, **settings)
-    return EvaluateResult(trained, tuple(evaluations), tuple(places))
+    chosen = chosen_targets(places, HELD_OUT, settings["seed"]) if held_out else None
+    evaluations = evaluate_run(trained, places, beside=others, targets=chosen, **settings)
+    return EvaluateResult(trained, tuple(evaluations), tuple(places), held_out)
 
 
 def _own(
@@ -215,7 +225,7 @@ def _own(
             **settings,
         )
     walked = own.agent if isinstance(own, Foreign) else own
-    return EvaluateResult(walked, tuple(evaluations), tuple(scenes))
+    return EvaluateResult(walked, tuple(evaluations), tuple(scenes), isinstance(targets, str) and targets == HELD_OUT)
 
 
 def _check_fits(card: Card, scenes: Sequence[Scene]) -> None:

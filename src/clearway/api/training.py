@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ from typing import Any, get_args
 
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
-from clearway.api.targets import Targets, chosen_targets
+from clearway.api.targets import Targets, chosen_targets, told_of_held_out
 from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
 from clearway.learn.algorithms import ALGORITHMS, algorithm
@@ -27,6 +28,7 @@ from clearway.markdown import table_lines
 from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
+from clearway.scenes.validate import SceneWarning
 from clearway.torch_threads import torch_threads
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
@@ -97,7 +99,8 @@ def train(
 
     Args:
         scenes: a scene, a scene file, a folder of them, or several. All with features of one encoder.
-        targets: state ids by scene name, or state ids alone for a single scene; five seeded ones where there are none.
+        targets: state ids by scene name, or state ids alone for a single scene; five seeded ones where there are none,
+            in generated rooms and flats none that is held out. "held-out": such ones alone.
         reward: one of `clearway.reward.REWARDS` by its name, a `Reward`, or package.module:name.
         algorithm: "ppo" (our recipe), "a2c", "a3c" (as published), "bc" or "q-learning", with its own defaults; a
             preset, such as "paper" (the published settings, synchronous); or settings, such as `PPO(envs=200)`.
@@ -126,9 +129,12 @@ def train(
     learner = chosen_learner(algorithm, frames, settings)
     pairs = scenes_and_files(scenes, features_in_file=store != "memory")
     loaded = [scene for scene, _ in pairs]
+    chosen = chosen_targets(loaded, targets, number)
+    for line in told_of_held_out(loaded, chosen):
+        warnings.warn(line, SceneWarning, stacklevel=2)
     request = RunRequest(
         scenes=loaded,
-        targets=chosen_targets(loaded, targets, number),
+        targets=chosen,
         learner=learner,
         reward=reward_named(reward),
         seed=number,

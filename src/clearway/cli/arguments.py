@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from clearway.choices import HELD_OUT
 from clearway.errors import ClearwayError
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 
@@ -70,12 +71,16 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def given_targets(words: Sequence[str], scene_count: int) -> dict[str, list[int]] | list[int] | None:
+def given_targets(words: Sequence[str], scene_count: int) -> dict[str, list[int]] | list[int] | str | None:
     """Targets from the command line's words: state ids by scene name, or of the only scene; None where none are given.
+
+    The word "held-out" alone stands for itself.
 
     Raises:
         ClearwayError: a word cannot be read, or leaves open which of several scenes it means.
     """
+    if list(words) == [HELD_OUT]:
+        return HELD_OUT
     named: dict[str, list[int]] = {}
     bare: list[int] = []
     for word in words:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,12 @@ def stderr_console() -> Console:
 def say(text: str) -> None:
     """Print a line on standard error as it is, however long, but for characters that are not printable."""
     stderr_console().print(printable(text), soft_wrap=True)
+
+
+def say_held_out(targets: Mapping[str, Sequence[int]]) -> None:
+    """Say which held-out targets, by scene name, were drawn."""
+    drawn = (f"{scene}={','.join(map(str, states))}" for scene, states in targets.items())
+    say(f"held-out targets: {' '.join(drawn)}")
 
 
 @contextmanager

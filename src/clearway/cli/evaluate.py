@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from clearway.choices import HELD_OUT
 from clearway.cli.arguments import scene_files
-from clearway.cli.console import print_json, say, stdout_console
+from clearway.cli.console import print_json, say, say_held_out, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
 from clearway.cli.live import STEP_LIMIT as LIVE_STEP_LIMIT
 from clearway.cli.live import Live, evaluate_live
 from clearway.errors import ClearwayError
+
+if TYPE_CHECKING:
+    from clearway.api.evaluation import EvaluateResult
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,9 @@ class Evaluate:
     """Print a row for each target too."""
     pictures: Path | None = None
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
+    held_out: bool = False
+    """Evaluate at five targets a scene that trainings in generated rooms and flats leave out, and leave held-out.json
+    and held-out.md, live held-out-live.json and held-out-live.md, in the run folder."""
     json: bool = False
     """Print JSON: the sampled agent's figures, and the other agents' under "others"."""
     room: Live = field(default_factory=Live)
@@ -49,6 +56,8 @@ class Evaluate:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
         self.room.check()
         self._check_file()
+        if self.held_out and self.pictures is not None and not self.room.live:
+            raise ClearwayError("--pictures shows the targets of the training. Leave it or --held-out out")
         if not self.room.live:
             self._on_grid()
             return
@@ -65,6 +74,7 @@ class Evaluate:
             step_limit=_or(self.step_limit, LIVE_STEP_LIMIT),
             seed=self.seed,
             pictures=self.pictures,
+            held_out=self.held_out,
             json=self.json,
         )
 
@@ -86,7 +96,17 @@ class Evaluate:
         files = scene_files(self.scenes) if self.scenes else None
         exported = is_exported(self.folder)
         agent = self.folder if exported else load_agent(self.folder, self.checkpoint)
-        result = evaluate(agent, files, beside=self.beside, episodes=episodes, step_limit=step_limit, seed=self.seed)
+        result = evaluate(
+            agent,
+            files,
+            targets=HELD_OUT if self.held_out else None,
+            beside=self.beside,
+            episodes=episodes,
+            step_limit=step_limit,
+            seed=self.seed,
+        )
+        if self.held_out:
+            say_held_out(_targets_of(result))
         if not exported:
             result.save(self.folder)
         if self.pictures:
@@ -103,6 +123,14 @@ class Evaluate:
         levels: list[Level] = ["targets"] if self.targets else []
         levels += ["scenes", "average"] if len(result.scenes) > 1 else ["average"]
         stdout_console().print(rich_tables(result.evaluations, levels))
+
+
+def _targets_of(result: EvaluateResult) -> dict[str, list[int]]:
+    found: dict[str, list[int]] = {}
+    for target in result.evaluations[0].targets:
+        assert target.target is not None, "a row a target"
+        found.setdefault(target.scene, []).append(target.target)
+    return found
 
 
 def _or(given: int | None, default: int) -> int:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from clearway.choices import HELD_OUT
 from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
-from clearway.cli.console import print_json, say, stderr_console, stdout_console
+from clearway.cli.console import print_json, say, say_held_out, stderr_console, stdout_console
 from clearway.errors import ClearwayError
 from clearway.live.conditions import MOST, REARRANGING, REFERENCE, Perturbations
 
@@ -74,9 +75,11 @@ def evaluate_live(
     step_limit: int,
     seed: int,
     pictures: Path | None,
+    held_out: bool,
     json: bool,
 ) -> None:
     """Walk the episodes, print, leave live.json and live.md in the run folder, and draw what is asked for."""
+    from clearway.api.targets import chosen_targets
     from clearway.learn.load import load_network, run_scenes
     from clearway.live.conditions import Condition, label_of, sweep_settings
     from clearway.scenes.scene import encoder_names
@@ -90,23 +93,27 @@ def evaluate_live(
     from clearway.live.episodes import LiveProtocol
     from clearway.live.result_tables import rich_tables
     from clearway.live.results import LiveReport
-    from clearway.live.walks import check_alike, finish_live, stages, walk_on_grid, walk_setting, write_live_part
+    from clearway.live.walks import LIVE, check_alike, finish_live, stages, walk_on_grid, walk_setting, write_live_part
 
     check_alike(agents)
     one = Condition(label_of(options.perturbations), options.perturbations)
     protocol = LiveProtocol(episodes, step_limit, seed, options.selection)
     encoder = encoder_names(scenes)
-    with stages(agents, scenes) as places:
+    targets = chosen_targets(scenes, HELD_OUT, seed) if held_out else next(iter(agents.values())).record.targets
+    name = f"{HELD_OUT}-{LIVE}" if held_out else LIVE
+    if held_out:
+        say_held_out(targets)
+    with stages(agents, scenes, targets) as places:
         settings = sweep_settings(options.strengths, _reference(places)) if options.sweep else [one]
         outcomes: list[LiveOutcome] = []
         with _status() as show:
             show("on the grid")
-            report = LiveReport((), walk_on_grid(agents, scenes, protocol), protocol, encoder)
+            report = LiveReport((), walk_on_grid(agents, scenes, targets, protocol), targets, protocol, encoder)
             for setting in settings:
                 outcomes.append(walk_setting(places, agents, setting, protocol, show))
                 report = replace(report, results=tuple(outcome.result for outcome in outcomes))
-                write_live_part(folder, report)  # what is complete outlives an interruption
-        finish_live(folder)
+                write_live_part(folder, report, name)  # what is complete outlives an interruption
+        finish_live(folder, name)
         if pictures is not None:
             _draw(pictures, places, outcomes)
     if json:

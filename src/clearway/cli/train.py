@@ -31,7 +31,8 @@ class Train:
     """The run folder."""
     targets: tuple[str, ...] = ()
     """Target states: "26 37 43" for one scene, "bathroom=26,37 kitchen=90,136" for several. By default the published
-    targets for the paper's four scenes, five seeded ones elsewhere."""
+    targets for the paper's four scenes, five seeded ones elsewhere, in generated rooms and flats none that is held out;
+    "held-out": such ones alone."""
     reward: RewardChoice = "collision-aware"
     parameters: RewardParameters = field(default_factory=RewardParameters)
     zones: ZoneLevel = "pose"

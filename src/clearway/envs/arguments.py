@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from clearway.choices import HELD_OUT
 from clearway.envs.render import RENDER_MODES
 from clearway.errors import EnvError
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
-from clearway.scenes.targets import default_targets
+from clearway.scenes.targets import default_held_out_targets, default_targets
 
 SceneSource = Scene | str | Path
 Seeds = int | Sequence[int | None] | np.ndarray | None
@@ -60,8 +61,17 @@ def check_switch(name: str, value: object) -> None:
         raise EnvError(f"{name}={value!r:.40}: expected True or False")
 
 
-def chosen_targets(targets: Mapping[str, Sequence[int]] | None, scenes: Sequence[Scene]) -> dict[str, Sequence[int]]:
-    """Targets by scene name, the scenes' default ones for None; EnvError where they are nothing of the kind."""
+def chosen_targets(
+    targets: Mapping[str, Sequence[int]] | str | None, scenes: Sequence[Scene]
+) -> dict[str, Sequence[int]]:
+    """Targets by scene name, the scenes' default ones for None, for "held-out" such ones.
+
+    Raises:
+        EnvError: they are nothing of the kind.
+        SceneError: nothing is held out in a scene.
+    """
+    if isinstance(targets, str) and targets == HELD_OUT:
+        return {scene.name: default_held_out_targets(scene) for scene in scenes}
     if targets is None:
         return {scene.name: default_targets(scene) for scene in scenes}
     if not isinstance(targets, Mapping):

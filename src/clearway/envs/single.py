@@ -91,7 +91,8 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
     | Parameter           | Default             | Description                                                        |
     |---------------------|---------------------|--------------------------------------------------------------------|
     | `scenes`            | required            | a `Scene` or scene file, or several of one encoder                 |
-    | `targets`           | `None`              | state ids by scene name; None: `scenes.targets.default_targets`    |
+    | `targets`           | `None`              | state ids by scene name; None: `scenes.targets.default_targets`;   |
+    |                     |                     | "held-out": some that trainings in generated rooms leave out       |
     | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name |
     | `observations`      | `"features"`        | or `"pictures"`                                                    |
     | `sensors`           | `("rgb",)`          | whose pictures, for example `("rgb", "depth")`                     |
@@ -119,7 +120,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         self,
         scenes: SceneSource | Sequence[SceneSource],
         *,
-        targets: Mapping[str, Sequence[int]] | None = None,
+        targets: Mapping[str, Sequence[int]] | str | None = None,
         reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
         sensors: Sequence[str] = (RGB,),

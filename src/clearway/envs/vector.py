@@ -93,7 +93,7 @@ class ImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self,
         scenes: SceneSource | Sequence[SceneSource],
         *,
-        targets: Mapping[str, Sequence[int]] | None = None,
+        targets: Mapping[str, Sequence[int]] | str | None = None,
         reward: str | Reward = "collision-aware",
         observations: ObservationKind = "features",
         sensors: Sequence[str] = (RGB,),

@@ -31,17 +31,19 @@ def evaluate_runs(
     scenes: Sequence[Scene],
     *,
     beside: Mapping[str, AgentMaker] = MappingProxyType({}),
+    targets: Mapping[str, Sequence[int]] | None = None,
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_limit: int = STEP_LIMIT,
     seed: int = 0,
 ) -> list[Evaluation]:
     """Agents of several runs on the same scenes and targets, by each way of choosing actions.
 
-    Beside them walk the exact optima, the agents of `beside`, a random and a shortest-path agent. Torch uses one thread
-    meanwhile: steps are too small for more, which only wait for each other beside a training.
+    Targets are those of the training, unless others are given by scene name. Beside the agents walk the exact optima,
+    the agents of `beside`, a random and a shortest-path agent. Torch uses one thread meanwhile: steps are too small for
+    more, which only wait for each other beside a training.
 
     Raises:
-        RunError: the runs have other targets.
+        RunError: the runs have other targets, or an agent can walk to its own alone.
         AgentError: one of `beside` cannot walk here.
     """
     records = [agent.record for agent in agents.values()]
@@ -49,7 +51,7 @@ def evaluate_runs(
     for record in records:
         if record.targets != first.targets:
             raise RunError("the runs differ in their targets. Evaluate them one by one")
-    world = run_world(first, scenes)
+    world = run_world(first, scenes, targets)
     with torch_threads(1):
         evaluations = evaluate_agents(
             world,

@@ -175,9 +175,9 @@ def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Sc
     return read_scene(Path(path), name=name)
 
 
-def run_world(record: RunRecord, scenes: Sequence[Scene]) -> World:
-    """The world of a run."""
-    return make_world(scenes, record.targets, record.zone_level)
+def run_world(record: RunRecord, scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]] | None = None) -> World:
+    """The world of a run; with its targets, unless others are given by scene name."""
+    return make_world(scenes, record.targets if targets is None else targets, record.zone_level)
 
 
 def run_tables(record: RunRecord, scenes: Sequence[Scene]) -> World:

@@ -14,6 +14,7 @@ from clearway.rooms.camera import CAMERA_HEIGHT_M, View, eye_view
 from clearway.rooms.groups import CEILING_GROUP, SEEN_GROUP
 from clearway.scenes import floor_plans
 from clearway.scenes.scene import Provenance, Scene
+from clearway.scenes.targets import possible_targets
 
 if TYPE_CHECKING:
     import mujoco
@@ -58,6 +59,11 @@ class LiveRoom:
         """x, z and heading of a state in the room."""
         x_m, z_m = self.scene.locations_m[state].tolist()
         return x_m, z_m, float(self.scene.headings_deg[state])
+
+    def possible_targets(self, held_out: bool = False) -> np.ndarray:
+        """States that may be drawn as targets, see `scenes.targets.possible_targets`."""
+        kept = replace(self.scene, locations_m=self.scene.locations_m + np.array(self.origin_m))
+        return possible_targets(kept, held_out)
 
     def as_built(self) -> Arrangement:
         """Nothing moved, nothing new."""

@@ -129,12 +129,14 @@ class LiveReport:
     Attributes:
         results: a setting each.
         grid: figures (`GRID_METRICS`) by the agent's name, of as many episodes with the same starts and targets.
+        targets: states by scene name.
         protocol: of both.
         encoder: whose features the agents see.
     """
 
     results: tuple[LiveResult, ...]
     grid: Mapping[str, Figures]
+    targets: Mapping[str, Sequence[int]]
     protocol: LiveProtocol
     encoder: str
 
@@ -146,6 +148,7 @@ class LiveReport:
             "step_limit": self.protocol.step_limit,
             "seed": self.protocol.seed,
             "action_selection": self.protocol.selection,
+            "targets": {scene: list(states) for scene, states in self.targets.items()},
             "grid": {"agents": {name: figures.to_json() for name, figures in self.grid.items()}},
             "results": [result.to_json() for result in self.results],
         }

@@ -26,8 +26,8 @@ from clearway.scenes.sensors import RGB
 from clearway.torch_threads import torch_threads
 from clearway.world.world import World, make_world
 
-JSON_FILE, MARKDOWN_FILE = "live.json", "live.md"
-JSON_PART, MARKDOWN_PART = "live.part.json", "live.part.md"
+LIVE = "live"
+"""Name of the files in the run folder."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,10 @@ def check_alike(agents: Mapping[str, TrainedNetwork]) -> None:
 
 
 @contextmanager
-def stages(agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene]) -> Iterator[list[LiveScene]]:
-    """Build the rooms of the agents' scenes and open a camera in each, for the block.
+def stages(
+    agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]
+) -> Iterator[list[LiveScene]]:
+    """Build the rooms of the agents' scenes, with targets by scene name, and open a camera in each, for the block.
 
     Raises:
         SceneError: a scene is none of our rooms.
@@ -85,7 +87,7 @@ def stages(agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene]) -> Ite
             record_of_encoder = _encoder_record(scene)  # before the seconds that the room takes
             live = live_room(scene)
             encoder = encoder_from_record(record_of_encoder)
-            world = make_world([scene], {scene.name: record.targets[scene.name]}, record.zone_level)
+            world = make_world([scene], {scene.name: targets[scene.name]}, record.zone_level)
             found.append(
                 LiveScene(live, world, encoder, opened.enter_context(studio(live.model, live.lens(*_size_px(scene)))))
             )
@@ -145,13 +147,16 @@ def walk_setting(
 
 
 def walk_on_grid(
-    agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene], protocol: LiveProtocol
+    agents: Mapping[str, TrainedNetwork],
+    scenes: Sequence[Scene],
+    targets: Mapping[str, Sequence[int]],
+    protocol: LiveProtocol,
 ) -> dict[str, Figures]:
     """All agents' figures on the grid, in episodes with the same targets, starts and chances."""
     found = {}
     with torch_threads(1):
         for name, agent in agents.items():
-            world = run_world(agent.record, scenes)
+            world = run_world(agent.record, scenes, targets)
             table = run_episodes(
                 world,
                 agent.on_poses(world),
@@ -165,17 +170,18 @@ def walk_on_grid(
     return found
 
 
-def write_live_part(folder: Path, report: LiveReport) -> None:
-    """Leave the settings walked so far in a run folder, as live.part.json and live.part.md."""
-    with written_whole(folder / JSON_PART) as part:
+def write_live_part(folder: Path, report: LiveReport, name: str = LIVE) -> None:
+    """Leave the settings walked so far in a run folder, as live.part.json and live.part.md, or under another name."""
+    with written_whole(folder / f"{name}.part.json") as part:
         part.write_text(json_text(report.to_json()), encoding="utf-8")
-    with written_whole(folder / MARKDOWN_PART) as part:
+    with written_whole(folder / f"{name}.part.md") as part:
         part.write_text(markdown_tables(report), encoding="utf-8")
 
 
-def finish_live(folder: Path) -> None:
+def finish_live(folder: Path, name: str = LIVE) -> None:
     """Make what `write_live_part` left last the run's live.json and live.md: no setting is missing any more."""
-    for part, name in ((JSON_PART, JSON_FILE), (MARKDOWN_PART, MARKDOWN_FILE)):
-        with written_whole(folder / name) as whole:
-            whole.write_bytes((folder / part).read_bytes())
-        (folder / part).unlink()
+    for ending in ("json", "md"):
+        part = folder / f"{name}.part.{ending}"
+        with written_whole(folder / f"{name}.{ending}") as whole:
+            whole.write_bytes(part.read_bytes())
+        part.unlink()

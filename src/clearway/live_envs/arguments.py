@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from clearway.choices import MODEL_SUFFIXES
 from clearway.errors import EnvError
 from clearway.live.conditions import MOST, Perturbations
 from clearway.live.live_room import LiveRoom, live_room, live_room_named
@@ -22,7 +23,6 @@ LIVE_RENDER_MODES = ("rgb_array",)
 CLEARANCE = "clearance"
 CLEARANCE_REACH_M = 5.0
 LEAST_PX, MOST_PX = 8, 4_096
-MODEL_SUFFIXES = (".xml", ".urdf")
 
 
 def opened_room(room: RoomSource, seed: int, *, small: bool, loose: bool) -> LiveRoom:

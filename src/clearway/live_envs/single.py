@@ -83,9 +83,10 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
 
     ## Starting State
 
-    Target and start are drawn uniformly from the poses of the grid's largest connected part, apart from each other by
-    more than `success_m` or `success_deg`. `reset(options={"target": end, "start": end})` fixes either: a state id of
-    the scene, or a pose (x, z, heading) in metres and degrees. A seed repeats all episodes, with their perturbations.
+    Start and target are drawn uniformly from the poses of the grid's largest connected part, the target from those that
+    `targets` names, apart from each other by more than `success_m` or `success_deg`.
+    `reset(options={"target": end, "start": end})` fixes either: a state id of the scene, or a pose (x, z, heading) in
+    metres and degrees. A seed repeats all episodes, with their perturbations.
 
     ## Episode End
 
@@ -106,7 +107,8 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
     | `room`              | required            | a room's name, a scene file or `Scene` that clearway built or        |
     |                     |                     | imported from a MuJoCo model, or such a model's file (.xml, .urdf)   |
     | `room_seed`         | `0`                 | of a room by name: another has other colours and small furniture     |
-    | `targets`           | `None`              | state ids to draw targets from; None: all                            |
+    | `targets`           | `None`              | state ids to draw targets from; None: all, of generated rooms and    |
+    |                     |                     | flats those that are not held out; "held-out": those that are        |
     | `reward`            | `"collision-aware"` | or another of `reward.REWARDS`, a `Reward`, or package.module:name   |
     | `sensors`           | `("rgb",)`          | of `"rgb"`, `"depth"`, `"clearance"`; a camera among them            |
     | `height_px`         | `96`                | of a picture                                                         |
@@ -141,7 +143,7 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
         room: RoomSource,
         *,
         room_seed: int = 0,
-        targets: Sequence[int] | None = None,
+        targets: Sequence[int] | str | None = None,
         reward: str | Reward = "collision-aware",
         sensors: Sequence[str] = (RGB,),
         height_px: int = HEIGHT_PX,

@@ -12,6 +12,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from clearway.choices import HELD_OUT
 from clearway.envs.arguments import (
     NO_LIMIT,
     RESET_MASK,
@@ -101,7 +102,7 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         room: RoomSource,
         *,
         room_seed: int = 0,
-        targets: Sequence[int] | None = None,
+        targets: Sequence[int] | str | None = None,
         reward: str | Reward = "collision-aware",
         sensors: Sequence[str] = (RGB,),
         height_px: int = HEIGHT_PX,
@@ -146,7 +147,9 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode}
         self.live, self._continuous, self._stop = live, continuous, stop
         self._limit = None if max_episode_steps == NO_LIMIT else max_episode_steps
-        self._episodes = Episodes(live, rules, _checked_targets(targets))
+        held_out = isinstance(targets, str) and targets == HELD_OUT
+        named = None if held_out else _checked_targets(targets)
+        self._episodes = Episodes(live, rules, live.possible_targets(held_out) if named is None else named)
         cameras = [sensor for sensor in self._sensors if sensor.name != CLEARANCE]
         self._eyes = Eyes(live, cameras, workers)
 
@@ -379,7 +382,7 @@ def _check_switches(continuous: bool, stop: bool, render_mode: str | None, senso
         raise EnvError(f"render_mode={render_mode!r} shows colour pictures. Name {RGB!r} among the sensors")
 
 
-def _checked_targets(targets: Sequence[int] | None) -> np.ndarray | None:
+def _checked_targets(targets: Sequence[int] | str | None) -> np.ndarray | None:
     if targets is None:
         return None
     found = np.asarray(targets)

@@ -52,8 +52,10 @@ def take_pictures(model: mujoco.MjModel, view: View, shots: Iterable[Shot]) -> I
             if shot.moved_m:
                 data.mocap_pos[:] = shot.moved_m
                 mujoco.mj_forward(model, data)
+            camera = _free_camera(shot, view.orthographic)
+            mujoco.mjv_updateCamera(model, data, camera, renderer.scene)  # endless planes are laid out around the last
             with frustum.of(shot) if frustum is not None else nullcontext():
-                renderer.update_scene(data, _free_camera(shot, view.orthographic), shown)
+                renderer.update_scene(data, camera, shown)
             taken = renderer.render(out=picture)
             yield sensor.kept(two_thirds(taken) if finer else taken)
 

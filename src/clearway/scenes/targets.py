@@ -1,10 +1,15 @@
-"""Which states of a scene are targets: those that Zhu et al. published, else a seeded choice."""
+"""Which states of a scene are targets: those that Zhu et al. published, else a seeded choice.
+
+In generated rooms and flats the choice leaves out the poses that are held out (`held_out`), or is among them alone.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.scenes.floor_plans import GENERATED
+from clearway.scenes.held_out import held_out as held_out_poses
 from clearway.scenes.scene import Scene
 
 ZHU_TARGETS: dict[str, tuple[int, ...]] = {
@@ -19,32 +24,67 @@ ZHU_STATES = {"bathroom_02": 180, "bedroom_04": 408, "kitchen_02": 676, "living_
 """States of those dumps."""
 
 TARGETS_PER_SCENE = 5
+HELD = " that are held out"
 
 
-def seeded_targets(scene: Scene, count: int = TARGETS_PER_SCENE, seed: int = 0) -> tuple[int, ...]:
-    """`count` distinct states of the scene's largest component, ascending, the same for the same seed.
+def held_out_targets(scene: Scene) -> np.ndarray:
+    """Which states are held out as targets, (S,) bool: in generated rooms and flats a tenth, elsewhere none."""
+    if scene.made_by.source != GENERATED:
+        return np.zeros(scene.state_count, bool)
+    return held_out_poses(scene)
+
+
+def possible_targets(scene: Scene, held_out: bool = False) -> np.ndarray:
+    """States of the scene's largest component that may be drawn as targets, (N,) int, ascending.
+
+    Args:
+        scene: any.
+        held_out: those that are held out, in place of those that are not.
+
+    Raises:
+        SceneError: nothing is held out in the scene.
+    """
+    held = held_out_targets(scene)
+    found = np.flatnonzero((scene.components == 0) & (held == held_out))
+    if held_out and not len(found):
+        kind = "no generated room or flat" if scene.made_by.source != GENERATED else "too small"
+        problem = f"nothing is held out in it: it is {kind}"
+        raise SceneError(scene.name, problem, "Name targets, or give scenes that clearway scenes generate made")
+    return found
+
+
+def seeded_targets(
+    scene: Scene, count: int = TARGETS_PER_SCENE, seed: int = 0, held_out: bool = False
+) -> tuple[int, ...]:
+    """`count` distinct states of `possible_targets`, ascending, the same for the same seed.
 
     They lie in distinct cells as long as there are cells enough.
 
     Raises:
-        SceneError: the component has fewer than `count` states.
+        SceneError: there are fewer, or nothing is held out in the scene.
     """
-    order = target_order(scene, seed)
-    if count < 1 or count > len(order) - 1:
+    order = target_order(scene, seed, held_out)
+    most = _most_targets(scene, held_out)
+    if count < 1 or count > most:
         raise SceneError(
             scene.name,
-            f"{count} targets asked for, the largest component has {len(order)} states",
-            f"Ask for 1 to {len(order) - 1} targets",
+            f"{count} targets asked for, the largest component has {len(order)} states{HELD if held_out else ''}",
+            f"Ask for 1 to {most} targets",
         )
     return tuple(sorted(order[:count]))
 
 
-def target_order(scene: Scene, seed: int = 0) -> tuple[int, ...]:
-    """All states of the scene's largest component in a random order, the same for the same seed.
+def _most_targets(scene: Scene, held_out: bool) -> int:
+    """Of the scene: a target needs a start beside it."""
+    return min(len(possible_targets(scene, held_out)), int((scene.components == 0).sum()) - 1)
+
+
+def target_order(scene: Scene, seed: int = 0, held_out: bool = False) -> tuple[int, ...]:
+    """All `possible_targets` of the scene in a random order, the same for the same seed.
 
     One state of every cell comes before the others.
     """
-    states = np.flatnonzero(scene.components == 0)
+    states = possible_targets(scene, held_out)
     order = np.random.default_rng([seed, scene.state_count]).permutation(states)
     _, first_of_cell = np.unique(scene.cells[order], return_index=True)
     one_a_cell = order[np.sort(first_of_cell)]
@@ -55,12 +95,20 @@ def target_order(scene: Scene, seed: int = 0) -> tuple[int, ...]:
 def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
     """Zhu's targets for a scene of one of the four published names and sizes, else five seeded ones.
 
-    Fewer than five where the scene's largest component has no more states.
+    Fewer than five where there are no more to draw. None of them is held out (`held_out_targets`).
     """
     if is_published(scene):
         return ZHU_TARGETS[scene.name]
-    most = int((scene.components == 0).sum()) - 1
-    return seeded_targets(scene, min(TARGETS_PER_SCENE, most), seed)
+    return seeded_targets(scene, min(TARGETS_PER_SCENE, _most_targets(scene, False)), seed)
+
+
+def default_held_out_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
+    """Five seeded targets among those that are held out, fewer where there are no more.
+
+    Raises:
+        SceneError: nothing is held out in the scene.
+    """
+    return seeded_targets(scene, min(TARGETS_PER_SCENE, _most_targets(scene, True)), seed, held_out=True)
 
 
 def is_published(scene: Scene) -> bool:
