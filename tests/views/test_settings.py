@@ -39,7 +39,8 @@ def test_what_differs_is_told():
     other = replace(one, poses=5, held_out=True)
     assert differing(other, one) == "poses 5 instead of 400, held out True instead of False"
     lit = replace(one, perturbations=Perturbations(light=0.1))
-    assert differing(lit, one).startswith("perturbations {")
+    assert differing(lit, one).startswith("distance noise 0.0 instead of 0.05, angle noise 0.0 instead of 5.0")
+    assert differing(lit, replace(lit, perturbations=Perturbations(light=0.2))) == "light 0.1 instead of 0.2"
 
 
 def test_a_record_gives_the_settings_back():

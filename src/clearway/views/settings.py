@@ -99,6 +99,6 @@ def settings_of(record: Mapping[str, Any]) -> ViewSettings:
 
 def differing(kept: ViewSettings, asked: ViewSettings) -> str:
     """What is not as asked for, in words; empty where all is."""
-    found, wanted = kept.to_json(), asked.to_json()
-    changed = [key for key in wanted if found[key] != wanted[key]]
+    found, wanted = ({**one.to_json(), **one.perturbations.to_json()} for one in (kept, asked))
+    changed = [key for key in wanted if found[key] != wanted[key] and key != "perturbations"]
     return ", ".join(f"{key.replace('_', ' ')} {found[key]} instead of {wanted[key]}" for key in changed)
