@@ -152,8 +152,10 @@ def read_shard(path: Path) -> Shard:
         count = settings.picture_count
         limit = memory_limit(path.stat().st_size)
         for name in (RGB, TABLE):
+            if (dataset := hdf5.find_dataset(file, name, path)) is None:
+                raise SceneError(path, "is missing", "Give a whole file of clearway scenes views", name)
             with hdf5.faults_named(path, name, "is damaged"):
-                check_written(hdf5.need_dataset(file, name, path))
+                check_written(dataset)
         colour = settings.all_sensors[0]
         hdf5.check_layout(file[RGB], path, shape=(count, *colour.shape), kinds="u", limit=limit)
         if file[RGB].dtype != np.uint8:
