@@ -7,7 +7,9 @@ Random actions; every step renders what the agent sees, 96 x 128 pixels unless o
 episode its target as well. The batch shares one room and has a renderer process a core; `async` is Gymnasium's
 `AsyncVectorEnv` with as many processes as there are cores, each with a room and a renderer. `moves` are steps a second
 of the episode alone, without pictures, on one core: body, zones, clearance and reward. Rooms are built, and the first
-steps taken, before the clock starts. Repeats are interleaved, and the median and the spread are told.
+steps taken, before the clock starts. Repeats are interleaved, and the median and the spread are told; `processor` is
+the processor time of a step, of all processes together (Linux): two free cores make 2,000 by it steps a second at most.
+Another version of clearway measures beside this one with `--beside PATH/TO/src`, in processes of its own.
 """
 
 from __future__ import annotations
@@ -16,8 +18,13 @@ import argparse
 import os
 import platform
 import statistics
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -51,44 +58,123 @@ def moves_per_s(envs: LiveImageGoalVectorEnv, seconds: float) -> float:
     return count / (time.perf_counter() - begin)
 
 
+def processor_s(process: int | None = None) -> float:
+    """Processor time of a process (None: this one) and of all that it started and that are there, seconds."""
+    if not Path("/proc/self/task").exists():
+        return float("nan")
+    process = os.getpid() if process is None else process
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    children = [int(child) for task in Path(f"/proc/{process}/task").iterdir() for child in _children(task)]
+    own = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return own + sum(map(processor_s, children))
+
+
+def _children(task: Path) -> list[str]:
+    try:
+        return (task / "children").read_text().split()
+    except OSError:  # a thread that has ended meanwhile
+        return []
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Steps a second, and processor time of a step in milliseconds."""
+
+    steps_per_s: float
+    processor_ms: float
+
+
+def measure(rate: Callable[[float], float], seconds: float) -> Rate:
+    """A rate with its processor time."""
+    begin, before = time.perf_counter(), processor_s()
+    found = rate(seconds)
+    steps = found * (time.perf_counter() - begin)
+    return Rate(found, 1_000 * (processor_s() - before) / steps)
+
+
+def opened(room: str, count: int, size: Mapping[str, int], **how: str) -> gymnasium.vector.VectorEnv:
+    """A batch that has taken its first steps."""
+    envs = gymnasium.make_vec(LIVE_ENV_ID, num_envs=count, room=room, **how, **size)
+    envs.reset(seed=0)
+    envs.action_space.seed(0)
+    for _ in range(WARM_UP):
+        envs.step(envs.action_space.sample())
+    return envs
+
+
+def answer(room: str, count: int, size: Mapping[str, int]) -> None:
+    """Measure for as many seconds as each line of standard input says: what `--beside` asks another version."""
+    envs = opened(room, count, size)
+    print("ready", flush=True)
+    for line in sys.stdin:
+        rate = measure(lambda seconds: steps_per_s(envs, seconds), float(line))
+        print(rate.steps_per_s, rate.processor_ms, flush=True)
+    envs.close()
+
+
+def asking(source: str, room: str, count: int, size: Mapping[str, int]) -> Callable[[float], Rate]:
+    """What measures with the clearway of another folder, in a process that ends with this one."""
+    words = ["--room", room, "--num-envs", str(count), "--answer"]
+    words += ["--height-px", str(size["height_px"]), "--width-px", str(size["width_px"])]
+    other = subprocess.Popen(
+        [sys.executable, __file__, *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": source},
+    )
+    assert other.stdin is not None and other.stdout is not None
+    asked, told = other.stdin, other.stdout
+    if told.readline().strip() != "ready":
+        raise SystemExit(f"--beside {source}: does not run. See above")
+
+    def rate(seconds: float) -> Rate:
+        print(seconds, file=asked, flush=True)
+        steps_per_s, processor_ms = map(float, told.readline().split())
+        return Rate(steps_per_s, processor_ms)
+
+    return rate
+
+
 def main() -> None:
     """Measure and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--room", nargs="+", default=list(ROOM_NAMES), help="names or scene files")
+    parser.add_argument("--room", nargs="+", default=list(ROOM_NAMES), help="names or files")
     parser.add_argument("--num-envs", nargs="+", type=int, default=[1, 8, 32])
     parser.add_argument("--height-px", type=int, default=96)
     parser.add_argument("--width-px", type=int, default=128)
     parser.add_argument("--seconds", type=float, default=2.0, help="of each measurement")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--beside", help="folder of another version of clearway")
+    parser.add_argument("--answer", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
+    size = {"height_px": asked.height_px, "width_px": asked.width_px}
+    if asked.answer:
+        answer(asked.room[0], asked.num_envs[0], size)
+        return
     cores = len(os.sched_getaffinity(0))
     print(f"{platform.processor() or platform.machine()}, {cores} cores, {asked.height_px} x {asked.width_px} pixels")
-    size = {"height_px": asked.height_px, "width_px": asked.width_px}
-    print("| room | environments | steps/s | spread |\n|---|---|---|---|")
+    print("| room | environments | steps/s | spread | processor, ms a step |\n|---|---|---|---|---|")
     for room in asked.room:
-        batches = {
-            f"batch of {count}": gymnasium.make_vec(LIVE_ENV_ID, num_envs=count, room=room, **size)
-            for count in asked.num_envs
-        }
+        batches = {f"batch of {count}": opened(room, count, size) for count in asked.num_envs}
         one = next(iter(batches.values()))
-        batches[f"async, {cores}"] = gymnasium.make_vec(
-            LIVE_ENV_ID, num_envs=cores, vectorization_mode="async", room=room, **size
-        )
-        measured: dict[str, Callable[[float], float]] = {}
-        for name, envs in batches.items():
-            envs.reset(seed=0)
-            envs.action_space.seed(0)
-            for _ in range(WARM_UP):
-                envs.step(envs.action_space.sample())
-            measured[name] = lambda seconds, envs=envs: steps_per_s(envs, seconds)
         assert isinstance(one, LiveImageGoalVectorEnv)
-        measured["moves"] = lambda seconds, one=one: moves_per_s(one, seconds)
-        found: dict[str, list[float]] = {name: [] for name in measured}
+        batches[f"async, {cores}"] = opened(room, cores, size, vectorization_mode="async")
+        rates: dict[str, Callable[[float], Rate]] = {}
+        for name, envs in batches.items():
+            rates[name] = partial(measure, partial(steps_per_s, envs))
+        for count in asked.num_envs if asked.beside else ():
+            rates[f"batch of {count}, {asked.beside}"] = asking(asked.beside, room, count, size)
+        rates["moves"] = partial(measure, partial(moves_per_s, one))
+        found: dict[str, list[Rate]] = {name: [] for name in rates}
         for _ in range(asked.repeats):
-            for name, measure in measured.items():
-                found[name].append(measure(asked.seconds))
-        for name, rates in found.items():
-            print(f"| {room} | {name} | {statistics.median(rates):,.0f} | {min(rates):,.0f} - {max(rates):,.0f} |")
+            for name, rate in rates.items():
+                found[name].append(rate(asked.seconds))
+        for name, measured in found.items():
+            steps = [one.steps_per_s for one in measured]
+            spread = f"{min(steps):,.0f} - {max(steps):,.0f}"
+            processor = statistics.median(one.processor_ms for one in measured)
+            print(f"| {room} | {name} | {statistics.median(steps):,.0f} | {spread} | {processor:.2f} |")
         for envs in batches.values():
             envs.close()
 

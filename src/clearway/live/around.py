@@ -18,6 +18,7 @@ from clearway.rooms.navigation import Floor
 from clearway.rooms.obstacles import AgentShape, CollisionRoom, bounding_boxes, copy_obstacle, obstacle_geoms
 
 SURE_M = 1e-4  # measured distances are as exact as this
+EDGES = -1  # among the obstacles of a model: the edges of its floor
 EDGE_M = 0.1  # thickness of the walls around the floor
 
 
@@ -174,19 +175,30 @@ class ModelAround:
     @property
     def touches(self) -> bool:
         """Something is no distance away, or there is no floor."""
-        if self.gap_m(SURE_M, self._nearby.between(self._place_m, self._place_m)) <= 0:
+        if self.gap_m(SURE_M, self._met(self._place_m, self._place_m)) <= 0:
             return True
         return self._carries is not None and not self._carries(self._place_m[None])[0]
 
     def gap_m(self, most_m: float, among: np.ndarray | None = None) -> float:
         """See `Around`; the edges of the floor are obstacles too."""
-        edge_m = float(np.minimum(self._place_m - self._least_m, self._most_m - self._place_m).min())
         self._data.geom_xpos[self._own] = (*self._place_m, self._centre_m)
-        return self._nearby.gap_m(self._place_m, min(edge_m, most_m), among)
+        if among is not None and not (among == EDGES).any():
+            return self._nearby.gap_m(self._place_m, most_m, among)
+        others = None if among is None else among[among != EDGES]
+        return self._nearby.gap_m(self._place_m, min(most_m, self._edge_gap_m(self._place_m)), others)
 
     def between(self, one_m: np.ndarray, other_m: np.ndarray) -> np.ndarray | None:
         """See `Around`; where the floor may have holes, every sample has to be tried."""
-        return None if self._carries is not None else self._nearby.between(one_m, other_m)
+        return None if self._carries is not None else self._met(one_m, other_m)
+
+    def _met(self, one_m: np.ndarray, other_m: np.ndarray) -> np.ndarray:
+        """The obstacles, EDGES among them where one of the places is at the edge of the floor."""
+        met = self._nearby.between(one_m, other_m)
+        inside = min(self._edge_gap_m(one_m), self._edge_gap_m(other_m)) > 0
+        return met if inside else np.append(met, EDGES)
+
+    def _edge_gap_m(self, place_m: np.ndarray) -> float:
+        return float(np.minimum(place_m - self._least_m, self._most_m - place_m).min())
 
 
 def _add_edges(spec: mujoco.MjSpec, room: CollisionRoom) -> None:

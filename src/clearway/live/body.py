@@ -19,6 +19,7 @@ SAMPLES = 20
 HALVINGS = 12
 STAND_OFF_M = 0.001  # so far does the body draw back from what it touched
 REACH_M = 1.0  # clearances are measured up to here
+CLOSE = 4
 NO_GAPS = np.zeros(0)
 
 
@@ -117,13 +118,14 @@ class Body:
         part_m = float(np.linalg.norm(way_m)) / samples
         met = None if len(gaps_m) else self._around.between(start_m, start_m + way_m)
         leaps = met is not None and part_m > 0
-        sample = 0
+        sample = close = 0  # close to an obstacle, some samples are tried without measuring anew
         while sample < samples:
-            ahead = samples - sample
-            if leaps:
-                gap_m = self._around.gap_m(ahead * part_m + 2 * SURE_M, met)
-                ahead = min(ahead, max(1, int((gap_m - SURE_M) / part_m)))
-            sample += ahead if leaps else 1
+            ahead, close = 1, close - 1
+            if leaps and close < 0:
+                gap_m = self._around.gap_m((samples - sample) * part_m + 2 * SURE_M, met)
+                ahead = min(samples - sample, max(1, int((gap_m - SURE_M) / part_m)))
+                close = CLOSE if ahead == 1 else 0
+            sample += ahead
             self.stand_at(start_m + sample / samples * way_m)
             if self.touches:
                 return sample
