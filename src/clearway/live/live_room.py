@@ -113,9 +113,11 @@ def _live_plan(scene: Scene, plan: FloorPlan, seed: int) -> LiveRoom:
     if not np.array_equal(floor_plans.plan_poses(plan)[2], scene.graph):
         raise SceneError(scene.name, "its moves are not those of its floor plan", floor_plans.REBUILD, "graph")
     check_mujoco()
+    from clearway.rooms.detail import recorded_detail
     from clearway.rooms.plans.plan_room import agent_for, build_plan_room
 
-    room, layout = build_plan_room(plan, seed, loose=True)
+    detail = recorded_detail(scene.name, scene.made_by.notes)
+    room, layout = build_plan_room(plan, seed, loose=True, detail=detail)
     locations_m = scene.locations_m - np.array(layout.origin_m)
     x_m, z_m = layout.origin_m
     view = scene.top_view and replace(
