@@ -38,22 +38,24 @@ class Occupancy:
         _, size_y, size_z = self.free_voxels.shape
         travelled = np.zeros(len(points_m), np.float32)
         limits = np.broadcast_to(np.asarray(limit_m / VOXEL_M, np.float32), len(points_m))
-        active = np.arange(len(points_m))
+        active, so_far = np.arange(len(points_m)), travelled.copy()
         here = np.ascontiguousarray((points_m.astype(np.float32) / np.float32(VOXEL_M) + np.float32(1)).T)
         step_by = np.ascontiguousarray(directions.astype(np.float32).T)
+        np.clip(here, 0, last, out=here)  # no step leads beyond the shell
         for _ in range(MAX_STEPS):
-            np.clip(here, 0, last, out=here)
             x, y, z = here.astype(np.int32)
             free = field[(x * size_y + y) * size_z + z]
-            moving = np.flatnonzero((free > 0) & (travelled[active] < limits[active]))
+            moving = np.flatnonzero((free > 0) & (so_far < limits))
             if len(moving) < len(active):
-                active, free = active[moving], free[moving]
+                travelled[active] = so_far
+                active, free, so_far, limits = active[moving], free[moving], so_far[moving], limits[moving]
                 here, step_by = here.take(moving, axis=1), step_by.take(moving, axis=1)
             if not len(active):
                 break
             step = np.maximum(free.astype(np.float32) - np.float32(0.9), np.float32(0.6))
             here += step_by * step
-            travelled[active] += step
+            so_far += step
+        travelled[active] = so_far
         return travelled * VOXEL_M
 
     def is_solid(self, points_m: np.ndarray) -> np.ndarray:
