@@ -37,5 +37,5 @@ def held_out(scene: Scene) -> np.ndarray:
     """
     _, first = np.unique(scene.cells, return_index=True)
     steps = scene.locations_m[first] / scene.cell_size_m
-    grid = np.ceil(steps - 0.5 - ROUNDING).astype(np.int64)  # cells may lie halfway: the nearest whole number, the lower
+    grid = np.ceil(steps - 0.5 - ROUNDING).astype(np.int64)  # cells may lie halfway
     return held_out_cells(scene.name, grid)[scene.cells]
