@@ -97,7 +97,7 @@ def test_an_interrupted_generation_goes_on(made, tmp_path) -> None:
     [
         (lambda path: path.write_bytes(b"no scene"), "is not an HDF5 file. Remove it, and the same command makes it"),
         (lambda path: path.write_bytes(path.read_bytes()[:-2000]), "Remove it, and the same command makes it again"),
-        (lambda path: write_scene(another(generator=0), path), "made by version 0 of the generator.* has version 1"),
+        (lambda path: write_scene(another(generator=0), path), "made by version 0 of the generator.* has version 2"),
         (lambda path: write_scene(another(source="floor_plan"), path), "made from floor_plan"),
         (lambda path: write_scene(another(split="test"), path), "is no room-train-000003-bathroom of seed 0"),
         (lambda path: write_scene(another(seed=4), path), "is no room-train-000003-bathroom of seed 0"),

@@ -1,7 +1,7 @@
 """Where the walls, the furniture and the thin partitions of a floor plan's room stand. Pure geometry, no MuJoCo.
 
-A plan that names its walls is built as it is (`cell_map`): walls and doors where it says, furniture on every other
-blocked cell that can be seen.
+A plan that names its walls is built as it is (`cell_map`): walls, doors and furniture where it says, any furniture on
+every other blocked cell that can be seen.
 
 Any other plan gets a rim of blocked cells at one or both ends of each axis, so that furniture stands along those walls
 and the others are bare. A blocked area that is open to the border and wide (OUTSIDE_M) is not part of the room: walls
@@ -34,7 +34,7 @@ from clearway.rooms.plans.walls import (
     solid_parts,
 )
 from clearway.rooms.shell import SIDES, Column, Face
-from clearway.scenes.floor_plans import Area, FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan, Furnishing
 
 PARTITION_THICKNESS = 0.1  # cells
 PARTITION_HEIGHT_M = 1.15
@@ -59,6 +59,7 @@ class Piece:
         back_at_wall: a wall is behind all of it.
         room: number of the room that it stands in, where the plan has walls; else 0.
         area: of the plan that its middle lies in, if any.
+        kind: of furniture that the plan names; None where any will do.
     """
 
     at: Frame
@@ -67,6 +68,7 @@ class Piece:
     back_at_wall: bool
     room: int = 0
     area: Area | None = None
+    kind: str | None = None
 
 
 @dataclass(frozen=True)
@@ -151,11 +153,15 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
     size_m = plan.cell_size_m
     cells = cell_map(plan) if plan.has_walls else _map_with_rim(plan, rng)
     shortest, longest = (cells_of(length_m, size_m, 1) for length_m in PIECE_LENGTHS_M)
+    open_to_choice = ~cells.free & ~cells.solid
+    named = _named_boxes(plan, cells)
+    for i0, j0, i1, j1 in named:
+        open_to_choice[i0:i1, j0:j1] = False
     boxes = [
         part
-        for box in rectangles(~cells.free & ~cells.solid, cells_of(PIECE_DEPTH_M, size_m, 1))
+        for box in rectangles(open_to_choice, cells_of(PIECE_DEPTH_M, size_m, 1))
         for part in cut(box, shortest, longest, rng)
-    ]
+    ] + list(named)
     owners = np.where(cells.free, FREE, OUTSIDE)
     for number, (i0, j0, i1, j1) in enumerate(boxes):
         owners[i0:i1, j0:j1] = number
@@ -164,7 +170,12 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
     blocked_edges = plan.blocked_edges.astype(np.int64) - np.array(cells.first_cell)
     parts = solid_parts(cells.solid, ~cells.solid if plan.has_walls else cells.free)
     pieces = tuple(
-        replace(_piece(box, owners, size_m, plan.has_walls), room=_room(box, cells), area=_area(box, cells, plan))
+        replace(
+            _piece(box, owners, size_m, plan.has_walls, named[box].front if box in named else None),
+            room=_room(box, cells),
+            area=_area(box, cells, plan),
+            kind=named[box].kind if box in named else None,
+        )
         for box in boxes
     )
     return Layout(
@@ -241,13 +252,31 @@ def _partition(one: np.ndarray, other: np.ndarray, size_m: float) -> Column:
     return Column(x_m - half_x, y_m - half_y, x_m + half_x, y_m + half_y, PARTITION_HEIGHT_M)
 
 
-def _piece(box: Box, owners: np.ndarray, size_m: float, to_walls: bool) -> Piece:
-    """The piece over a box of cells, drawn in so that nothing touches, but drawn out to walls if asked to."""
+def _named_boxes(plan: FloorPlan, cells: CellMap) -> dict[Box, Furnishing]:
+    """The furniture that a plan with walls names, by its cells on the map; what nobody could see is left out."""
+    x, z = cells.first_cell
+    boxes = {
+        (piece.low[0] - x, piece.low[1] - z, piece.high[0] - x + 1, piece.high[1] - z + 1): piece
+        for piece in (plan.furniture if plan.has_walls else ())
+    }
+    return {
+        (i0, j0, i1, j1): piece
+        for (i0, j0, i1, j1), piece in boxes.items()
+        if min(i0, j0) >= 0 and i1 <= cells.free.shape[0] and j1 <= cells.free.shape[1]
+        if not cells.solid[i0:i1, j0:j1].any()
+    }
+
+
+def _piece(box: Box, owners: np.ndarray, size_m: float, to_walls: bool, front: str | None = None) -> Piece:
+    """The piece over a box of cells, drawn in so that nothing touches, but drawn out to walls if asked to.
+
+    Without a `front` it looks to where most cells are free.
+    """
     beyond = {side: _beyond(box, owners, side) for side in SIDES}
     free = {side: int((cells == FREE).sum()) for side, cells in beyond.items()}
     walled = {side: bool((cells == OUTSIDE).all()) for side, cells in beyond.items()}
     at_rest = next((side for side in SIDES if walled[side]), "south")
-    front = max(SIDES, key=lambda side: (free[side], side == OPPOSITE[at_rest]))
+    front = front or max(SIDES, key=lambda side: (free[side], side == OPPOSITE[at_rest]))
     i0, j0, i1, j1 = box
     lines = {"west": i0, "south": j0, "east": i1, "north": j1}
     edge_m = {}
