@@ -21,6 +21,7 @@ class Furniture:
         near: another kind and how it stands to that where it can: facing it, before its front, or beside it at the
             same wall.
         all_round: it can be used from any side; else from its front alone.
+        once: a room has one at most.
     """
 
     kind: str
@@ -30,6 +31,7 @@ class Furniture:
     chance: float = 1.0
     near: tuple[str, Relation] | None = None
     all_round: bool = False
+    once: bool = False
 
 
 DOUBLE_BED = Furniture("double bed", (3, 4), 4, all_round=True)
@@ -60,24 +62,24 @@ SECOND_CHANCE = 0.3  # that the second of a group is tried before the first
 MORE: dict[str, tuple[Furniture, ...]] = {
     "bathroom": (Furniture("shower", (2, 2), 2, chance=0.15), Furniture("cabinet", (1, 2), 1, chance=0.5)),
     "kitchen": (
-        Furniture("fridge", (2, 2), 1, near=("counter", "beside")),
+        Furniture("fridge", (2, 2), 1, near=("counter", "beside"), once=True),
         Furniture("dining table", (2, 4), 2, free_standing=True, chance=0.7, all_round=True),
-        Furniture("island", (3, 4), 2, free_standing=True, chance=0.4),
+        Furniture("island", (3, 4), 2, free_standing=True, chance=0.4, once=True),
         Furniture("worktop", (2, 4), 1, chance=0.7),
     ),
     "bedroom": (
         Furniture("nightstand", (1, 1), 1, chance=0.8, near=("double bed", "beside")),
         Furniture("nightstand", (1, 1), 1, chance=0.5, near=("double bed", "beside")),
         Furniture("wardrobe", (3, 4), 1),
-        Furniture("desk", (2, 3), 1, chance=0.5),
+        Furniture("desk", (2, 3), 1, chance=0.5, once=True),
         Furniture("chest", (2, 2), 1, chance=0.5),
     ),
     "living room": (
-        Furniture("television", (3, 4), 1, near=("sofa", "facing")),
+        Furniture("television", (3, 4), 1, near=("sofa", "facing"), once=True),
         Furniture("armchair", (2, 2), 2, chance=0.5),
         Furniture("dining table", (3, 4), 2, free_standing=True, chance=0.6, all_round=True),
         Furniture("bookcase", (2, 4), 1, chance=0.8),
-        Furniture("fireplace", (3, 3), 1, chance=0.25),
+        Furniture("fireplace", (3, 3), 1, chance=0.25, once=True),
     ),
     "corridor": (Furniture("coats", (2, 3), 1, chance=0.5), Furniture("shoe cabinet", (2, 3), 1, chance=0.3)),
 }
@@ -103,7 +105,7 @@ FURTHER: dict[str, tuple[Furniture, ...]] = {
         Furniture("sofa", (3, 4), 2),
         Furniture("armchair", (2, 2), 2),
         Furniture("plant", (1, 1), 1),
-        Furniture("desk", (2, 3), 1),
+        Furniture("desk", (2, 3), 1, once=True),
     ),
     "corridor": (),
 }

@@ -122,7 +122,8 @@ def _filled(so_far: Furnished, zone: Zone, kept: np.ndarray, rng: np.random.Gene
         if taken >= wanted or (number >= len(pieces) and not further):
             break
         piece = pieces[number] if number < len(pieces) else further[int(rng.integers(len(further)))]
-        so_far = _with_piece(so_far, piece, zone, kept, rng) or so_far
+        if not (piece.once and any(one.kind == piece.kind for one, _ in so_far.pieces)):
+            so_far = _with_piece(so_far, piece, zone, kept, rng) or so_far
     return so_far
 
 

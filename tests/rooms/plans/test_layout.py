@@ -212,6 +212,16 @@ def test_the_seed_chooses_the_walls_with_furniture() -> None:
     assert len({laid_out(plan, seed).free.shape for seed in range(12)}) > 1
 
 
+def test_what_is_outside_of_a_flat_is_told_from_its_walls() -> None:
+    lines = ("WWWWWWW", "W.WWWWW", "W.WWWWW", "W.WWWWW", "W.....W", "WWWWWWW")
+    layout = laid_out(walled("ell", lines))
+    assert layout.beyond and set(layout.beyond) < set(layout.walls)
+    # cells of 0.5 m; the wall of one cell beside the rooms ends 1.1 m and 1.1 m from the corner of the floor
+    low = np.min([column_of(column)[0] for column in layout.beyond], axis=0)
+    assert low == pytest.approx([1.1, 1.1])
+    assert not laid_out(plan_of("ell", ELL)).beyond
+
+
 @pytest.mark.parametrize("front", FRONTS)
 def test_furniture_that_a_plan_names_stands_on_its_cells_and_looks_where_it_says(front: str) -> None:
     lines = ("WWWWWW", "W....W", "W.##.W", "W.##.W", "W....W", "WWWWWW")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -22,6 +22,7 @@ FRONT_DOOR_M = 0.74  # the same where the plan has walls: they go on beyond a st
 MOST_BEHIND_M = 1.3  # a piece of furniture higher than this hides what hangs behind it
 LAMP_FLOOR_M2 = 7.0  # that one ceiling lamp lights
 MOST_LAMPS = 16
+PENDANT_M = 2.05  # height of a hanging lamp's rim
 COVER_M = 0.02
 ROUNDS = 10  # of k-means
 CURTAIN_ROOM_M = 0.3  # nearer than that, a camera would look through curtains, and see nothing but lawn
@@ -123,8 +124,27 @@ def _hang_lamps(room: Room, layout: Layout) -> None:
         floor_m2 = len(places_m) * layout.cell_size_m**2
         count = int(np.clip(round(floor_m2 / LAMP_FLOOR_M2), 1, MOST_LAMPS))
         power = 1.1 * float(np.clip(np.sqrt(floor_m2 / LAMP_FLOOR_M2), 0.6, 1.0)) if layout.has_walls else 1.1
+        hang = _lamp_of_a_room(room, power) if layout.has_named_furniture else None
         for x_m, y_m in _spread(places_m, min(count, len(places_m))):
-            lamps.ceiling_lamp(room, Frame(float(x_m), float(y_m)), 0.24, power)
+            at = Frame(float(x_m), float(y_m))
+            if hang is None:
+                lamps.ceiling_lamp(room, at, 0.24, power)
+            else:
+                hang(at)
+
+
+def _lamp_of_a_room(room: Room, power: float) -> Callable[[Frame], None]:
+    """What hangs a lamp of the kind and colour that all lamps of a room have; its generator chooses."""
+    colour = (lamps.WARM, lamps.NEUTRAL, lamps.COOL)[int(room.rng.integers(3))]
+    kind, size_m = int(room.rng.integers(4)), float(room.rng.uniform(0.2, 0.3))
+    metal = str(room.rng.choice(("black", "brass", "white", "chrome")))
+    if kind == 0:
+        return lambda at: lamps.ceiling_lamp(room, at, size_m, power, colour)
+    if kind == 1:
+        return lambda at: lamps.ceiling_panel(room, at, 2 * size_m, power, colour)
+    if kind == 2:
+        return lambda at: lamps.shade_lamp(room, at, power, colour)
+    return lambda at: lamps.pendant(room, at, PENDANT_M, metal, power, colour)
 
 
 def _spread(places_m: np.ndarray, count: int) -> list[np.ndarray]:
@@ -141,4 +161,5 @@ def _cover_walls(room: Room, layout: Layout) -> None:
     for wall in layout.walls:
         width_m, depth_m = wall.x_max_m - wall.x_min_m, wall.y_max_m - wall.y_min_m
         middle = Frame((wall.x_min_m + wall.x_max_m) / 2, (wall.y_min_m + wall.y_max_m) / 2)
-        room.box(middle, (0, 0, room.height_m), (width_m, depth_m, COVER_M), "trim", segments=0)
+        material = "beyond" if wall in layout.beyond else "trim"
+        room.box(middle, (0, 0, room.height_m), (width_m, depth_m, COVER_M), material, segments=0)

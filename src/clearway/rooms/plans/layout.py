@@ -103,6 +103,8 @@ class Layout:
         first_cell: x and z of the map's cell (0, 0), in the plan's numbers.
         free: (X, Z) bool map with its rim, the cells that can be entered.
         walls: solid parts inside the floor's rectangle, up to the ceiling.
+        beyond: those of them that are more than a cell away from every room, where the plan says where walls are: what
+            is outside of a flat that fills no rectangle.
         partitions: on the blocked edges.
         pieces: of furniture.
         stretches: of wall.
@@ -123,6 +125,7 @@ class Layout:
     first_cell: tuple[int, int]
     free: np.ndarray
     walls: tuple[Column, ...]
+    beyond: tuple[Column, ...]
     partitions: tuple[Column, ...]
     pieces: tuple[Piece, ...]
     stretches: tuple[Stretch, ...]
@@ -133,6 +136,11 @@ class Layout:
     doorways: tuple[Doorway, ...]
     areas: tuple[Area, ...]
     area_map: np.ndarray
+
+    @property
+    def has_named_furniture(self) -> bool:
+        """Whether the plan names furniture, as generated ones do."""
+        return any(piece.kind is not None for piece in self.pieces)
 
     def area_at(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """The numbers of the areas at places of the floor, see `area_map`."""
@@ -169,6 +177,8 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
     x_m, z_m = ((cell - 0.5 - GAP) * size_m for cell in cells.first_cell)
     blocked_edges = plan.blocked_edges.astype(np.int64) - np.array(cells.first_cell)
     parts = solid_parts(cells.solid, ~cells.solid if plan.has_walls else cells.free)
+    beyond = _beyond_rooms(cells.solid) if plan.has_walls else np.zeros_like(parts)
+    walls, far_walls = columns_of(parts & ~beyond, size_m), columns_of(parts & beyond, size_m)
     pieces = tuple(
         replace(
             _piece(box, owners, size_m, plan.has_walls, named[box].front if box in named else None),
@@ -185,7 +195,8 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
         cell_size_m=size_m,
         first_cell=cells.first_cell,
         free=cells.free,
-        walls=columns_of(parts, size_m),
+        walls=walls + far_walls,
+        beyond=far_walls,
         partitions=tuple(_partition(one, other, size_m) for one, other in blocked_edges),
         pieces=pieces,
         stretches=_stretches(cells, owners, pieces, plan),
@@ -197,6 +208,12 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
         areas=plan.areas,
         area_map=_area_map(cells, plan),
     )
+
+
+def _beyond_rooms(solid: np.ndarray) -> np.ndarray:
+    """Which thirds of (X, Z) cells, (3 X, 3 Z) bool, are in solid cells that touch no others, not at a corner."""
+    touched = ndimage.binary_dilation(~solid, np.ones((3, 3), bool))
+    return np.repeat(np.repeat(~touched, 3, axis=0), 3, axis=1)
 
 
 def _map_with_rim(plan: FloorPlan, rng: np.random.Generator) -> CellMap:
