@@ -35,6 +35,7 @@ from clearway.generation.request import KINDS, ROOM_USES, SPLITS, Request
 from clearway.generation.split import canonical_hash
 from clearway.generation.statistics import FIGURES, plan_statistics
 from clearway.generation.structure import draw_structure
+from clearway.rooms.parts import Lamp
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import connected_parts, edges_among, neighbour_pairs
 
@@ -109,15 +110,16 @@ def variety(requests: Sequence[Request]) -> dict[str, str]:
     found = {
         "distinct plans": str(len({canonical_hash(plan.cells) for plan in plans})),
         "floor, m2": spread(sizes_m2),
-        "outline is a rectangle": f"{np.mean(filled):.0%}",
         "pieces of furniture": spread(pieces),
         "kinds of furniture": str(len({piece.kind for plan in plans for piece in plan.furniture})),
         "time of day": shares(room.daytime.name for room in rooms),
-        "colour of lamps": shares(f"{room.lamps[0].colour[2] / room.lamps[0].colour[0]:.2f}" for room in rooms),
+        "colour of lamps": shares(lamp_colour(room.lamps) for room in rooms),
         "distinct schemes of colours": str(len({room.colours for room in rooms})),
         "windows": spread(np.array([len(room.windows) for room in rooms], float)),
     }
-    if requests[0].kind == "flat":
+    if requests[0].kind == "room":
+        found["outline is a rectangle"] = f"{np.mean(filled):.0%}"
+    else:
         drawn = (draw_structure(np.random.default_rng([request.seed, request.number])) for request in requests)
         flats = [flat for flat in drawn if flat is not None]
         ours = [(flat, number) for flat in flats for number, use in enumerate(flat.uses, 1) if use != "corridor"]
@@ -128,6 +130,12 @@ def variety(requests: Sequence[Request]) -> dict[str, str]:
             "rooms that are no rectangle": f"{np.mean([len(c) < np.prod(np.ptp(c, axis=0) + 1) for c in cells]):.0%}",
         }
     return found
+
+
+def lamp_colour(lamps: Sequence[Lamp]) -> str:
+    """Of the brightest lamp."""
+    red, _, blue = max(lamps, key=lambda lamp: lamp.power).colour
+    return "cool" if blue >= red else "neutral" if blue > 0.8 * red else "warm"
 
 
 def shares(words: Iterable[str]) -> str:

@@ -17,6 +17,7 @@ SLOT_M = 1.3  # of wall for one thing
 LEAST_M = 0.45
 MOST_WINDOWS = 5
 MOST_WINDOWS_A_ROOM = 2  # where the plan has walls
+WINDOWS_A_ROOM = (1, 2, 2, 3)  # at most, where it names its furniture
 DOOR_M = 1.05  # of a stretch, SPARE_M aside, that a door takes
 FRONT_DOOR_M = 0.74  # the same where the plan has walls: they go on beyond a stretch, by GAP of a cell
 MOST_BEHIND_M = 1.3  # a piece of furniture higher than this hides what hangs behind it
@@ -39,6 +40,9 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
     entrance, windows, most = _entrance(layout), Counter[int](), MOST_WINDOWS
     if layout.has_walls:
         most = MOST_WINDOWS_A_ROOM
+    panes = 2
+    if layout.has_named_furniture:
+        most, panes = int(room.rng.choice(WINDOWS_A_ROOM)), int(room.rng.integers(1, 4))
     for stretch in layout.stretches:
         top_m = 0.0 if stretch.piece is None else tops_m[stretch.piece]
         if top_m > MOST_BEHIND_M:
@@ -51,7 +55,7 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
                 openings.door(room, at)
                 doors += 1
             elif window_here and usable_m > 0.7 and (room.rng.random() < 0.6 or not in_room):
-                _window(room, at, usable_m, top_m, between_walls=layout.has_walls)
+                _window(room, at, usable_m, top_m, panes, between_walls=layout.has_walls)
                 windows[stretch.room] += 1
             elif stretch.area is not None and stretch.area.use == "bathroom":
                 _hang_in_bathroom(room, at, usable_m, top_m)
@@ -82,7 +86,7 @@ def _slots(stretch: Stretch) -> list[tuple[Frame, float]]:
     return [(stretch.at.moved((number - (count - 1) / 2) * length_m, 0), length_m) for number in range(count)]
 
 
-def _window(room: Room, at: Frame, usable_m: float, top_m: float, *, between_walls: bool) -> None:
+def _window(room: Room, at: Frame, usable_m: float, top_m: float, panes: int, *, between_walls: bool) -> None:
     """A window over furniture, or with curtains down to the floor; between walls inside they do not reach beyond it."""
     sill_m = max(0.9, top_m + 0.12)
     width_m, curtains = min(usable_m, 1.5), top_m == 0
@@ -90,7 +94,7 @@ def _window(room: Room, at: Frame, usable_m: float, top_m: float, *, between_wal
         room_m = usable_m - 2 * openings.CURTAIN_REACH_M + SPARE_M
         curtains = curtains and room_m > 0.55
         width_m = min(width_m, room_m) if curtains else width_m
-    openings.window(room, at.moved(0, 0, sill_m), width_m, 2.15 - sill_m, curtains=curtains)
+    openings.window(room, at.moved(0, 0, sill_m), width_m, 2.15 - sill_m, curtains, panes)
 
 
 def _hang(room: Room, at: Frame, usable_m: float, top_m: float) -> None:
