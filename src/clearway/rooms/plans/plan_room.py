@@ -27,7 +27,7 @@ HEIGHT_M = 2.6
 AGENT_RADIUS = 0.35  # cells: less than to a partition, more than half of what is open between two pieces
 CLEARANCE = 0.02  # cells
 LAYOUT_STREAM, MOOD_STREAM = 3, 4  # of random numbers, beside the room's own
-DOOR_FRAMES = ("trim", "white", "wood", "oak", "pine")
+DOOR_FRAMES = ("wood", "oak", "pine", "walnut", "cream", "cabinet")
 
 
 def build_plan_room(
@@ -51,7 +51,7 @@ def build_plan_room(
     )
     layout = lay_out(plan, layout_rng)
     first_m = (0.5 + GAP) * plan.cell_size_m
-    door_frame = DOOR_FRAMES[0]
+    door_frame = "trim"
     room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks, detail=detail)
     if layout.has_named_furniture:
         room.daytime, room.colours = draw_daytime(mood_rng), mixed_colours(mood_rng)
