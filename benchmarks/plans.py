@@ -16,6 +16,7 @@ the position half-way can be reached too.
     mean_path_steps, longest_path_steps    shortest paths between poses, turns included
     blank_share      poses with something nearer than 0.6 m ahead: those that cannot move forward
     within           generated plans that lie between the real ones' 5 and 95 %
+    first drafts     rooms as they come, before any is drawn again for being unlike real ones or another split's
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from clearway.generation.plans import draw_plan
+from clearway.generation.plans import draw_plan, draw_room, finished
 from clearway.generation.request import KINDS, ROOM_USES, SPLITS, Request
 from clearway.generation.split import canonical_hash
 from clearway.generation.statistics import FIGURES, plan_statistics
@@ -89,6 +90,7 @@ def main() -> None:
     print(markdown(rows))
     for use in ROOM_USES:
         some = {who: values[[each == use for each in uses[who]]] for who, values in rows.items() if who != "flats"}
+        some["first drafts"] = drafts(use, given.count // len(ROOM_USES), given.seed)
         print(f"\n{use}s\n\n{markdown(some)}")
     if given.json:
         content = {
@@ -199,6 +201,12 @@ def on_coarse_grid(name: str, positions: np.ndarray) -> FloorPlan:
             best = cells[kept], cells[kept][shut]
     assert best is not None
     return FloorPlan(name, best[0], best[1].reshape(-1, 2, 2), cell_size_m=0.5)
+
+
+def drafts(use: str, count: int, seed: int) -> np.ndarray:
+    """(plans, figures) of rooms of some use as they come, none of which is drawn again."""
+    drawn = (draw_room(use, np.random.default_rng([seed, number])) for number in range(count))
+    return table([finished(draft, use) for draft in drawn if draft is not None])
 
 
 def table(plans: Sequence[FloorPlan]) -> np.ndarray:

@@ -16,7 +16,12 @@ GLASS_M = (1.05, 0.75)  # where a looking-glass over a basin begins, and how hig
 
 def fitted_kitchen(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
     """A worktop with a sink, and a cooker at one end."""
-    side, rest_m = _cooker_side(room), width_m - COOKER_M
+    _worktop_with_cooker(room, at, width_m, depth_m)
+
+
+def _worktop_with_cooker(room: Room, at: Frame, width_m: float, depth_m: float) -> int:
+    """The same; gives the end at which the cooker is, 1 or -1 along x, which the room's layout generator chooses."""
+    side, rest_m = (1 if room.layout_rng.random() < 0.5 else -1), width_m - COOKER_M
     placing.cooker(room, at.moved(side * rest_m / 2, 0), COOKER_M, depth_m)
     worktop = at.moved(-side * COOKER_M / 2, 0)
     kitchen.counter(room, worktop, rest_m - 0.01, "granite", depth_m)
@@ -25,20 +30,15 @@ def fitted_kitchen(room: Room, at: Frame, width_m: float, depth_m: float) -> Non
     if rest_m > 1.2:
         appliance = (kitchen.toaster, kitchen.kettle, kitchen.jars, kitchen.microwave)[int(room.rng.integers(4))]
         appliance(room, worktop.moved(-side * (rest_m / 2 - 0.3), -0.02))
+    return side
 
 
 def fitted_kitchen_with_cabinets(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
     """The same with cabinets and an extractor hood on the wall above it."""
-    fitted_kitchen(room, at, width_m, depth_m)
-    side, rest_m = _cooker_side(room), width_m - COOKER_M
+    side, rest_m = _worktop_with_cooker(room, at, width_m, depth_m), width_m - COOKER_M
     wall = at.moved(0, -depth_m / 2)
     kitchen.wall_cabinets(room, wall.moved(-side * COOKER_M / 2, 0), rest_m)
     kitchen.hood(room, wall.moved(side * rest_m / 2, 0), COOKER_M)
-
-
-def _cooker_side(room: Room) -> int:
-    """The end of a worktop at which the cooker is, the same in all of a room's kitchens."""
-    return 1 if room.seed % 2 else -1
 
 
 def worktop_with_cabinets(room: Room, at: Frame, width_m: float, depth_m: float) -> None:
