@@ -84,7 +84,8 @@ def best_poses(plan: FloorPlan, count: int) -> list[tuple[np.ndarray, int]]:
 
 
 def best_pose(plan: FloorPlan, areas: list[Area]) -> tuple[np.ndarray, int]:
-    """The cell and heading in the first area before which most cells of all of them lie."""
+    """The cell and heading in some areas before which most cells of them lie; if possible with two free cells ahead."""
+    free = {(x, z) for x, z in plan.cells.tolist()}
     cells = np.concatenate([np.argwhere(np.ones(np.subtract(a.high, a.low) + 1, bool)) + a.low for a in areas])
     inside = [cell for cell in plan.cells if any((cell >= a.low).all() and (cell <= a.high).all() for a in areas)]
     found = []
@@ -92,7 +93,8 @@ def best_pose(plan: FloorPlan, areas: list[Area]) -> tuple[np.ndarray, int]:
         for heading, (dx, dz) in enumerate(((0, 1), (1, 0), (0, -1), (-1, 0))):
             x, z = (cells - cell).T
             ahead, aside = x * dx + z * dz, np.abs(x * dz - z * dx)
-            found.append((int(((ahead > 1) & (aside <= SLOPE * ahead)).sum()), cell, heading))
+            open_ahead = all((int(cell[0]) + n * dx, int(cell[1]) + n * dz) in free for n in (1, 2))
+            found.append(((open_ahead, int(((ahead > 1) & (aside <= SLOPE * ahead)).sum())), cell, heading))
     _, cell, heading = max(found, key=lambda one: one[0])
     return cell, heading
 
