@@ -3,6 +3,7 @@
     python benchmarks/plans.py --real ithor_floor_plans.npz                 # some seconds
     python benchmarks/plans.py --real ithor_floor_plans.npz --count 1000
     python benchmarks/plans.py --real ithor_floor_plans.npz --sheet plans.png    # twelve real plans, 24 rooms, 8 flats
+    python benchmarks/plans.py --variety --count 1000                       # how much differs; needs MuJoCo
 
 The real plans are the positions that AI2-THOR's agent reaches, (cells, 2) whole numbers a room in units of 0.25 m. To
 compare like with like they are brought to the generator's grid of 0.5 m: of the four ways to take every second position
@@ -15,6 +16,7 @@ the position half-way can be reached too.
     mean_path_steps, longest_path_steps    shortest paths between poses, turns included
     blank_share      poses with something nearer than 0.6 m ahead: those that cannot move forward
     within           generated plans that lie between the real ones' 5 and 95 %
+    first drafts     rooms as they come, before any is drawn again for being unlike real ones or another split's
 """
 
 from __future__ import annotations
@@ -23,15 +25,18 @@ import argparse
 import json
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from clearway.generation.plans import draw_plan
+from clearway.generation.plans import draw_plan, draw_room, finished
 from clearway.generation.request import KINDS, ROOM_USES, SPLITS, Request
+from clearway.generation.split import canonical_hash
 from clearway.generation.statistics import FIGURES, plan_statistics
+from clearway.generation.structure import draw_structure
+from clearway.rooms.parts import Lamp
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import connected_parts, edges_among, neighbour_pairs
 
@@ -49,13 +54,22 @@ FLOORS = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--real", type=Path, required=True, help="real plans, .npz")
+    parser.add_argument("--real", type=Path, help="real plans, .npz")
+    parser.add_argument("--variety", action="store_true", help="say how much generated plans and rooms differ")
     parser.add_argument("--count", type=int, default=200, help="generated plans of each kind")
     parser.add_argument("--split", choices=SPLITS, default="train")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path, help="write all figures here")
     parser.add_argument("--sheet", type=Path, help="draw plans here")
     given = parser.parse_args()
+    if given.variety:
+        for kind in KINDS:
+            requests = [Request(kind, given.split, given.seed, number) for number in range(given.count)]
+            print(f"\n{given.count} {kind}s\n")
+            print("\n".join(f"| {what} | {shown} |" for what, shown in variety(requests).items()))
+        return
+    if given.real is None:
+        parser.error("give real plans with --real")
     if given.sheet:
         draw_sheet(given.real, given.split, given.seed, given.sheet)
         return
@@ -76,12 +90,60 @@ def main() -> None:
     print(markdown(rows))
     for use in ROOM_USES:
         some = {who: values[[each == use for each in uses[who]]] for who, values in rows.items() if who != "flats"}
+        some["first drafts"] = drafts(use, given.count // len(ROOM_USES), given.seed)
         print(f"\n{use}s\n\n{markdown(some)}")
     if given.json:
         content = {
             who: [dict(zip(FIGURES, row, strict=True)) for row in values.tolist()] for who, values in rows.items()
         }
         given.json.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def variety(requests: Sequence[Request]) -> dict[str, str]:
+    """What differs among generated plans and the rooms that are built of them, by how much."""
+    from clearway.rooms.plans.plan_room import build_plan_room
+
+    plans = [draw_plan(request).plan for request in requests]
+    insides = [plan.cells.tolist() + [cell for piece in plan.furniture for cell in piece.cells] for plan in plans]
+    sizes_m2 = np.array([0.25 * (len(inside) - len(plan.doors)) for inside, plan in zip(insides, plans, strict=True)])
+    filled = [len(inside) == np.prod(np.ptp(inside, axis=0) + 1) for inside in insides]
+    pieces = np.array([len(plan.furniture) for plan in plans], float)
+    rooms = [build_plan_room(plan, request.seed, looks=False)[0] for plan, request in zip(plans, requests, strict=True)]
+    found = {
+        "distinct plans": str(len({canonical_hash(plan.cells) for plan in plans})),
+        "floor, m2": spread(sizes_m2),
+        "pieces of furniture": spread(pieces),
+        "kinds of furniture": str(len({piece.kind for plan in plans for piece in plan.furniture})),
+        "time of day": shares(room.daytime.name for room in rooms),
+        "colour of lamps": shares(lamp_colour(room.lamps) for room in rooms),
+        "distinct schemes of colours": str(len({room.colours for room in rooms})),
+        "windows": spread(np.array([len(room.windows) for room in rooms], float)),
+    }
+    if requests[0].kind == "room":
+        found["outline is a rectangle"] = f"{np.mean(filled):.0%}"
+    else:
+        drawn = (draw_structure(np.random.default_rng([request.seed, request.number])) for request in requests)
+        flats = [flat for flat in drawn if flat is not None]
+        ours = [(flat, number) for flat in flats for number, use in enumerate(flat.uses, 1) if use != "corridor"]
+        cells = [np.argwhere(flat.numbers == number) for flat, number in ours]
+        found |= {
+            "corridor": shares(flat.form for flat in flats),
+            "rooms": shares(str(len(flat.uses) - 1) for flat in flats),
+            "rooms that are no rectangle": f"{np.mean([len(c) < np.prod(np.ptp(c, axis=0) + 1) for c in cells]):.0%}",
+        }
+    return found
+
+
+def lamp_colour(lamps: Sequence[Lamp]) -> str:
+    """Of the brightest lamp."""
+    red, _, blue = max(lamps, key=lambda lamp: lamp.power).colour
+    return "cool" if blue >= red else "neutral" if blue > 0.8 * red else "warm"
+
+
+def shares(words: Iterable[str]) -> str:
+    """How often each of some words comes."""
+    counts = Counter(words)
+    return ", ".join(f"{word} {count / counts.total():.0%}" for word, count in counts.most_common())
 
 
 def draw_sheet(real: Path, split: str, seed: int, path: Path) -> None:
@@ -139,6 +201,12 @@ def on_coarse_grid(name: str, positions: np.ndarray) -> FloorPlan:
             best = cells[kept], cells[kept][shut]
     assert best is not None
     return FloorPlan(name, best[0], best[1].reshape(-1, 2, 2), cell_size_m=0.5)
+
+
+def drafts(use: str, count: int, seed: int) -> np.ndarray:
+    """(plans, figures) of rooms of some use as they come, none of which is drawn again."""
+    drawn = (draw_room(use, np.random.default_rng([seed, number])) for number in range(count))
+    return table([finished(draft, use) for draft in drawn if draft is not None])
 
 
 def table(plans: Sequence[FloorPlan]) -> np.ndarray:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
+import h5py
 import numpy as np
 import pytest
 
@@ -97,7 +98,7 @@ def test_an_interrupted_generation_goes_on(made, tmp_path) -> None:
     [
         (lambda path: path.write_bytes(b"no scene"), "is not an HDF5 file. Remove it, and the same command makes it"),
         (lambda path: path.write_bytes(path.read_bytes()[:-2000]), "Remove it, and the same command makes it again"),
-        (lambda path: write_scene(another(generator=0), path), "made by version 0 of the generator.* has version 1"),
+        (lambda path: write_scene(another(generator=0), path), "made by version 0 of the generator.* has version 2"),
         (lambda path: write_scene(another(source="floor_plan"), path), "made from floor_plan"),
         (lambda path: write_scene(another(split="test"), path), "is no room-train-000003-bathroom of seed 0"),
         (lambda path: write_scene(another(seed=4), path), "is no room-train-000003-bathroom of seed 0"),
@@ -121,6 +122,26 @@ def test_a_file_that_is_not_what_is_asked_for_is_told(made, tmp_path, kept, said
         make(REQUESTS, tmp_path)
     assert str(refused.value).startswith(str(path))
     assert made == [] and path.read_bytes() == before
+
+
+@pytest.mark.parametrize("dataset", ["observation", "sensors/depth", "resnet_feature"])
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.999])
+def test_one_changed_byte_in_a_file_that_is_there_is_told(made, tmp_path, dataset, share) -> None:
+    path = scene_path(REQUESTS[0], tmp_path)
+    scene = replace(with_depth(), encoder=RECORD, features=floor_plan_scene(generated_plan(REQUESTS[0]), 4).features)
+    write_scene(scene, path)
+    seen = Seen(("rgb", "depth"), SEEN.size_px)
+    assert generate_scenes(REQUESTS[:1], tmp_path, seen, "random-resnet50") == []
+    with h5py.File(path) as file:
+        kept = file[dataset].id
+        chunk = kept.get_chunk_info(int(share * kept.get_num_chunks()))
+    content = bytearray(path.read_bytes())
+    content[chunk.byte_offset + int(share * (chunk.size - 1))] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match="Remove it, and the same command makes it again") as refused:
+        generate_scenes(REQUESTS[:1], tmp_path, seen, "random-resnet50")
+    assert str(refused.value).startswith(f"{path}") and dataset in str(refused.value)
+    assert made == [] and path.read_bytes() == content
 
 
 def another(source: str = GENERATED, seed: int = 0, **notes: object) -> Scene:

@@ -6,6 +6,7 @@ from clearway.generation.frozen import TEST_FLATS, TEST_HASH, TEST_ROOMS, frozen
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import GENERATOR_VERSION, Request
 from clearway.generation.split import canonical_hash
+from clearway.scenes.floor_plans import FloorPlan
 
 
 def test_the_test_split_never_changes() -> None:
@@ -14,8 +15,14 @@ def test_the_test_split_never_changes() -> None:
     assert (TEST_ROOMS, TEST_FLATS) == (100, 50) and len(requests) == 150
     assert {request.split for request in requests} == {"test"} and {request.seed for request in requests} == {0}
     plans = [generated_plan(request) for request in requests]
-    assert GENERATOR_VERSION == 1 and plans_hash(plans) == TEST_HASH
-    assert len({canonical_hash(plan.cells) for plan in plans}) == 150
+    assert GENERATOR_VERSION == 2 and plans_hash(plans) == TEST_HASH
+    assert len({canonical_hash(plan.cells) for plan in plans}) == 148  # two pairs of rooms have the same cells
+    assert len({(canonical_hash(plan.cells), furniture_of(plan)) for plan in plans}) == 150
+
+
+def furniture_of(plan: FloorPlan) -> tuple[tuple[str, int], ...]:
+    """Kind and size of each piece, however the plan is turned."""
+    return tuple(sorted((piece.kind, len(piece.cells)) for piece in plan.furniture))
 
 
 def test_the_hash_covers_all_of_a_plan() -> None:
@@ -26,5 +33,6 @@ def test_the_hash_covers_all_of_a_plan() -> None:
         replace(plan, walls=plan.walls[1:]),
         replace(plan, doors=plan.doors[1:]),
         replace(plan, areas=plan.areas[1:]),
+        replace(plan, furniture=plan.furniture[1:]),
     ]
-    assert len({plans_hash([one]) for one in (plan, *others)}) == 6
+    assert len({plans_hash([one]) for one in (plan, *others)}) == 7

@@ -6,6 +6,7 @@ import pytest
 from clearway.errors import SceneError
 from clearway.rooms import ROOM_NAMES, build_room
 from clearway.rooms.bathroom import build as build_bathroom
+from clearway.rooms.detail import FULL
 from clearway.rooms.groups import OBSTACLE_GROUP
 from clearway.rooms.navigation import find_grid
 from clearway.scenes.graph import distances
@@ -53,11 +54,11 @@ def test_the_package_loads_without_mujoco():
 
 
 def test_the_obstacles_do_not_depend_on_the_looks():
-    assert np.array_equal(obstacles_of(build_bathroom(3, True)), obstacles_of(build_bathroom(3, False)))
+    assert np.array_equal(obstacles_of(build_bathroom(3, True, FULL)), obstacles_of(build_bathroom(3, False, FULL)))
 
 
 def test_a_seed_repeats_and_another_differs():
-    first, again, other = build_bathroom(2, True), build_bathroom(2, True), build_bathroom(4, True)
+    first, again, other = build_bathroom(2, True, FULL), build_bathroom(2, True, FULL), build_bathroom(4, True, FULL)
     for one, two in zip(first.surfaces, again.surfaces, strict=True):
         assert np.array_equal(one.albedo, two.albedo)
     for one, two in zip(first.parts, again.parts, strict=True):

@@ -13,6 +13,7 @@ from clearway.scenes.floor_plans import (
     MAX_WALLS,
     Area,
     FloorPlan,
+    Furnishing,
     floor_plan_scene,
     parts_apart,
     plan_of,
@@ -171,6 +172,9 @@ def test_a_plan_needs_neither_simulator_nor_torch() -> None:
 ROW = np.array([[0, 0], [1, 0], [2, 0]])
 
 
+SOFA = Furnishing("sofa", (0, 1), (1, 1), "south")
+
+
 def test_walls_and_doors_and_areas_stand_in_a_plan() -> None:
     plan = FloorPlan(
         "flat", ROW, walls=np.array([[1, 1]]), doors=np.array([[1, 0]]), areas=(Area("kitchen", (0, 0), (0, 0)),)
@@ -189,6 +193,12 @@ def test_walls_and_doors_and_areas_stand_in_a_plan() -> None:
         ({"doors": np.array([1, 1])}, r"has doors of int64 and shape \(2,\), expected whole numbers"),
         ({"areas": (Area("garage", (0, 0), (1, 1)),)}, "has the area .*garage.*Give a use among bathroom"),
         ({"areas": (Area("kitchen", (1, 0), (0, 0)),)}, "has the area .*kitchen"),
+        ({"furniture": (Furnishing("throne", (0, 1), (1, 1), "north"),)}, "has the furniture .*throne.*Give a kind of"),
+        ({"furniture": (Furnishing("sofa", (0, 1), (1, 1), "up"),)}, "has the furniture .*up"),
+        ({"furniture": (Furnishing("sofa", (1, 1), (0, 1), "north"),)}, "has the furniture .*sofa"),
+        ({"furniture": (Furnishing("sofa", (0, 1), (1, 99), "north"),)}, "has the furniture .*sofa"),
+        ({"furniture": (SOFA, SOFA)}, r"has a sofa in the cell \(0, 1\) that is taken. Put it on blocked cells"),
+        ({"furniture": (replace(SOFA, low=(0, 0)),)}, r"has a sofa in the cell \(0, 0\) that is taken"),
     ],
 )
 def test_parts_that_are_none_are_refused(parts, problem) -> None:
@@ -238,15 +248,17 @@ def test_a_scene_gives_its_plan_back_from_its_file_too(tmp_path: Path) -> None:
         drawn,
         cells=drawn.cells[::-1] - 2,
         blocked_edges=drawn.blocked_edges - 2,
-        walls=np.array([[0, -1]]),
+        walls=np.array([[5, -1]]),
         doors=np.array([[1, 0]]),
         areas=(Area("kitchen", (-2, -2), (-1, 0)),),
+        furniture=(Furnishing("island", (0, -1), (0, -1), "east"),),
     )
     made = floor_plan_scene(plan, feature_count=4)
     write_scene(made, tmp_path / "drawn.h5")
     for scene in (made, read_scene(tmp_path / "drawn.h5")):
         again = plan_of(scene)
         assert (again.name, again.cell_size_m, again.areas) == ("drawn", 0.3, plan.areas)
+        assert again.furniture == plan.furniture
         for name in ("cells", "edges", "walls", "doors"):
             np.testing.assert_array_equal(getattr(again, name), getattr(plan, name))
         np.testing.assert_array_equal(floor_plan_scene(again, feature_count=4).features, made.features)
@@ -258,12 +270,19 @@ def test_a_plan_of_nothing_but_cells_needs_no_record() -> None:
     assert len(plan_of(scene).edges) == 4
 
 
+DAMAGED_FURNITURE = (
+    {"furniture": [["sofa", [0, 0], [0, 0]]]},
+    {"furniture": [["sofa", [0, 0, 0], [0, 0], "north"]]},
+    {"furniture": [["sofa", ["0", 0], [0, 0], "north"]]},
+)
+
+
 def test_scenes_without_a_plan_are_refused() -> None:
     scene = floor_plan_scene(FloorPlan.of_map("open", np.ones((2, 2), bool)), feature_count=4)
     askew = replace(scene, locations_m=scene.locations_m + 0.1)
     with pytest.raises(SceneError, match=r"open: its poses are not those of a floor plan\. Make the scene"):
         plan_of(askew)
-    for parts in ({"areas": [["attic", [0, 0]]]}, {"walls": ["here"]}, 3):
+    for parts in ({"areas": [["attic", [0, 0]]]}, {"walls": ["here"]}, *DAMAGED_FURNITURE, 3):
         damaged = replace(scene, made_by=replace(scene.made_by, notes={"plan": parts}))
         with pytest.raises(SceneError, match="the record of its floor plan is damaged"):
             plan_of(damaged)

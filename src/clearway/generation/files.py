@@ -5,7 +5,8 @@ A file is written whole or not at all, so that an interrupted generation goes on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from clearway.rooms.build import build_floor_plan, check_mujoco
 from clearway.rooms.library import cached_plan_scene
 from clearway.rooms.render import core_count
 from clearway.rooms.render_worker import renderer_environment
+from clearway.scenes.contents import check_contents
 from clearway.scenes.floor_plans import GENERATED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -94,7 +96,10 @@ def generate_scenes(
         check_kept(scene, scene_path(request, folder), request, seen)
     missing = [request for request in requests if request not in there]
     record = _record_of(there, folder, encoder, encoder_seed)
-    done(len(there))
+    for number, (request, scene) in enumerate(there.items(), 1):
+        with _remedied(scene_path(request, folder)):
+            check_contents(scene)
+        done(number)
     if not missing:
         return []
     if record is None and encoder != NO_ENCODER:
@@ -167,8 +172,15 @@ def _kept(path: Path) -> Scene | None:
     """The scene in a file, None where there is none. Raises SceneError where it is damaged, with the remedy."""
     if not path.exists():
         return None
-    try:
+    with _remedied(path):
         return read_scene(path, features_in_file=True)
+
+
+@contextmanager
+def _remedied(path: Path) -> Iterator[None]:
+    """What is told of a damaged file says how it is made again."""
+    try:
+        yield
     except SceneError as fault:
         raise SceneError(
             path, fault.problem, "Remove it, and the same command makes it again", fault.dataset

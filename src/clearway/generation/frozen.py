@@ -11,7 +11,7 @@ from clearway.scenes.floor_plans import FloorPlan
 
 TEST_SEED = 0
 TEST_ROOMS, TEST_FLATS = 100, 50
-TEST_HASH = "67c0c0697aff1f26bc0e606b0c20751753bc936dc35e599daa1946679230be3a"
+TEST_HASH = "43f8f64f60000a13c3f76e573ae58ea5a30fded306b3d2a55667cc17c7afc5f4"
 """Of `plans_hash` over the plans of `frozen_requests`. It changes only with `GENERATOR_VERSION`."""
 
 
@@ -22,7 +22,7 @@ def frozen_requests() -> list[Request]:
 
 
 def plans_hash(plans: Iterable[FloorPlan]) -> str:
-    """SHA-256 over names, cells, walls, doors and areas of plans in their order, as hexadecimal digits."""
+    """SHA-256 over names, cells, walls, doors, areas and furniture of plans in their order, as hexadecimal digits."""
     digest = hashlib.sha256()
     for plan in plans:
         parts = {
@@ -32,6 +32,7 @@ def plans_hash(plans: Iterable[FloorPlan]) -> str:
             "walls": plan.walls.tolist(),
             "doors": plan.doors.tolist(),
             "areas": [[area.use, list(area.low), list(area.high)] for area in plan.areas],
+            "furniture": [[one.kind, list(one.low), list(one.high), one.front] for one in plan.furniture],
         }
         digest.update(json.dumps(parts, sort_keys=True).encode())
     return digest.hexdigest()

@@ -10,7 +10,7 @@ SHAPES = ("rectangle", "L", "T", "niche", "breast")
 SHAPE_SHARES = (0.34, 0.24, 0.14, 0.16, 0.12)
 NARROWEST = 3  # cells that a part of a room is wide, at least
 SIZES = {  # cells of 0.5 m: least and most of the shorter side, then of the longer
-    "bathroom": ((4, 6), (5, 7)),
+    "bathroom": ((4, 5), (5, 7)),
     "kitchen": ((5, 9), (6, 11)),
     "bedroom": ((5, 8), (6, 9)),
     "living room": ((6, 10), (8, 13)),

@@ -1,4 +1,4 @@
-"""Plans by request: the stages in turn, what is rejected and drawn again, and the plan with walls, doors and areas."""
+"""Plans by request: the stages in turn, what is rejected and drawn again, and the plan with all its parts."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clearway.errors import ClearwayError
-from clearway.generation.furnish import furnished, is_connected
+from clearway.generation.furnish import Furnished, Zone, furnished, is_connected
 from clearway.generation.outline import draw_outline, inside_of
 from clearway.generation.request import Request
 from clearway.generation.split import owner
 from clearway.generation.statistics import PlanStatistics, plan_statistics
-from clearway.generation.structure import Structure, draw_structure
-from clearway.scenes.floor_plans import Area, FloorPlan
+from clearway.generation.structure import CORRIDOR, Structure, draw_structure
+from clearway.rooms.plans.rectangles import rectangles
+from clearway.scenes.floor_plans import FRONTS, Area, FloorPlan, Furnishing
 
 CELL_SIZE_M = 0.5
 MOST_ATTEMPTS = 2_000
 ROOM_LIMITS: dict[str, tuple[float, float]] = {
-    "cells": (11, 60),
+    "cells": (13, 60),  # real ones from 11; rooms so small would often be alike
     "blocked_share": (0.12, 0.52),
     "dead_ends": (0, 4),
     "mean_path_steps": (3.7, 10.0),
@@ -52,16 +53,18 @@ class Draft:
         free: (X, Z) bool, what of it can be entered.
         doors: (D, 2) int, cells.
         areas: what is used as what.
+        furniture: what stands on the cells inside that cannot be entered.
     """
 
     inside: np.ndarray
     free: np.ndarray
     doors: np.ndarray
     areas: tuple[Area, ...]
+    furniture: tuple[Furnishing, ...]
 
 
 def generated_plan(request: Request) -> FloorPlan:
-    """The plan of a request; the same cells, walls, doors and areas whoever asks, wherever."""
+    """The plan of a request; the same cells, walls, doors, areas and furniture whoever asks, wherever."""
     return draw_plan(request).plan
 
 
@@ -90,37 +93,78 @@ def draw_plan(request: Request) -> Drawn:
 
 
 def draw_room(use: str, rng: np.random.Generator) -> Draft | None:
-    """A furnished room of some use; None where furniture leaves too little."""
+    """A furnished room of some use; None where furniture leaves too little, or what it must have finds no place."""
     inside = inside_of(draw_outline(use, rng), rng)
-    free = furnished(inside, use, np.zeros_like(inside), rng)
-    if free.sum() < LEAST_FREE:
+    done = furnished([Zone(use, inside)], np.zeros_like(inside), rng)
+    if done is None or done.free.sum() < LEAST_FREE:
         return None
     width, depth = inside.shape
-    return Draft(inside, free, np.zeros((0, 2), np.int64), (Area(use, (0, 0), (width - 1, depth - 1)),))
+    areas = (Area(use, (0, 0), (width - 1, depth - 1)),)
+    return Draft(inside, done.free, np.zeros((0, 2), np.int64), areas, tuple(_named(done, (0, 0))))
 
 
 def draw_flat(rng: np.random.Generator) -> Draft | None:
-    """A furnished flat; None where rooms meet, one is too full, or a part cannot be reached."""
-    structure = _from_origin(draw_structure(rng))
-    areas, doors = structure.areas, np.array(structure.doors, np.int64)
-    inside = np.zeros(np.max([area.high for area in areas], axis=0) + 1, bool)
-    for area in areas:
-        (x0, z0), (x1, z1) = area.low, area.high
-        around = inside[max(0, x0 - 1) : x1 + 2, max(0, z0 - 1) : z1 + 2]
-        if around.any():  # a wall of one cell at least, all around
-            return None
-        inside[x0 : x1 + 1, z0 : z1 + 1] = True
-    opening = np.zeros_like(inside)
+    """A furnished flat; None where no rooms fit, one is too full or bare, or a part cannot be reached."""
+    structure = draw_structure(rng)
+    if structure is None:
+        return None
+    numbers, doors = structure.numbers, np.array(structure.doors, np.int64)
+    opening = np.zeros(numbers.shape, bool)
     opening[tuple(doors.T)] = True
-    beside_door = _beside(opening)
-    free = opening.copy()
-    for area in areas:
-        (x0, z0), (x1, z1) = area.low, area.high
-        part = np.s_[x0 : x1 + 1, z0 : z1 + 1]
-        free[part] = furnished(inside[part], area.use, beside_door[part], rng)
-        if free[part].sum() < LEAST_FREE:
+    kept, free = _beside(opening) | _entrance(structure), opening.copy()
+    areas: list[Area] = []
+    furniture: list[Furnishing] = []
+    for room in _open_rooms(numbers):
+        places = np.argwhere(np.isin(numbers, room))
+        (x0, z0), (x1, z1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
+        part = np.s_[x0:x1, z0:z1]
+        zones = [Zone(structure.uses[number - 1], numbers[part] == number) for number in room]
+        done = furnished(zones, kept[part], rng)
+        if done is None or any((done.free & zone.inside).sum() < LEAST_FREE for zone in zones):
             return None
-    return Draft(inside | opening, free, doors, areas) if is_connected(free) else None
+        free[part] |= done.free
+        furniture += _named(done, (x0, z0))
+        areas += [
+            Area(zone.use, (x0 + i0, z0 + j0), (x0 + i1 - 1, z0 + j1 - 1))
+            for zone in zones
+            for i0, j0, i1, j1 in rectangles(zone.inside, max(zone.inside.shape))
+        ]
+    if not is_connected(free):
+        return None
+    return Draft((numbers > 0) | opening, free, doors, tuple(areas), tuple(furniture))
+
+
+def _named(done: Furnished, origin: tuple[int, int]) -> list[Furnishing]:
+    """The pieces of a room whose map begins at some cell."""
+    x, z = origin
+    return [
+        Furnishing(piece.kind, (x + at.x0, z + at.z0), (x + at.x1 - 1, z + at.z1 - 1), at.front)
+        for piece, at in done.pieces
+    ]
+
+
+def _open_rooms(numbers: np.ndarray) -> list[list[int]]:
+    """The numbers of rooms from 1, those together that no wall is between."""
+    beside = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
+    together = {
+        (int(a), int(b)) for one, other in beside for a, b in zip(one[one != other], other[one != other], strict=True)
+    }
+    rooms: list[list[int]] = []
+    for number in range(1, int(numbers.max()) + 1):
+        joined = next((room for room in rooms if {(number, room[0]), (room[0], number)} & together), None)
+        if joined is None:
+            rooms.append([number])
+        else:
+            joined.append(number)
+    return rooms
+
+
+def _entrance(structure: Structure) -> np.ndarray:
+    """(X, Z) bool, the corridor's cells at the border of the flat, where its front door may be."""
+    corridor = structure.numbers == structure.uses.index(CORRIDOR) + 1
+    inner = np.zeros_like(corridor)
+    inner[1:-1, 1:-1] = True
+    return corridor & ~inner
 
 
 def is_like_real_rooms(figures: PlanStatistics) -> bool:
@@ -150,7 +194,25 @@ def turned(draft: Draft, way: int) -> Draft:
         corners = cells_turned(np.array([area.low, area.high], np.int64))
         low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         areas.append(Area(area.use, (low[0], low[1]), (high[0], high[1])))
-    return Draft(map_turned(draft.inside), map_turned(draft.free), cells_turned(draft.doors), tuple(areas))
+    fronts = dict(zip(FRONTS, _fronts_turned(flips, swapped), strict=True))
+    furniture = []
+    for piece in draft.furniture:
+        corners = cells_turned(np.array([piece.low, piece.high], np.int64))
+        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        furniture.append(Furnishing(piece.kind, (low[0], low[1]), (high[0], high[1]), fronts[piece.front]))
+    inside, free, doors = map_turned(draft.inside), map_turned(draft.free), cells_turned(draft.doors)
+    return Draft(inside, free, doors, tuple(areas), tuple(furniture))
+
+
+def _fronts_turned(flips: tuple[int, ...], swapped: bool) -> list[str]:
+    """What becomes of each of `FRONTS` where axes are flipped, then perhaps swapped."""
+    turned_to = []
+    for front in FRONTS:
+        axis, ahead = (1 if front in ("south", "north") else 0), front in ("north", "east")
+        ahead ^= axis in flips
+        axis ^= swapped
+        turned_to.append((("west", "east"), ("south", "north"))[axis][ahead])
+    return turned_to
 
 
 def finished(draft: Draft, name: str) -> FloorPlan:
@@ -162,21 +224,16 @@ def finished(draft: Draft, name: str) -> FloorPlan:
         cell_size_m=CELL_SIZE_M,
         walls=np.argwhere(~inside),
         doors=draft.doors + 1,
-        areas=tuple(
-            Area(area.use, (area.low[0] + 1, area.low[1] + 1), (area.high[0] + 1, area.high[1] + 1))
-            for area in draft.areas
+        areas=tuple(Area(area.use, _moved(area.low), _moved(area.high)) for area in draft.areas),
+        furniture=tuple(
+            Furnishing(piece.kind, _moved(piece.low), _moved(piece.high), piece.front) for piece in draft.furniture
         ),
     )
 
 
-def _from_origin(structure: Structure) -> Structure:
-    """The structure, moved so that its lowest cell is (0, 0)."""
-    x, z = np.min([area.low for area in structure.areas], axis=0).tolist()
-    areas = tuple(
-        Area(area.use, (area.low[0] - x, area.low[1] - z), (area.high[0] - x, area.high[1] - z))
-        for area in structure.areas
-    )
-    return Structure(areas, tuple((door[0] - x, door[1] - z) for door in structure.doors))
+def _moved(cell: tuple[int, int]) -> tuple[int, int]:
+    """A cell of a draft, in its plan with the wall around it."""
+    return cell[0] + 1, cell[1] + 1
 
 
 def _beside(marked: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from clearway.choices import PlanKind, SplitName
 from clearway.errors import ClearwayError
 
-GENERATOR_VERSION = 1
+GENERATOR_VERSION = 2
 """Raised whenever the same request gives another plan."""
 
 KINDS: tuple[PlanKind, ...] = get_args(PlanKind)

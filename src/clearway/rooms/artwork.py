@@ -52,6 +52,13 @@ def _roofs(rng: np.random.Generator, view: np.ndarray) -> np.ndarray:
     return out
 
 
+def gleam(rng: np.random.Generator, height: int, width: int, step: int = 1) -> np.ndarray:
+    """What a glass shows that faces a pale room: a slanting light between greys."""
+    y, x = np.mgrid[:height:step, :width:step] / np.array([height, width])[:, None, None]
+    slant = np.clip(1 - np.abs(x + 0.6 * y - rng.uniform(0.5, 1.1)) / 0.35, 0, 1)
+    return mix((0.55, 0.6, 0.63), (0.86, 0.89, 0.9), 0.25 + 0.5 * slant * (1 - y) + 0.2 * (1 - y))
+
+
 def painting(rng: np.random.Generator, height: int, width: int, step: int = 1) -> np.ndarray:
     """A landscape, circles, colour blocks, a cloud of colour, a vase or a sail, on a white mount."""
     kinds = (_landscape, _circles, _blocks, _clouds, _vase, _sail)

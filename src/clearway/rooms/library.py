@@ -103,6 +103,7 @@ def plan_path(
         "walls": plan.walls.tolist(),
         "doors": plan.doors.tolist(),
         "areas": [asdict(area) for area in plan.areas],
+        "furniture": [asdict(piece) for piece in plan.furniture],
     }
     asked = {"plan": plan.name, "seed": seed, "sensors": sorted(sensors), "size_px": size_px}
     return _path_of(plan.name, {**asked, **shape})

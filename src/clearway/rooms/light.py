@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
+from clearway.rooms.daytime import Daytime
 from clearway.rooms.detail import Detail
 from clearway.rooms.draw import draw_parts, draw_surface
 from clearway.rooms.occupancy import VOXEL_M, Occupancy, occupancy_of
@@ -49,7 +50,7 @@ class _Source:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What light meets (solid parts, sources, windows with sun, the floor's tint), and how closely it is looked at."""
+    """What light meets (solid parts, sources, windows with sun, the floor's tint), how closely one looks, and when."""
 
     solid: Occupancy
     sources: Sequence[_Source]
@@ -57,6 +58,7 @@ class _Scene:
     sun: np.ndarray | None
     floor_tint: np.ndarray
     detail: Detail
+    daytime: Daytime
 
 
 def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
@@ -75,7 +77,7 @@ def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
         if surface.name != "ceiling":
             texels, places_m = light.reshape(-1, 3), _texel_points(surface, room.detail.texel_m)
             shown.append(texels if count_hidden else texels[~scene.solid.is_solid(places_m)])
-    exposure = MEAN_EXPOSURE / float(np.concatenate(shown).mean())
+    exposure = room.daytime.exposure * MEAN_EXPOSURE / float(np.concatenate(shown).mean())
     for surface, light in zip(room.surfaces, maps, strict=True):
         draw_surface(room.spec, surface, light * exposure)
     shown_parts = [part for part in room.parts if part.material]
@@ -90,16 +92,17 @@ def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
 def _scene_of(room: Room) -> _Scene:
     size = (room.width_m, room.depth_m, room.height_m)
     sources = [source for lamp in room.lamps for source in _lamp_sources(lamp)]
-    sources += [source for window in room.windows for source in _window_sources(window)]
+    sources += [source for window in room.windows for source in _window_sources(window, room.daytime)]
     floor = next(surface for surface in room.surfaces if surface.name == "floor")
     tint = floor.albedo[::8, ::8].mean(axis=(0, 1))
     return _Scene(
         occupancy_of(size, room.parts),
         sources,
         room.windows,
-        _sun_direction(room.windows),
+        _sun_direction(room.windows, room.daytime),
         tint / tint.max(),
         room.detail,
+        room.daytime,
     )
 
 
@@ -111,9 +114,9 @@ def _lamp_sources(lamp: Lamp) -> list[_Source]:
     return [_Source(lamp.centre_m + offset, lamp.colour * lamp.power / count, None) for offset in around]
 
 
-def _window_sources(window: Window) -> list[_Source]:
+def _window_sources(window: Window, daytime: Daytime) -> list[_Source]:
     """Four points on the pane."""
-    light = DAYLIGHT * 0.62 * window.width_m * window.height_m / 4
+    light = DAYLIGHT * np.array(daytime.sky) * 0.62 * window.width_m * window.height_m / 4
     middle = window.centre_m + window.normal * 0.2
     return [
         _Source(
@@ -124,12 +127,12 @@ def _window_sources(window: Window) -> list[_Source]:
     ]
 
 
-def _sun_direction(windows: Sequence[Window]) -> np.ndarray | None:
-    """Towards the sun, (3,) unit vector, so that it shines in through the largest window; None without windows."""
-    if not windows:
+def _sun_direction(windows: Sequence[Window], daytime: Daytime) -> np.ndarray | None:
+    """Towards the sun, (3,) unit vector, so that it shines in by the largest window; None without windows or sun."""
+    if not windows or not any(daytime.sun):
         return None
     largest = max(windows, key=lambda window: window.width_m * window.height_m)
-    sun = -largest.normal + SUN_SLANT * largest.right + np.array([0, 0, 0.8])
+    sun = -largest.normal + SUN_SLANT * largest.right + np.array([0, 0, daytime.height])
     return sun / np.linalg.norm(sun)
 
 
@@ -246,7 +249,7 @@ def _sunlight(scene: _Scene, surface: Surface, points_m: np.ndarray, rng: np.ran
         direction = np.broadcast_to(scene.sun, start.shape)
         reach = scene.solid.distance_m(start, direction)
         hits += _through_window(scene.windows, start + direction * reach[:, None]) / 4
-    return hits[:, None] * SUN * slope * SUNLIGHT
+    return hits[:, None] * SUN * slope * SUNLIGHT * np.array(scene.daytime.sun)
 
 
 def _through_window(windows: Sequence[Window], points_m: np.ndarray) -> np.ndarray:
@@ -301,7 +304,7 @@ def _add_lights(room: Room) -> None:
     """MuJoCo's own lights, without shadows: they only turn the sides of furniture lighter and darker."""
     lights = [((0.1, 0.15, -1.0), 0.34), ((0.3, -0.2, 1.0), 0.06)]
     normals = [window.normal for window in room.windows] or [np.array([0.6, 0.8, 0.0])]
-    lights += [((n[0], n[1], -0.4), 0.26 / len(normals)) for n in normals]
+    lights += [((n[0], n[1], -0.4), 0.26 * room.daytime.brightness / len(normals)) for n in normals]
     lights += [((-normals[0][0] + 0.4 * normals[0][1], -normals[0][1] - 0.4 * normals[0][0], -0.3), 0.14)]
     for number, (direction, brightness) in enumerate(lights):
         light = room.spec.worldbody.add_light(

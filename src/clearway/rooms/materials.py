@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -78,6 +78,15 @@ SCHEMES = (
     ),
 )  # fmt: skip
 """Schemes that a seed chooses from."""
+
+
+def mixed_colours(rng: np.random.Generator) -> Colours:
+    """Colours of three of `SCHEMES`: cloths of one, walls and fronts of another, wood of a third; a little varied."""
+    cloths, walls, woods = (SCHEMES[int(rng.integers(len(SCHEMES)))] for _ in range(3))
+    parts = {field.name: getattr(cloths, field.name) for field in fields(Colours)}
+    parts |= {name: getattr(walls, name) for name in ("wall", "feature_wall", "cabinet")}
+    parts |= {name: getattr(woods, name) for name in ("dark_wood", "light_wood")}
+    return Colours(**{name: varied(rng, colour, 0.035) for name, colour in parts.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +242,7 @@ MAKERS: dict[str, Maker] = {
     "brass": _plain((0.74, 0.58, 0.3), specular=0.9, shininess=0.8),
     "steel": _metal((0.66, 0.67, 0.69)),
     "porcelain": _plain((0.93, 0.93, 0.92), specular=0.7, shininess=0.8),
+    "beyond": _plain((1.0, 1.0, 1.0), specular=0.0, emission=1.0),
     "bulb": _plain((1.0, 1.0, 0.95), emission=1.0),
     "leaf": _plain((0.18, 0.4, 0.14), specular=0.2),
     "young leaf": _plain((0.3, 0.52, 0.2), specular=0.2),

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from clearway.rooms import meshes
+from clearway.rooms.daytime import NOON, Daytime
 from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.frame import UPRIGHT, Frame, along, rotation
 from clearway.rooms.groups import OBSTACLE_GROUP, SEEN_GROUP
@@ -42,6 +43,7 @@ class Room:
         looks: False builds the obstacles alone, in milliseconds.
         mirrored: swap left and right (x to width_m - x) in everything that is placed.
         detail: how finely it is modelled and lit.
+        daytime: the light outside.
         spec: the MuJoCo model so far.
         rng: for looks: colours, textures, ornaments without obstacles.
         layout_rng: for everything that moves an obstacle; the same with and without looks.
@@ -58,6 +60,7 @@ class Room:
     looks: bool = True
     mirrored: bool = False
     detail: Detail = FULL
+    daytime: Daytime = NOON
     spec: mujoco.MjSpec = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -27,14 +27,21 @@ from clearway.version import __version__
 SOURCE = "floor_plan"  # stands in a scene's `made_by`
 GENERATED = "generated"  # the same of a plan that was drawn (`clearway.generation`)
 SOURCES = (SOURCE, GENERATED)  # of scenes that `plan_of` knows
-PLAN_NOTE = "plan"  # in its notes: walls, doors and areas
+PLAN_NOTE = "plan"  # in its notes: walls, doors, areas and furniture
 REBUILD = "Make the scene of its plan again"
 CELL_SIZE_M = 0.25  # of the published AI2-THOR plans
 MAX_CELLS = MAX_STATES // HEADING_COUNT
 MAX_WALLS = 1 << 18
+MAX_FURNITURE_CELLS = 64  # along a side
 BLOCKED_LETTER, FREE_LETTER, WALL_LETTER, DOOR_LETTER = "#", ".", "W", "D"  # of a map in characters
 LETTERS = {BLOCKED_LETTER: "blocked", FREE_LETTER: "reachable", WALL_LETTER: "a wall", DOOR_LETTER: "a door in it"}
 USES = ("bathroom", "bedroom", "kitchen", "living room", "corridor")
+FURNITURE = (
+    *("armchair", "basin", "bath", "bookcase", "cabinet", "chest", "coats", "coffee table", "counter", "desk"),
+    *("dining table", "double bed", "fireplace", "fridge", "island", "nightstand", "pantry", "plant", "shoe cabinet"),
+    *("shower", "sideboard", "single bed", "sofa", "table", "television", "toilet", "wardrobe", "worktop"),
+)  # kinds that a plan may name
+FRONTS = ("south", "north", "west", "east")  # z grows to the north, x to the east
 
 
 def _no_edges() -> np.ndarray:
@@ -59,6 +66,28 @@ class Area:
     high: tuple[int, int]
 
 
+@dataclass(frozen=True)
+class Furnishing:
+    """A piece of furniture that a plan names, on a rectangle of blocked cells.
+
+    Attributes:
+        kind: one of `FURNITURE`.
+        low, high: x and z of its lowest and highest cell, both included.
+        front: the side that its front looks to, one of `FRONTS`.
+    """
+
+    kind: str
+    low: tuple[int, int]
+    high: tuple[int, int]
+    front: str
+
+    @property
+    def cells(self) -> list[tuple[int, int]]:
+        """X and z of the cells that it stands on."""
+        (x0, z0), (x1, z1) = self.low, self.high
+        return [(x, z) for x in range(x0, x1 + 1) for z in range(z0, z1 + 1)]
+
+
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
     """The cells that can be entered, on a square grid. Neighbouring cells are joined unless the way is blocked.
@@ -74,10 +103,12 @@ class FloorPlan:
             furniture.
         doors: (D, 2) int, x and z of `cells` that are openings in a wall.
         areas: what parts of the plan are used as; the first that holds a cell counts, none: any furniture.
+        furniture: pieces on blocked cells, where the plan has walls; what stands on other blocked cells is chosen when
+            the plan is built.
 
     Raises:
-        SceneError: there are no cells or too many, one stands twice or far away, or a blocked edge, a wall, a door or
-            an area is none.
+        SceneError: there are no cells or too many, one stands twice or far away, or a blocked edge, a wall, a door, an
+            area or a piece of furniture is none.
     """
 
     name: str
@@ -89,6 +120,7 @@ class FloorPlan:
     walls: np.ndarray = field(default_factory=_no_cells)
     doors: np.ndarray = field(default_factory=_no_cells)
     areas: tuple[Area, ...] = ()
+    furniture: tuple[Furnishing, ...] = ()
 
     def __post_init__(self) -> None:
         """Check all of it."""
@@ -106,6 +138,7 @@ class FloorPlan:
             self._refuse(f"names the cell {tuple(distinct[times.argmax()].tolist())} twice", "Name every cell once")
         self._check_blocked()
         self._check_parts()
+        self._check_furniture()
 
     @classmethod
     def of_map(
@@ -199,6 +232,21 @@ class FloorPlan:
         for area in self.areas:
             if area.use not in USES or area.low[0] > area.high[0] or area.low[1] > area.high[1]:
                 self._refuse(f"has the area {area}", f"Give a use among {', '.join(USES)}, then low and high cell")
+
+    def _check_furniture(self) -> None:
+        taken = set(map(tuple, np.concatenate([self.cells, self.walls]).tolist())) if self.furniture else set()
+        for piece in self.furniture:
+            known = piece.kind in FURNITURE and piece.front in FRONTS
+            sides = [high - low for low, high in zip(piece.low, piece.high, strict=True)]
+            if not known or min(sides) < 0 or max(sides) >= MAX_FURNITURE_CELLS:
+                self._refuse(f"has the furniture {piece}", "Give a kind of FURNITURE, low and high cell, and a front")
+            standing = set(piece.cells)
+            if standing & taken:
+                cell = min(standing & taken)
+                self._refuse(
+                    f"has a {piece.kind} in the cell {cell} that is taken", "Put it on blocked cells of its own"
+                )
+            taken |= standing
 
     def _is_far(self, cells: np.ndarray) -> bool:
         far = MAX_COORDINATE_M / self.cell_size_m
@@ -317,6 +365,7 @@ def plan_notes(plan: FloorPlan) -> dict[str, object]:
         "walls": plan.walls.tolist(),
         "doors": plan.doors.tolist(),
         "areas": [[area.use, list(area.low), list(area.high)] for area in plan.areas],
+        "furniture": [[one.kind, list(one.low), list(one.high), one.front] for one in plan.furniture],
     }
     kept = {name: part for name, part in parts.items() if part}
     return {PLAN_NOTE: kept} if kept else {}
@@ -326,7 +375,7 @@ def plan_of(scene: Scene) -> FloorPlan:
     """The plan that a scene was made of.
 
     Raises:
-        SceneError: its poses are no plan's, or its record of walls, doors and areas is damaged.
+        SceneError: its poses are no plan's, or its record of walls, doors, areas and furniture is damaged.
     """
     size_m, firsts = scene.cell_size_m, slice(None, None, HEADING_COUNT)
     cells = np.rint(scene.locations_m[firsts] / size_m).astype(np.int64)
@@ -337,11 +386,14 @@ def plan_of(scene: Scene) -> FloorPlan:
         parts = scene.made_by.notes.get(PLAN_NOTE, {})
         assert isinstance(parts, dict)
         areas = tuple(Area(use, tuple(low), tuple(high)) for use, low, high in parts.get("areas", ()))
+        pieces = parts.get("furniture", ())
+        furniture = tuple(Furnishing(kind, tuple(low), tuple(high), front) for kind, low, high, front in pieces)
+        assert all([type(at) for at in (*one.low, *one.high)] == [int] * 4 for one in furniture)
         walls, doors = (np.array(parts.get(name, []), np.int64).reshape(-1, 2) for name in ("walls", "doors"))
     except (AssertionError, TypeError, ValueError) as fault:
         raise SceneError(scene.name, "the record of its floor plan is damaged", REBUILD) from fault
     blocked = cells[pairs[ahead == BLOCKED]]
-    plan = FloorPlan(scene.name, cells, blocked, size_m, walls=walls, doors=doors, areas=areas)
+    plan = FloorPlan(scene.name, cells, blocked, size_m, walls=walls, doors=doors, areas=areas, furniture=furniture)
     locations_m, headings_deg, graph = plan_poses(plan)
     same = locations_m.shape == scene.locations_m.shape and np.allclose(locations_m, scene.locations_m)
     if not same or not np.array_equal(headings_deg, scene.headings_deg) or not np.array_equal(graph, scene.graph):

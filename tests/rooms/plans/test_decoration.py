@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -6,7 +8,7 @@ from clearway.rooms.plans.decoration import MOST_BEHIND_M, MOST_WINDOWS, decorat
 from clearway.rooms.plans.layout import Layout, lay_out
 from clearway.rooms.plans.walls import GAP
 from clearway.rooms.room import Room
-from clearway.scenes.floor_plans import Area, FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan, Furnishing
 from helpers.plan_maps import ELL, plan_of, walled
 
 PLAN = plan_of("ell", ELL)
@@ -125,3 +127,16 @@ def test_lamps_hang_over_free_cells() -> None:
     assert len(room.lamps) >= 1
     for lamp in room.lamps:
         assert np.linalg.norm(free_m - lamp.centre_m[:2], axis=1).min() < 1e-6
+
+
+def furnished_plan(number: int) -> FloorPlan:
+    """A plan that names a piece of furniture."""
+    lines = ("WWWWWWWW", "W......W", "W......W", "W.##...W", "WWWWWWWW")
+    return replace(walled(f"room {number}", lines), furniture=(Furnishing("sofa", (2, 1), (3, 1), "north"),))
+
+
+def test_lamps_of_plans_that_name_their_furniture_differ() -> None:
+    lamps = [decorated(0.9, seed, furnished_plan(0))[0].lamps[0] for seed in range(30)]
+    assert len({tuple(lamp.colour) for lamp in lamps}) == 3
+    assert len({round(float(lamp.centre_m[2]), 3) for lamp in lamps}) >= 3
+    assert len({tuple(lamp.colour) for lamp in decorated(0.9, 3, FOUR_ROOMS)[0].lamps}) == 1

@@ -45,6 +45,14 @@ def test_areas_have_papers_of_their_own_that_meet_in_the_wall(monkeypatch) -> No
     assert finish.walls["west"].mean() == 0.25 and finish.walls["east"].mean() == 0.75
 
 
+def test_rectangles_that_are_one_room_have_one_paper() -> None:
+    kitchen = Area("kitchen", (4, 1), (5, 3))
+    ell = (Area("bedroom", (1, 1), (2, 2)), kitchen, Area("bedroom", (3, 2), (3, 3)), Area("bedroom", (1, 3), (2, 3)))
+    assert finish_module._first_of_each_room(ell) == [0, 1, 0, 0]
+    apart = (Area("bedroom", (1, 1), (2, 2)), Area("bedroom", (4, 1), (5, 2)), Area("bedroom", (3, 3), (5, 4)))
+    assert finish_module._first_of_each_room(apart) == [0, 1, 1]  # (2, 2) and (3, 3) meet at a corner alone
+
+
 def test_areas_have_floors_of_their_own_that_meet_in_the_wall(monkeypatch) -> None:
     monkeypatch.setattr(finish_module, "_floor", lambda room: np.full((272, 592, 3), 0.75))
     monkeypatch.setattr(finishes, "floor_of", lambda room, tiles: np.full((272, 592, 3), 0.25))

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from clearway.rooms.plans.layout import Layout, Piece, lay_out
-from clearway.rooms.plans.walls import GAP
+from clearway.rooms.plans.walls import GAP, YAWS_DEG
 from clearway.rooms.shell import Column
-from clearway.scenes.floor_plans import Area, FloorPlan
+from clearway.scenes.floor_plans import FRONTS, Area, FloorPlan, Furnishing
 from helpers.plan_maps import ELL, ISLAND, SINGLE, plan_of, walled
 
 EXAMPLES = settings(max_examples=30, deadline=None, derandomize=True)
@@ -208,3 +210,34 @@ def test_the_seed_chooses_the_walls_with_furniture() -> None:
     plan = plan_of("island", ISLAND)
     assert laid_out(plan, 3).pieces == laid_out(plan, 3).pieces
     assert len({laid_out(plan, seed).free.shape for seed in range(12)}) > 1
+
+
+def test_what_is_outside_of_a_flat_is_told_from_its_walls() -> None:
+    lines = ("WWWWWWW", "W.WWWWW", "W.WWWWW", "W.WWWWW", "W.....W", "WWWWWWW")
+    layout = laid_out(walled("ell", lines))
+    assert layout.beyond and set(layout.beyond) < set(layout.walls)
+    # cells of 0.5 m; the wall of one cell beside the rooms ends 1.1 m and 1.1 m from the corner of the floor
+    low = np.min([column_of(column)[0] for column in layout.beyond], axis=0)
+    assert low == pytest.approx([1.1, 1.1])
+    assert not laid_out(plan_of("ell", ELL)).beyond
+
+
+@pytest.mark.parametrize("front", FRONTS)
+def test_furniture_that_a_plan_names_stands_on_its_cells_and_looks_where_it_says(front: str) -> None:
+    lines = ("WWWWWW", "W....W", "W.##.W", "W.##.W", "W....W", "WWWWWW")
+    plan = replace(walled("one", lines), furniture=(Furnishing("sofa", (2, 2), (3, 3), front),))
+    (piece,) = laid_out(plan).pieces
+    assert piece.kind == "sofa" and piece.at.yaw_deg == YAWS_DEG[front]
+    # cells 2 and 3 of 0.5 m begin 0.6 m from the floor's corner, and the piece keeps 0.1 m from what is free
+    assert rectangle_of(piece) == pytest.approx(np.array([[0.7, 0.7], [1.5, 1.5]]))
+    (unnamed,) = laid_out(walled("one", lines)).pieces
+    assert unnamed.kind is None and rectangle_of(unnamed) == pytest.approx(rectangle_of(piece))
+
+
+def test_furniture_is_not_cut_and_what_is_beside_it_is() -> None:
+    lines = ("WWWWWWWWWWWW", "W##########W", "W..........W", "WWWWWWWWWWWW")
+    counter = Furnishing("counter", (1, 2), (7, 2), "south")
+    pieces = laid_out(replace(walled("row", lines), furniture=(counter,))).pieces
+    named = [piece for piece in pieces if piece.kind == "counter"]
+    assert len(named) == 1 and named[0].width_m == pytest.approx(7 * 0.5 + 0.1 - 0.01)
+    assert {piece.kind for piece in pieces} == {"counter", None}

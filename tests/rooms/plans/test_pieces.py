@@ -9,11 +9,13 @@ import pytest
 from clearway.rooms.frame import Frame, rotation
 from clearway.rooms.groups import OBSTACLE_GROUP
 from clearway.rooms.plans.layout import Piece
-from clearway.rooms.plans.pieces import ANYWHERE, BY_USE, FIRST, LAST_RESORT, THEMES, Kind, furnish
+from clearway.rooms.plans.named import NAMED
+from clearway.rooms.plans.pieces import ANYWHERE, BY_USE, FIRST, LAST_RESORT, THEMES, furnish
+from clearway.rooms.plans.placing import Kind
 from clearway.rooms.room import Room
-from clearway.scenes.floor_plans import USES, Area
+from clearway.scenes.floor_plans import FURNITURE, USES, Area
 
-ALL = (*THEMES, *BY_USE.values(), ANYWHERE, (LAST_RESORT,))
+ALL = (*THEMES, *BY_USE.values(), *NAMED.values(), ANYWHERE, (LAST_RESORT,))
 KINDS = sorted({kind for kinds in ALL for kind in kinds}, key=lambda kind: str(kind))
 NEAREST_M = 0.35
 MIDDLE_M = 5.0
@@ -96,6 +98,30 @@ def test_every_bedroom_has_a_bed_and_one_only() -> None:
     areas = [Area("bedroom", (0, 0), (4, 4)), Area("bedroom", (5, 0), (9, 4))]
     room, _ = room_with([replace(place(1.6, 2.0, True), area=area) for area in areas for _ in range(2)], looks=True)
     assert sum(part.material == "duvet" for part in room.parts) == 2
+
+
+KEY_MATERIALS = {
+    "double bed": {"duvet"},
+    "single bed": {"duvet"},
+    "toilet": {"porcelain"},
+    "basin": {"porcelain"},
+    "bath": {"porcelain", "water"},
+    "shower": {"porcelain", "glass"},
+    "counter": {"granite", "steel", "black"},
+    "sofa": {"walnut", "accent"},
+    "coffee table": {"wood"},
+    "television": {"walnut", "black"},
+}
+
+
+def test_furniture_that_a_plan_names_is_drawn_where_it_says() -> None:
+    assert set(NAMED) == set(FURNITURE)
+    for kind, materials in KEY_MATERIALS.items():
+        named = NAMED[kind][0]
+        size_m = (sum(side) / 2 for side in (named.widths_m, named.depths_m))
+        room, tops_m = room_with([replace(place(*size_m, True), kind=kind)], looks=True)
+        assert materials <= {part.material for part in room.parts}, kind
+        assert tops_m[0] in {one.top_m for one in NAMED[kind]}
 
 
 def test_rooms_between_walls_have_themes_of_their_own() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -15,12 +15,13 @@ from hypothesis.extra.numpy import arrays
 
 from clearway.errors import SceneError
 from clearway.rooms.camera import first_person_view
+from clearway.rooms.daytime import DAYTIMES, NOON
 from clearway.rooms.groups import SEEN_GROUP
 from clearway.rooms.plans import plan_room
 from clearway.rooms.plans.plan_room import build_plan_room, open_plan
 from clearway.rooms.render import render
 from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
-from clearway.scenes.floor_plans import Area, FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan, Furnishing
 from helpers.imported import imported_by
 from helpers.plan_maps import ELL, FLAT, ISLAND, MAPS, plan_of, walled
 
@@ -241,6 +242,18 @@ def test_both_rooms_are_lit_and_the_way_shows_from_above(two_rooms: Furnished) -
         for y_m, hit in ((0.85, np.zeros(1, np.int32)), (1.4, np.zeros(1, np.int32)))
     ]
     assert seen_m == pytest.approx([9.0, 9.0 - 2.6], abs=0.03)  # the floor of the doorway, the top of the wall
+
+
+def test_light_and_colours_of_plans_that_name_their_furniture_differ_with_the_seed() -> None:
+    lines = ("WWWWWWWW", "W......W", "W.##...W", "WWWWWWWW")
+    plain = walled("room", lines)
+    named = replace(plain, furniture=(Furnishing("sofa", (2, 1), (3, 1), "north"),))
+    rooms = [build_plan_room(named, seed, looks=False)[0] for seed in range(24)]
+    assert {room.daytime.name for room in rooms} == {daytime.name for daytime in DAYTIMES}
+    assert len({room.colours for room in rooms}) == 24
+    again = build_plan_room(named, 3, looks=False)[0]
+    assert (again.daytime, again.colours) == (rooms[3].daytime, rooms[3].colours)
+    assert {build_plan_room(plain, seed, looks=False)[0].daytime for seed in range(4)} == {NOON}
 
 
 def real_plans() -> list[FloorPlan]:

@@ -9,18 +9,32 @@ from clearway.rooms.room import Room
 LYING = turn("x", -90)
 
 
-def toilet(room: Room, at: Frame, depth_m: float = 0.7) -> None:
-    """A toilet with its cistern at -y, 40 x 70 cm, or of another depth."""
+def toilet(room: Room, at: Frame, depth_m: float = 0.7, width_m: float = 0.4) -> None:
+    """A toilet with its cistern at -y, 40 x 70 cm, or of another depth; it blocks less than its width if need be."""
     share = depth_m / 0.7
-    room.box(at, (0, -0.25 * share, 0.38), (0.38, 0.18 * share, 0.38), "porcelain", 0.03, segments=3)
-    room.box(at, (0, -0.25 * share, 0.755), (0.4, 0.2 * share, 0.03), "porcelain", 0.012)
+    slim = max(0.85, width_m / 0.4)
+    room.box(at, (0, -0.25 * share, 0.38), (0.38 * slim, 0.18 * share, 0.38), "porcelain", 0.03, segments=3)
+    room.box(at, (0, -0.25 * share, 0.755), (0.4 * slim, 0.2 * share, 0.03), "porcelain", 0.012)
     room.cylinder(at, (0, -0.25 * share, 0.785), 0.025, 0.012, "chrome")
     bowl = [(0, 0), (0.15, 0), (0.13, 0.08), (0.12, 0.18), (0.17, 0.32), (0.2, 0.4), (0.17, 0.405), (0, 0.405)]
-    room.turned(at, (0, 0.08 * share, 0), bowl, "porcelain", scale_xy=(0.92, 1.3 * share), slices=28)
-    room.box(at, (0, -0.14 * share, 0), (0.25, 0.34 * share, 0.37), "porcelain", 0.04, segments=3)
+    room.turned(at, (0, 0.08 * share, 0), bowl, "porcelain", scale_xy=(0.92 * slim, 1.3 * share), slices=28)
+    room.box(at, (0, -0.14 * share, 0), (0.25 * slim, 0.34 * share, 0.37), "porcelain", 0.04, segments=3)
     lid = [(0, 0), (0.2, 0), (0.207, 0.012), (0.2, 0.028), (0, 0.034)]
-    room.turned(at, (0, 0.08 * share, 0.405), lid, "white", scale_xy=(0.92, 1.3 * share), slices=28)
-    room.block(at, (0, 0, 0.4), (0.4, depth_m, 0.8))
+    room.turned(at, (0, 0.08 * share, 0.405), lid, "white", scale_xy=(0.92 * slim, 1.3 * share), slices=28)
+    room.block(at, (0, 0, 0.4), (width_m, depth_m, 0.8))
+
+
+def basin(room: Room, at: Frame, width_m: float = 0.5, depth_m: float = 0.45) -> None:
+    """A basin on a foot, with its tap at -y."""
+    top = 0.84
+    foot = [(0, 0), (0.13, 0), (0.1, 0.1), (0.075, 0.5), (0.1, 0.72), (0, 0.72)]
+    room.turned(at, (0, -0.06, 0), foot, "porcelain", slices=20)
+    bowl = [(0, 0), (0.08, 0), (0.19, 0.1), (0.2, 0.14), (0.18, 0.14), (0.1, 0.05), (0, 0.045)]
+    scale = (max(width_m, 0.34) / 0.4, (depth_m - 0.04) / 0.4)
+    room.turned(at, (0, 0, top - 0.14), bowl, "porcelain", scale_xy=scale, slices=28)
+    room.box(at, (0, -depth_m / 2 + 0.06, top - 0.12), (0.3, 0.11, 0.13), "porcelain", 0.03, segments=2)
+    tap(room, at.moved(0, -depth_m / 2 + 0.06), top, 0.18, 0.13)
+    room.block(at, (0, 0, top / 2), (width_m, depth_m, top))
 
 
 def bathtub(room: Room, at: Frame, length_m: float = 1.7, width_m: float = 0.75) -> None:

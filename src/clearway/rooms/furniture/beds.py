@@ -6,6 +6,8 @@ from clearway.rooms.frame import Frame, turn
 from clearway.rooms.furniture import decor, lamps
 from clearway.rooms.room import Room
 
+NARROW_M = 1.1  # width of a bed for one, at most
+
 
 def double_bed(room: Room, at: Frame, width_m: float = 1.6, length_m: float = 2.05, material: str = "wood") -> None:
     """A made bed; the headboard is at -y, the frame's origin in the middle of the mattress."""
@@ -26,13 +28,14 @@ def double_bed(room: Room, at: Frame, width_m: float = 1.6, length_m: float = 2.
 
 
 def _pillows(room: Room, at: Frame, width_m: float, half_length_m: float) -> None:
-    """Two pillows and two cushions against the headboard."""
-    for side, cushion in ((-1, "accent"), (1, "second accent")):
+    """Two pillows and two cushions against the headboard; one of each on a narrow bed."""
+    narrow = width_m < NARROW_M
+    for side, cushion in ((0, "accent"),) if narrow else ((-1, "accent"), (1, "second accent")):
         x = side * width_m / 4
         room.box(
             at,
             (x, -half_length_m + 0.3, 0.52),
-            (width_m / 2 - 0.1, 0.42, 0.15),
+            (width_m - 0.15 if narrow else width_m / 2 - 0.1, 0.42, 0.15),
             "linen",
             0.074,
             turn("x", 18),

@@ -51,6 +51,19 @@ def mirror(room: Room, at: Frame, width_m: float, height_m: float, frame: str = 
     _border(room, at, width_m, height_m, 0.035, frame)
 
 
+def looking_glass(room: Room, at: Frame, width_m: float, height_m: float, frame: str = "chrome") -> None:
+    """A framed glass on a wall frame, centred on it, that gleams and mirrors nothing: a mirror is drawn twice."""
+    room.picture(
+        at,
+        (0, 0.014, 0),
+        (width_m, height_m),
+        lambda rng, step: artwork.gleam(rng, 64, round(64 * width_m / height_m), step),
+        specular=0.6,
+        shininess=0.9,
+    )
+    _border(room, at, width_m, height_m, 0.02, frame)
+
+
 def clock(room: Room, at: Frame, radius_m: float = 0.16, frame: str = "black") -> None:
     """A round clock on a wall frame."""
     rim = [(0, 0), (radius_m, 0), (radius_m, 0.035), (radius_m - 0.02, 0.04), (radius_m - 0.02, 0.02), (0, 0.02)]

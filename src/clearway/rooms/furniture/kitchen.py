@@ -121,14 +121,15 @@ def hood(room: Room, at: Frame, width_m: float = 0.66) -> None:
     room.box(at, (0, 0.13, 1.75), (0.27, 0.26, room.height_m - 1.75), "steel", 0.004)
 
 
-def sink(room: Room, at: Frame) -> None:
+def sink(room: Room, at: Frame, depth_m: float = DEPTH_M) -> None:
     """A steel sink with a tap, set in a worktop; at the middle of the counter's footprint."""
-    room.box(at, (0, 0.02, WORKTOP_M - 0.006), (0.62, 0.42, 0.012), "chrome", 0.005)
-    room.box(at, (-0.13, 0.02, WORKTOP_M - 0.002), (0.3, 0.34, 0.009), "rubber", 0.003)
-    room.box(at, (-0.13, 0.02, WORKTOP_M), (0.27, 0.31, 0.009), "steel", 0.003)
+    spare_m = min(0.0, depth_m - 0.48)  # that it must be less deep
+    room.box(at, (0, 0.02, WORKTOP_M - 0.006), (0.62, 0.42 + spare_m, 0.012), "chrome", 0.005)
+    room.box(at, (-0.13, 0.02, WORKTOP_M - 0.002), (0.3, 0.34 + spare_m, 0.009), "rubber", 0.003)
+    room.box(at, (-0.13, 0.02, WORKTOP_M), (0.27, 0.31 + spare_m, 0.009), "steel", 0.003)
     for number in range(5):
-        room.box(at, (0.1 + 0.04 * number, 0.02, WORKTOP_M + 0.004), (0.012, 0.3, 0.006), "chrome", 0.002)
-    tap(room, at.moved(-0.13, -0.2), WORKTOP_M)
+        room.box(at, (0.1 + 0.04 * number, 0.02, WORKTOP_M + 0.004), (0.012, 0.3 + spare_m, 0.006), "chrome", 0.002)
+    tap(room, at.moved(-0.13, -0.2 - spare_m / 2), WORKTOP_M)
 
 
 def tap(room: Room, at: Frame, z_m: float, height_m: float = 0.26, reach_m: float = 0.17) -> None:

@@ -25,7 +25,7 @@ def window(room: Room, at: Frame, width_m: float, height_m: float, curtains: boo
         at,
         (0, 0.012, height_m / 2),
         (width_m, height_m),
-        lambda rng, step: artwork.outdoor(rng, 256, round(256 * width_m / height_m), step),
+        lambda rng, step: room.daytime.seen(artwork.outdoor(rng, 256, round(256 * width_m / height_m), step)),
         emission=0.95,
         specular=0.0,
     )
@@ -72,7 +72,15 @@ def door(room: Room, at: Frame, material: str = "wood", width_m: float = 0.85, p
     room.rod(at, (width_m / 2 - 0.07, 0.024, 0.99), (width_m / 2 - 0.07, 0.06, 0.99), 0.008, "brass")
 
 
-def doorway(room: Room, at: Frame, width_m: float, depth_m: float, height_m: float, lining_m: float) -> None:
+def doorway(
+    room: Room,
+    at: Frame,
+    width_m: float,
+    depth_m: float,
+    height_m: float,
+    lining_m: float,
+    material: str = "trim",
+) -> None:
     """An open doorway in a wall: jambs, a head, an architrave on both sides, and what stops light and bodies above.
 
     What hides the way from above is in the group of the ceiling.
@@ -84,6 +92,7 @@ def doorway(room: Room, at: Frame, width_m: float, depth_m: float, height_m: flo
         depth_m: thickness of the wall.
         height_m: of the opening.
         lining_m: thickness of jambs and head, within the width.
+        material: of its frame.
     """
     lintel_m = room.height_m - height_m
     room.block(at, (0, 0, height_m + lintel_m / 2), (width_m, depth_m, lintel_m), f"{SHELL_NAME} {_title(at)} lintel")
@@ -97,16 +106,22 @@ def doorway(room: Room, at: Frame, width_m: float, depth_m: float, height_m: flo
     room.shadow_box(at.moved(0, 0, height_m + lining_m), (width_m, depth_m, lintel_m - lining_m))
     proud_m = depth_m + 0.01
     for side in (-1, 1):
-        room.box(at, (side * (width_m - lining_m) / 2, 0, 0), (lining_m, proud_m, height_m + lining_m), "trim", 0.004)
-    room.box(at, (0, 0, height_m), (width_m - 2 * lining_m, proud_m, lining_m), "trim", 0.004, group=CEILING_GROUP)
+        room.box(
+            at,
+            (side * (width_m - lining_m) / 2, 0, 0),
+            (lining_m, proud_m, height_m + lining_m),
+            material,
+            0.004,
+        )
+    room.box(at, (0, 0, height_m), (width_m - 2 * lining_m, proud_m, lining_m), material, 0.004, group=CEILING_GROUP)
     broad_m, thick_m = ARCHITRAVE_M
     inner_m = width_m / 2 - lining_m + REVEAL_M
     for front in (at.moved(0, depth_m / 2), at.moved(0, -depth_m / 2, 0, 180.0)):
         for side in (-1, 1):
             place = (side * (inner_m + broad_m / 2), thick_m / 2, 0)
-            room.box(front, place, (broad_m, thick_m, height_m + REVEAL_M), "trim", 0.006)
+            room.box(front, place, (broad_m, thick_m, height_m + REVEAL_M), material, 0.006)
         size = (2 * (inner_m + broad_m), thick_m, broad_m)
-        room.box(front, (0, thick_m / 2, height_m + REVEAL_M), size, "trim", 0.006, group=CEILING_GROUP)
+        room.box(front, (0, thick_m / 2, height_m + REVEAL_M), size, material, 0.006, group=CEILING_GROUP)
 
 
 def _title(at: Frame) -> str:

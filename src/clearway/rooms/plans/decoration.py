@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,11 +17,13 @@ SLOT_M = 1.3  # of wall for one thing
 LEAST_M = 0.45
 MOST_WINDOWS = 5
 MOST_WINDOWS_A_ROOM = 2  # where the plan has walls
+WINDOWS_A_ROOM = (1, 2, 2, 3)  # at most, where it names its furniture
 DOOR_M = 1.05  # of a stretch, SPARE_M aside, that a door takes
 FRONT_DOOR_M = 0.74  # the same where the plan has walls: they go on beyond a stretch, by GAP of a cell
 MOST_BEHIND_M = 1.3  # a piece of furniture higher than this hides what hangs behind it
 LAMP_FLOOR_M2 = 7.0  # that one ceiling lamp lights
 MOST_LAMPS = 16
+PENDANT_M = 2.05  # height of a hanging lamp's rim
 COVER_M = 0.02
 ROUNDS = 10  # of k-means
 CURTAIN_ROOM_M = 0.3  # nearer than that, a camera would look through curtains, and see nothing but lawn
@@ -38,6 +40,9 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
     entrance, windows, most = _entrance(layout), Counter[int](), MOST_WINDOWS
     if layout.has_walls:
         most = MOST_WINDOWS_A_ROOM
+    panes = 2
+    if layout.has_named_furniture:
+        most, panes = int(room.rng.choice(WINDOWS_A_ROOM)), int(room.rng.integers(1, 4))
     for stretch in layout.stretches:
         top_m = 0.0 if stretch.piece is None else tops_m[stretch.piece]
         if top_m > MOST_BEHIND_M:
@@ -50,7 +55,7 @@ def decorate(room: Room, layout: Layout, tops_m: Sequence[float]) -> None:
                 openings.door(room, at)
                 doors += 1
             elif window_here and usable_m > 0.7 and (room.rng.random() < 0.6 or not in_room):
-                _window(room, at, usable_m, top_m, between_walls=layout.has_walls)
+                _window(room, at, usable_m, top_m, panes, between_walls=layout.has_walls)
                 windows[stretch.room] += 1
             elif stretch.area is not None and stretch.area.use == "bathroom":
                 _hang_in_bathroom(room, at, usable_m, top_m)
@@ -81,7 +86,7 @@ def _slots(stretch: Stretch) -> list[tuple[Frame, float]]:
     return [(stretch.at.moved((number - (count - 1) / 2) * length_m, 0), length_m) for number in range(count)]
 
 
-def _window(room: Room, at: Frame, usable_m: float, top_m: float, *, between_walls: bool) -> None:
+def _window(room: Room, at: Frame, usable_m: float, top_m: float, panes: int, *, between_walls: bool) -> None:
     """A window over furniture, or with curtains down to the floor; between walls inside they do not reach beyond it."""
     sill_m = max(0.9, top_m + 0.12)
     width_m, curtains = min(usable_m, 1.5), top_m == 0
@@ -89,7 +94,7 @@ def _window(room: Room, at: Frame, usable_m: float, top_m: float, *, between_wal
         room_m = usable_m - 2 * openings.CURTAIN_REACH_M + SPARE_M
         curtains = curtains and room_m > 0.55
         width_m = min(width_m, room_m) if curtains else width_m
-    openings.window(room, at.moved(0, 0, sill_m), width_m, 2.15 - sill_m, curtains=curtains)
+    openings.window(room, at.moved(0, 0, sill_m), width_m, 2.15 - sill_m, curtains, panes)
 
 
 def _hang(room: Room, at: Frame, usable_m: float, top_m: float) -> None:
@@ -123,8 +128,27 @@ def _hang_lamps(room: Room, layout: Layout) -> None:
         floor_m2 = len(places_m) * layout.cell_size_m**2
         count = int(np.clip(round(floor_m2 / LAMP_FLOOR_M2), 1, MOST_LAMPS))
         power = 1.1 * float(np.clip(np.sqrt(floor_m2 / LAMP_FLOOR_M2), 0.6, 1.0)) if layout.has_walls else 1.1
+        hang = _lamp_of_a_room(room, power) if layout.has_named_furniture else None
         for x_m, y_m in _spread(places_m, min(count, len(places_m))):
-            lamps.ceiling_lamp(room, Frame(float(x_m), float(y_m)), 0.24, power)
+            at = Frame(float(x_m), float(y_m))
+            if hang is None:
+                lamps.ceiling_lamp(room, at, 0.24, power)
+            else:
+                hang(at)
+
+
+def _lamp_of_a_room(room: Room, power: float) -> Callable[[Frame], None]:
+    """What hangs a lamp of the kind and colour that all lamps of a room have; its generator chooses."""
+    colour = (lamps.WARM, lamps.NEUTRAL, lamps.COOL)[int(room.rng.integers(3))]
+    kind, size_m = int(room.rng.integers(4)), float(room.rng.uniform(0.2, 0.3))
+    metal = str(room.rng.choice(("black", "brass", "white", "chrome")))
+    if kind == 0:
+        return lambda at: lamps.ceiling_lamp(room, at, size_m, power, colour)
+    if kind == 1:
+        return lambda at: lamps.ceiling_panel(room, at, 2 * size_m, power, colour)
+    if kind == 2:
+        return lambda at: lamps.shade_lamp(room, at, power, colour)
+    return lambda at: lamps.pendant(room, at, PENDANT_M, metal, power, colour)
 
 
 def _spread(places_m: np.ndarray, count: int) -> list[np.ndarray]:
@@ -141,4 +165,5 @@ def _cover_walls(room: Room, layout: Layout) -> None:
     for wall in layout.walls:
         width_m, depth_m = wall.x_max_m - wall.x_min_m, wall.y_max_m - wall.y_min_m
         middle = Frame((wall.x_min_m + wall.x_max_m) / 2, (wall.y_min_m + wall.y_max_m) / 2)
-        room.box(middle, (0, 0, room.height_m), (width_m, depth_m, COVER_M), "trim", segments=0)
+        material = "beyond" if wall in layout.beyond else "trim"
+        room.box(middle, (0, 0, room.height_m), (width_m, depth_m, COVER_M), material, segments=0)

@@ -16,6 +16,7 @@ from clearway.rooms.plans.walls import GAP
 from clearway.rooms.room import Room
 from clearway.rooms.shell import SIDES, Face, Finish, wall_size_m
 from clearway.rooms.surfaces import PIXELS_PER_METRE, pixels
+from clearway.scenes.floor_plans import Area
 
 RUG_M = (2.2, 1.6)
 WET = {"bathroom": 0.2, "kitchen": 0.15}  # uses with tiled walls, and the height of a tile there, metres
@@ -29,13 +30,35 @@ def finish_of(room: Room, layout: Layout) -> Finish:
     longest = "south" if room.width_m >= room.depth_m else "west"
     if (layout.area_map >= 0).any():
         floor, ceiling = _floor_by_area(room, layout), finishes.plain_ceiling(room)
-        papers = [finishes.aged(room, longest, _paper(room, longest, area.use)) for area in layout.areas]
+        firsts = _first_of_each_room(layout.areas)
+        own = {
+            first: finishes.aged(room, longest, _paper(room, longest, layout.areas[first].use))
+            for first in sorted(set(firsts))
+        }
+        papers = [own[first] for first in firsts]
         walls = {side: _papered_by_area(room, side, papers, layout) for side in SIDES}
         return Finish(floor, ceiling, walls, papers[0], [papers[_area_before(face, layout)] for face in layout.faces])
     walls = {side: finishes.aged(room, side, _wall(room, side)) for side in SIDES}
     floor = _with_rug(room, _floor(room), _roomiest_m(layout), layout)
     ceiling, inner = finishes.plain_ceiling(room), finishes.aged(room, longest, _wall(room, longest))
     return Finish(floor, ceiling, walls, inner, [inner] * len(layout.faces))
+
+
+def _first_of_each_room(areas: Sequence[Area]) -> list[int]:
+    """For each area the first one that it is a room with: rectangles of one use that touch."""
+    firsts = list(range(len(areas)))
+    for number, area in enumerate(areas):
+        for other, before in enumerate(areas[:number]):
+            if before.use == area.use and _touch(before, area):
+                one, same = firsts[number], firsts[other]
+                firsts = [min(one, same) if first in (one, same) else first for first in firsts]
+    return firsts
+
+
+def _touch(one: Area, other: Area) -> bool:
+    """Whether cells of two areas lie side by side."""
+    gaps = [max(other.low[axis] - one.high[axis], one.low[axis] - other.high[axis]) for axis in (0, 1)]
+    return max(gaps) == 1 and min(gaps) <= 0
 
 
 def _paper(room: Room, side: str, use: str) -> np.ndarray:

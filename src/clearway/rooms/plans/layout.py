@@ -1,7 +1,7 @@
 """Where the walls, the furniture and the thin partitions of a floor plan's room stand. Pure geometry, no MuJoCo.
 
-A plan that names its walls is built as it is (`cell_map`): walls and doors where it says, furniture on every other
-blocked cell that can be seen.
+A plan that names its walls is built as it is (`cell_map`): walls, doors and furniture where it says, any furniture on
+every other blocked cell that can be seen.
 
 Any other plan gets a rim of blocked cells at one or both ends of each axis, so that furniture stands along those walls
 and the others are bare. A blocked area that is open to the border and wide (OUTSIDE_M) is not part of the room: walls
@@ -34,7 +34,7 @@ from clearway.rooms.plans.walls import (
     solid_parts,
 )
 from clearway.rooms.shell import SIDES, Column, Face
-from clearway.scenes.floor_plans import Area, FloorPlan
+from clearway.scenes.floor_plans import Area, FloorPlan, Furnishing
 
 PARTITION_THICKNESS = 0.1  # cells
 PARTITION_HEIGHT_M = 1.15
@@ -59,6 +59,7 @@ class Piece:
         back_at_wall: a wall is behind all of it.
         room: number of the room that it stands in, where the plan has walls; else 0.
         area: of the plan that its middle lies in, if any.
+        kind: of furniture that the plan names; None where any will do.
     """
 
     at: Frame
@@ -67,6 +68,7 @@ class Piece:
     back_at_wall: bool
     room: int = 0
     area: Area | None = None
+    kind: str | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,8 @@ class Layout:
         first_cell: x and z of the map's cell (0, 0), in the plan's numbers.
         free: (X, Z) bool map with its rim, the cells that can be entered.
         walls: solid parts inside the floor's rectangle, up to the ceiling.
+        beyond: those of them that are more than a cell away from every room, where the plan says where walls are: what
+            is outside of a flat that fills no rectangle.
         partitions: on the blocked edges.
         pieces: of furniture.
         stretches: of wall.
@@ -121,6 +125,7 @@ class Layout:
     first_cell: tuple[int, int]
     free: np.ndarray
     walls: tuple[Column, ...]
+    beyond: tuple[Column, ...]
     partitions: tuple[Column, ...]
     pieces: tuple[Piece, ...]
     stretches: tuple[Stretch, ...]
@@ -131,6 +136,11 @@ class Layout:
     doorways: tuple[Doorway, ...]
     areas: tuple[Area, ...]
     area_map: np.ndarray
+
+    @property
+    def has_named_furniture(self) -> bool:
+        """Whether the plan names furniture, as generated ones do."""
+        return any(piece.kind is not None for piece in self.pieces)
 
     def area_at(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """The numbers of the areas at places of the floor, see `area_map`."""
@@ -151,11 +161,15 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
     size_m = plan.cell_size_m
     cells = cell_map(plan) if plan.has_walls else _map_with_rim(plan, rng)
     shortest, longest = (cells_of(length_m, size_m, 1) for length_m in PIECE_LENGTHS_M)
+    open_to_choice = ~cells.free & ~cells.solid
+    named = _named_boxes(plan, cells)
+    for i0, j0, i1, j1 in named:
+        open_to_choice[i0:i1, j0:j1] = False
     boxes = [
         part
-        for box in rectangles(~cells.free & ~cells.solid, cells_of(PIECE_DEPTH_M, size_m, 1))
+        for box in rectangles(open_to_choice, cells_of(PIECE_DEPTH_M, size_m, 1))
         for part in cut(box, shortest, longest, rng)
-    ]
+    ] + list(named)
     owners = np.where(cells.free, FREE, OUTSIDE)
     for number, (i0, j0, i1, j1) in enumerate(boxes):
         owners[i0:i1, j0:j1] = number
@@ -163,8 +177,15 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
     x_m, z_m = ((cell - 0.5 - GAP) * size_m for cell in cells.first_cell)
     blocked_edges = plan.blocked_edges.astype(np.int64) - np.array(cells.first_cell)
     parts = solid_parts(cells.solid, ~cells.solid if plan.has_walls else cells.free)
+    beyond = _beyond_rooms(cells.solid) if plan.has_walls else np.zeros_like(parts)
+    walls, far_walls = columns_of(parts & ~beyond, size_m), columns_of(parts & beyond, size_m)
     pieces = tuple(
-        replace(_piece(box, owners, size_m, plan.has_walls), room=_room(box, cells), area=_area(box, cells, plan))
+        replace(
+            _piece(box, owners, size_m, plan.has_walls, named[box].front if box in named else None),
+            room=_room(box, cells),
+            area=_area(box, cells, plan),
+            kind=named[box].kind if box in named else None,
+        )
         for box in boxes
     )
     return Layout(
@@ -174,7 +195,8 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
         cell_size_m=size_m,
         first_cell=cells.first_cell,
         free=cells.free,
-        walls=columns_of(parts, size_m),
+        walls=walls + far_walls,
+        beyond=far_walls,
         partitions=tuple(_partition(one, other, size_m) for one, other in blocked_edges),
         pieces=pieces,
         stretches=_stretches(cells, owners, pieces, plan),
@@ -186,6 +208,12 @@ def lay_out(plan: FloorPlan, rng: np.random.Generator) -> Layout:
         areas=plan.areas,
         area_map=_area_map(cells, plan),
     )
+
+
+def _beyond_rooms(solid: np.ndarray) -> np.ndarray:
+    """Which thirds of (X, Z) cells, (3 X, 3 Z) bool, are in solid cells that touch no others, not at a corner."""
+    touched = ndimage.binary_dilation(~solid, np.ones((3, 3), bool))
+    return np.repeat(np.repeat(~touched, 3, axis=0), 3, axis=1)
 
 
 def _map_with_rim(plan: FloorPlan, rng: np.random.Generator) -> CellMap:
@@ -241,13 +269,31 @@ def _partition(one: np.ndarray, other: np.ndarray, size_m: float) -> Column:
     return Column(x_m - half_x, y_m - half_y, x_m + half_x, y_m + half_y, PARTITION_HEIGHT_M)
 
 
-def _piece(box: Box, owners: np.ndarray, size_m: float, to_walls: bool) -> Piece:
-    """The piece over a box of cells, drawn in so that nothing touches, but drawn out to walls if asked to."""
+def _named_boxes(plan: FloorPlan, cells: CellMap) -> dict[Box, Furnishing]:
+    """The furniture that a plan with walls names, by its cells on the map; what nobody could see is left out."""
+    x, z = cells.first_cell
+    boxes = {
+        (piece.low[0] - x, piece.low[1] - z, piece.high[0] - x + 1, piece.high[1] - z + 1): piece
+        for piece in (plan.furniture if plan.has_walls else ())
+    }
+    return {
+        (i0, j0, i1, j1): piece
+        for (i0, j0, i1, j1), piece in boxes.items()
+        if min(i0, j0) >= 0 and i1 <= cells.free.shape[0] and j1 <= cells.free.shape[1]
+        if not cells.solid[i0:i1, j0:j1].any()
+    }
+
+
+def _piece(box: Box, owners: np.ndarray, size_m: float, to_walls: bool, front: str | None = None) -> Piece:
+    """The piece over a box of cells, drawn in so that nothing touches, but drawn out to walls if asked to.
+
+    Without a `front` it looks to where most cells are free.
+    """
     beyond = {side: _beyond(box, owners, side) for side in SIDES}
     free = {side: int((cells == FREE).sum()) for side, cells in beyond.items()}
     walled = {side: bool((cells == OUTSIDE).all()) for side, cells in beyond.items()}
     at_rest = next((side for side in SIDES if walled[side]), "south")
-    front = max(SIDES, key=lambda side: (free[side], side == OPPOSITE[at_rest]))
+    front = front or max(SIDES, key=lambda side: (free[side], side == OPPOSITE[at_rest]))
     i0, j0, i1, j1 = box
     lines = {"west": i0, "south": j0, "east": i1, "north": j1}
     edge_m = {}

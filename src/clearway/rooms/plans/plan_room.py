@@ -6,9 +6,11 @@ import zlib
 
 import numpy as np
 
+from clearway.rooms.daytime import draw_daytime
 from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.furniture import openings
 from clearway.rooms.light import bake
+from clearway.rooms.materials import mixed_colours
 from clearway.rooms.obstacles import AgentShape, Obstacles, collision_model
 from clearway.rooms.plans.buildable import check_can_be_rendered
 from clearway.rooms.plans.decoration import decorate
@@ -24,7 +26,8 @@ from clearway.scenes.grid import neighbour_pairs
 HEIGHT_M = 2.6
 AGENT_RADIUS = 0.35  # cells: less than to a partition, more than half of what is open between two pieces
 CLEARANCE = 0.02  # cells
-LAYOUT_STREAM = 3  # of random numbers, beside the room's own
+LAYOUT_STREAM, MOOD_STREAM = 3, 4  # of random numbers, beside the room's own
+DOOR_FRAMES = ("wood", "oak", "pine", "walnut", "cream", "cabinet")
 
 
 def build_plan_room(
@@ -43,9 +46,16 @@ def build_plan_room(
         SceneError: the plan's cells, their number or its extent are no room's, or the seed is negative.
     """
     check_can_be_rendered(plan, seed)
-    layout = lay_out(plan, np.random.default_rng([seed, zlib.crc32(plan.name.encode()), LAYOUT_STREAM]))
+    layout_rng, mood_rng = (
+        np.random.default_rng([seed, zlib.crc32(plan.name.encode()), stream]) for stream in (LAYOUT_STREAM, MOOD_STREAM)
+    )
+    layout = lay_out(plan, layout_rng)
     first_m = (0.5 + GAP) * plan.cell_size_m
+    door_frame = "trim"
     room = Room(plan.name, layout.width_m, layout.depth_m, HEIGHT_M, (first_m, first_m), seed, looks, detail=detail)
+    if layout.has_named_furniture:
+        room.daytime, room.colours = draw_daytime(mood_rng), mixed_colours(mood_rng)
+        door_frame = str(mood_rng.choice(DOOR_FRAMES))
     columns = layout.walls + layout.partitions
     add_walls(room, columns)
     if looks:
@@ -54,7 +64,7 @@ def build_plan_room(
         if layout.has_walls:
             add_faces(room, layout.faces, layout.cornices, layout.walls, finish)
     for doorway in layout.doorways:
-        openings.doorway(room, doorway.at, doorway.width_m, doorway.depth_m, DOOR_HEIGHT_M, LINING_M)
+        openings.doorway(room, doorway.at, doorway.width_m, doorway.depth_m, DOOR_HEIGHT_M, LINING_M, door_frame)
     tops_m = furnish(room, layout.pieces, first_m)
     decorate(room, layout, tops_m)
     cells, edges = open_plan(room, layout)
