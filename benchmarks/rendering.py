@@ -12,6 +12,7 @@ process and of two that run side by side (the sum). MiniWorld is measured where 
     build        layout, textures, furniture
     bake         the light: rays, light maps, colours of furniture
     compile      MuJoCo's compiler
+    hall         a plan of 85 cells; a room, a flat: the first ones of `clearway scenes generate --split train --seed 0`
     full, small  the room's `Detail`;  fast: `View.fast`
     update, render, read, rest   mjv_updateScene, mjr_render, mjr_readPixels (Mesa's software rasteriser fills triangles
                  only when somebody asks for pixels: "read" is most of the drawing), Python and numpy
@@ -36,6 +37,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from clearway.choices import PlanKind
+from clearway.generation.plans import generated_plan
+from clearway.generation.request import Request
 from clearway.rooms import camera
 from clearway.rooms.camera import View, first_person_view
 from clearway.rooms.detail import FULL, SMALL, Detail
@@ -78,13 +82,19 @@ def medians(rows: Sequence[Row]) -> Row:
     return {key: statistics.median(row[key] for row in rows) for key in rows[0]}
 
 
-def build_costs(detail: Detail, seed: int) -> Row:
+def plans_of(number: int) -> dict[str, FloorPlan]:
+    """The hall, and a generated room and flat."""
+    kinds: tuple[PlanKind, ...] = ("room", "flat")
+    return {"hall": hall(), **{f"a {kind}": generated_plan(Request(kind, "train", 0, number)) for kind in kinds}}
+
+
+def build_costs(detail: Detail, plan: FloorPlan, seed: int) -> Row:
     """Seconds of each stage of one room."""
     spent, bake = [], plan_room.bake
     plan_room.bake = lambda room, **options: spent.append(used(lambda: bake(room, **options)))
     made = []
     try:
-        whole = used(lambda: made.append(build_plan_room(hall(), seed, detail=detail)))
+        whole = used(lambda: made.append(build_plan_room(plan, seed, detail=detail)))
     finally:
         plan_room.bake = bake
     compiled = used(lambda: made[0][0].spec.compile())
@@ -340,10 +350,11 @@ def main() -> None:
     if missing := [name for name in ("LP_NUM_THREADS", "OMP_NUM_THREADS") if os.environ.get(name) != "1"]:
         parser.error(f"set {' and '.join(missing)} to 1, or processes disturb each other")
     built = defaultdict(list)
-    build_costs(FULL, options.seed)
+    build_costs(FULL, hall(), options.seed)
     for number in range(options.repeats):
-        for name, detail in DETAILS.items():
-            built[name].append(build_costs(detail, options.seed + number))
+        for title, plan in plans_of(number).items():
+            for name, detail in DETAILS.items():
+                built[f"{title}, {name}"].append(build_costs(detail, plan, options.seed + number))
     rooms = rooms_of(options.seed)
     pictures: dict[str, Row] = {}
     for size in sizes(options.sizes):
@@ -372,7 +383,7 @@ def main() -> None:
         print(json.dumps({**machine, **report}, indent=2))
         return
     print(f"{machine['cores']} cores, load {machine['load']:.1f} at the end, MuJoCo {machine['mujoco']}\n")
-    print(table("seconds of the processor, a room of 85 cells", report["seconds"], 2))
+    print(table("seconds of the processor, a hall of 85 cells, rooms and flats as generated", report["seconds"], 2))
     print(table("pictures", report["pictures"], 2))
     print(table(f"milliseconds of a picture of {smallest[0]} x {smallest[1]}", report["what costs"], 2))
     print(table("milliseconds, pictures cut from four faces", report["cut from a cube"], 2))

@@ -40,6 +40,7 @@ ORDER = (
     {"evaluation"},
     {"live"},
     {"live_envs"},
+    {"views"},
     {"experiments"},
     {"deploy"},
     {"viz"},

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from clearway.api.generation import generate
     from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
     from clearway.api.training import TrainResult, train
+    from clearway.api.views import open_views, take_views
     from clearway.deploy.navigator import Navigator
     from clearway.errors import ClearwayError
     from clearway.learn.a2c import A2C
@@ -33,6 +34,8 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "load_scenes": "clearway.api.scenes",
     "build_room": "clearway.api.scenes",
     "generate": "clearway.api.generation",
+    "take_views": "clearway.api.views",
+    "open_views": "clearway.api.views",
     "encode_scenes": "clearway.api.scenes",
     "Reward": "clearway.reward",
     "make_env": "clearway.api.environments",
@@ -81,6 +84,8 @@ __all__ = [
     "load_scene",
     "load_scenes",
     "make_env",
+    "open_views",
+    "take_views",
     "train",
 ]
 

@@ -26,6 +26,7 @@ COMMANDS = {
     "demo",
     "scenes build",
     "scenes generate",
+    "scenes views",
     "scenes import thor-v1",
     "scenes import floor-plan",
     "scenes import images",

@@ -12,10 +12,14 @@ from clearway.generation.request import Request
 from clearway.live.around import RoomAround
 from clearway.live.body import Body
 from clearway.live.live_room import live_room, live_room_named
+from clearway.rooms.build import build_floor_plan
+from clearway.rooms.camera import first_person_view
+from clearway.rooms.render import render
 from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.scene import Provenance
 from helpers.made import corridor_scene
+from helpers.plan_maps import plan_of
 
 
 def test_a_scene_that_is_no_room_of_ours_is_refused():
@@ -68,6 +72,17 @@ def test_a_generated_room_is_one_to_walk_in_and_another_plan_is_not_taken_for_it
     moves[0, Action.MOVE_FORWARD] = BLOCKED if moves[0, Action.MOVE_FORWARD] != BLOCKED else 0
     with pytest.raises(SceneError, match="are not those of a floor plan"):
         live_room(replace(scene, graph=moves))
+
+
+def test_the_camera_sees_the_room_in_the_detail_of_the_scene():
+    scene = build_floor_plan(plan_of("nook", ("..#", "#..")), 1, size_px=(30, 40), workers=1)
+    assert scene.made_by.notes["detail"] == "small"
+    live = live_room(scene)
+    view = first_person_view(live.scene.locations_m, scene.headings_deg, height_px=30, width_px=40)
+    seen = render(live.model, view, workers=1)
+    assert np.abs(seen.astype(int) - scene.observations).mean() < 0.1
+    unrecorded = live_room(replace(scene, made_by=replace(scene.made_by, notes={})))
+    assert unrecorded.model.mesh_facenum.sum() > 1.4 * live.model.mesh_facenum.sum()
 
 
 @pytest.mark.slow

@@ -5,15 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clearway.errors import SceneError
 from clearway.rooms.camera import first_person_view
-from clearway.rooms.detail import FULL, SMALL, Detail
+from clearway.rooms.detail import FULL, SMALL, Detail, detail_for, recorded_detail
 from clearway.rooms.draw import draw_parts
 from clearway.rooms.frame import Frame
 from clearway.rooms.pieces import FIXED
+from clearway.rooms.plans import plan_room
 from clearway.rooms.plans.plan_room import build_plan_room
 from clearway.rooms.render import render
 from clearway.rooms.room import Room
-from helpers.plan_maps import ISLAND, plan_of
+from clearway.scenes.floor_plans import Area
+from helpers.plan_maps import ISLAND, plan_of, walled
 
 
 def room_of(detail: Detail) -> Room:
@@ -66,3 +69,43 @@ def test_small_pictures_of_a_plan_look_the_same_in_small_detail():
     coarse = [some.reshape(len(some), 12, 8, 16, 8, 3).mean(axis=(2, 4)) for some in pictures]
     assert np.abs(coarse[0] - coarse[1]).mean() < 5
     assert np.abs(pictures[0].mean(axis=(1, 2, 3)) - pictures[1].mean(axis=(1, 2, 3))).max() < 5
+
+
+def mean_colour(room: Room, material: str) -> np.ndarray:
+    """Of its picture, 0 to 255; black where it has none."""
+    texture = room.spec.texture(f"{material} texture")
+    return np.zeros(3) if texture is None else np.frombuffer(texture.data, np.uint8).reshape(-1, 3).mean(axis=0)
+
+
+@pytest.mark.parametrize(
+    ("plan", "seed"),
+    [
+        (plan_of("island", ISLAND), 1),
+        (walled(areas=(Area("bathroom", (1, 1), (3, 3)), Area("kitchen", (5, 1), (7, 3)))), 0),
+    ],
+)
+def test_a_room_in_small_detail_is_made_by_the_same_draws(monkeypatch, plan, seed):
+    monkeypatch.setattr(plan_room, "bake", lambda room, **options: None)  # which draws for every texel
+    full, small = (build_plan_room(plan, seed, detail=detail)[0] for detail in (FULL, SMALL))
+    for stream in ("rng", "layout_rng"):
+        assert getattr(full, stream).bit_generator.state == getattr(small, stream).bit_generator.state
+    assert [part.material for part in full.parts] == [part.material for part in small.parts]
+    assert np.allclose([part.position_m for part in full.parts], [part.position_m for part in small.parts])
+    for name in {part.material for part in full.parts if part.material}:
+        assert np.array_equal(full.tint_of(name), small.tint_of(name))
+        assert np.allclose(mean_colour(full, name), mean_colour(small, name), atol=4), name
+    for one, other in zip(full.surfaces, small.surfaces, strict=True):
+        assert one.name == other.name
+        assert [-(-side // 2) for side in one.albedo.shape[:2]] == list(other.albedo.shape[:2])
+        assert np.abs(one.albedo.mean(axis=(0, 1)) - other.albedo.mean(axis=(0, 1))).max() < 0.01
+
+
+def test_the_height_of_pictures_decides_the_detail_and_a_record_tells_it():
+    assert [detail_for(height_px) for height_px in (96, 128, 129, 300)] == ["small", "small", "full", "full"]
+    assert recorded_detail("hall", {"detail": "small"}) == SMALL
+    assert recorded_detail("hall", {}) == recorded_detail("hall", {"detail": "full"}) == FULL
+    for odd in ("huge", 3, None, ["small"]):
+        with pytest.raises(
+            SceneError, match=r"hall: its room has the detail .*knows full, small\. Make the scene again"
+        ):
+            recorded_detail("hall", {"detail": odd})

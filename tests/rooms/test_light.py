@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from clearway.rooms.frame import Frame, along, compose, rotation, turn
 from clearway.rooms.light import bake
-from clearway.rooms.occupancy import VOXEL_M, occupancy_of
+from clearway.rooms.occupancy import VOXEL_M, chessboard_distance, occupancy_of
 from clearway.rooms.parts import Lamp
 from clearway.rooms.room import Room
 from clearway.rooms.shell import SIDES, Finish, add_surfaces, wall_size_m
@@ -57,6 +58,29 @@ def test_rays_stop_where_they_have_come_far_enough():
     assert to_wall == solid.distance_m(start, ray)[0] == pytest.approx(3.0, abs=1.5 * VOXEL_M)
     assert 1.0 <= short < to_wall
     assert 0.2 <= shorter <= short
+
+
+def test_distances_are_those_of_a_chess_king():
+    rng = np.random.default_rng(0)
+    for shape, share in (((12, 9, 7), 0.05), ((5, 30, 4), 0.01), ((1, 3, 8), 0.3)):
+        solid = rng.random(shape) < share
+        solid[0, 0, 0] = True
+        assert np.array_equal(chessboard_distance(solid), ndimage.distance_transform_cdt(~solid, "chessboard"))
+
+
+def test_turned_and_tilted_parts_fill_the_voxels_within_them():
+    for tilt, yaw_deg in (((1.0, 0.0, 0.0, 0.0), 30.0), (turn("x", 25), 70.0)):
+        room = empty_room()
+        room.box(Frame(2.0, 1.5, yaw_deg), (0, 0, 0.5), (1.2, 0.4, 0.6), "white", tilt=tilt)
+        room.cylinder(Frame(1.0, 0.8, yaw_deg), (0, 0, 0.4), 0.3, 0.9, "white", tilt=tilt)
+        solid = occupancy_of((4.0, 3.0, 2.4), room.parts)
+        places = (np.indices((100, 75, 60)).reshape(3, -1).T + 0.5) * VOXEL_M
+        inside = np.zeros(len(places), bool)
+        for part in room.parts:
+            local = (places - part.centre_m) @ part.rotation / part.half_extents_m
+            filled = np.abs(local).max(axis=1) <= 1
+            inside |= filled & ((local[:, :2] ** 2).sum(axis=1) <= 1) if part.round else filled
+        assert np.array_equal(solid.is_solid(places), inside) and inside.sum() > 4000
 
 
 def test_light_passes_glass_and_fills_a_thin_board():

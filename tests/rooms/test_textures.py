@@ -9,41 +9,44 @@ from clearway.rooms import artwork, textures
 
 DARK, LIGHT = (0.4, 0.25, 0.15), (0.7, 0.5, 0.3)
 SURFACES = {
-    "wood": lambda rng: textures.wood(rng, 96, 128, DARK, LIGHT),
-    "planks": lambda rng: textures.planks(rng, 96, 128, 6, DARK, LIGHT),
-    "parquet": lambda rng: textures.parquet(rng, 96, 96, 4, DARK, LIGHT),
-    "tiles": lambda rng: textures.tiles(rng, 96, 96, 4, 4, LIGHT, DARK),
-    "chessboard": lambda rng: textures.tiles(rng, 96, 96, 4, 4, LIGHT, DARK, second=(0.1, 0.1, 0.1)),
-    "fabric": lambda rng: textures.fabric(rng, 96, 96, LIGHT),
-    "striped": lambda rng: textures.striped(rng, 96, 96, LIGHT, DARK),
-    "pile": lambda rng: textures.pile(rng, 96, 96, LIGHT, DARK),
-    "plaster": lambda rng: textures.plaster(rng, 96, 96, LIGHT),
-    "stone": lambda rng: textures.stone(rng, 96, 96, LIGHT),
-    "brushed": lambda rng: textures.brushed(rng, 96, 96, LIGHT),
-    "wicker": lambda rng: textures.wicker(rng, 96, 96, LIGHT),
+    "wood": lambda rng, step: textures.wood(rng, 96, 128, DARK, LIGHT, step=step),
+    "planks": lambda rng, step: textures.planks(rng, 96, 128, 6, DARK, LIGHT, step=step),
+    "parquet": lambda rng, step: textures.parquet(rng, 96, 96, 4, DARK, LIGHT, step=step),
+    "tiles": lambda rng, step: textures.tiles(rng, 96, 96, 4, 4, LIGHT, DARK, step=step),
+    "chessboard": lambda rng, step: textures.tiles(rng, 96, 96, 4, 4, LIGHT, DARK, second=(0.1, 0.1, 0.1), step=step),
+    "fabric": lambda rng, step: textures.fabric(rng, 96, 96, LIGHT, step=step),
+    "striped": lambda rng, step: textures.striped(rng, 96, 96, LIGHT, DARK, step=step),
+    "pile": lambda rng, step: textures.pile(rng, 96, 96, LIGHT, DARK, step=step),
+    "plaster": lambda rng, step: textures.plaster(rng, 96, 96, LIGHT, step=step),
+    "stone": lambda rng, step: textures.stone(rng, 96, 96, LIGHT, step=step),
+    "brushed": lambda rng, step: textures.brushed(rng, 96, 96, LIGHT, step=step),
+    "wicker": lambda rng, step: textures.wicker(rng, 96, 96, LIGHT, step=step),
     **{
-        f"{pattern} paper": lambda rng, pattern=pattern: textures.wallpaper(rng, 96, 96, LIGHT, DARK, pattern, 3)
+        f"{pattern} paper": lambda rng, step, pattern=pattern: textures.wallpaper(
+            rng, 96, 96, LIGHT, DARK, pattern, 3, step=step
+        )
         for pattern in textures.WALLPAPERS
     },
 }
 PICTURES = {
-    "outdoor": lambda rng: artwork.outdoor(rng, 96, 128),
-    "painting": lambda rng: artwork.painting(rng, 96, 128),
-    "books": lambda rng: artwork.books(rng, 64, 128),
-    "clock": lambda rng: artwork.clock(rng, 64),
-    "screen": lambda rng: artwork.screen(rng, 64, 96),
+    "outdoor": lambda rng, step: artwork.outdoor(rng, 96, 128, step=step),
+    "painting": lambda rng, step: artwork.painting(rng, 96, 128, step=step),
+    "books": lambda rng, _: artwork.books(rng, 64, 128),
+    "clock": lambda rng, _: artwork.clock(rng, 64),
+    "screen": lambda rng, _: artwork.screen(rng, 64, 96),
     **{
-        f"{pattern} rug": lambda rng, pattern=pattern: artwork.rug(rng, 96, 128, LIGHT, DARK, pattern)
+        f"{pattern} rug": lambda rng, step, pattern=pattern: artwork.rug(rng, 96, 128, LIGHT, DARK, pattern, step=step)
         for pattern in artwork.RUGS
     },
 }
 ALL = SURFACES | PICTURES
+STEPPED = [name for name in ALL if name not in ("books", "clock", "screen")]
 SMOOTH = ("fabric", "plaster", "stone", "pile", "stripes paper", "damask paper", "dots paper")
 OF_TWO_COLOURS = ("striped", *(name for name in ALL if name.endswith((" paper", " rug"))))
 
 
-def made(name: str, seed: int = 3) -> np.ndarray:
-    return ALL[name](np.random.default_rng(seed))
+def made(name: str, seed: int = 3, step: int = 1) -> np.ndarray:
+    return ALL[name](np.random.default_rng(seed), step)
 
 
 def share_of_dark(image: np.ndarray) -> np.ndarray:
@@ -188,7 +191,7 @@ def test_noise_is_tileable_and_centred():
 
 @pytest.mark.parametrize("name", SMOOTH)
 def test_textures_repeat_without_a_seam(name):
-    image = SURFACES[name](np.random.default_rng(1))
+    image = made(name, seed=1)
     for axis in (0, 1):
         inside = np.abs(np.diff(image, axis=axis)).mean(axis=(1 - axis, 2))
         seam = np.abs(np.take(image, 0, axis) - np.take(image, -1, axis)).mean()
@@ -209,3 +212,59 @@ def test_a_chessboard_alternates():
     )
     middles = image[10::20, 10::20, 0]
     assert np.array_equal(middles > 0.5, (np.indices((4, 4)).sum(axis=0) % 2) == 0)
+
+
+def means(image: np.ndarray, side: int) -> np.ndarray:
+    """The mean of every `side` x `side` pixels, (height / side, width / side, 3)."""
+    height, width, _ = image.shape
+    return image.reshape(height // side, side, width // side, side, 3).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_every_second_pixel_shows_the_same_picture(name):
+    for seed in range(3):
+        whole, rng = made(name, seed), np.random.default_rng(seed)
+        half = ALL[name](rng, 2)
+        assert half.shape == (whole.shape[0] // 2, whole.shape[1] // 2, 3) and half.min() >= 0 and half.max() <= 1
+        after = np.random.default_rng(seed)
+        ALL[name](after, 1)
+        assert rng.bit_generator.state == after.bit_generator.state  # what comes next is the same too
+        same, other = (np.abs(means(one, 8) - means(half, 4)).mean() for one in (whole, made(name, seed + 10)))
+        assert same < 0.016
+        assert not name.endswith(" paper") or np.abs(means(whole, 2) - half).mean() < 0.004
+        assert same < 0.6 * other or name in (*OF_TWO_COLOURS, "wicker")  # whose pattern is the same with every seed
+
+
+def test_coarser_noise_is_the_same_field_without_what_is_too_fine():
+    for exponent, stretch in ((0.3, 1.0), (1.3, 2.5), (1.7, 6.0)):
+        fields = [textures.noise(np.random.default_rng(4), 96, 128, exponent, stretch, step=step) for step in (1, 2, 4)]
+        assert [field.shape for field in fields] == [(96, 128), (48, 64), (24, 32)]
+        spectra = [np.fft.rfft2(field)[:12, 1:16] / field.size for field in fields]
+        for coarser in spectra[1:]:
+            assert np.abs(coarser - spectra[0]).mean() < 0.1 * np.abs(spectra[0]).mean()
+    uneven = textures.noise(np.random.default_rng(4), 97, 131, 1.3, step=2)
+    assert uneven.shape == (49, 66)
+
+
+@pytest.mark.parametrize(("step", "brightness"), [(1, 0.55), (2, 0.775), (4, 0.8875)])
+def test_seams_keep_their_places_and_grow_paler_instead_of_broader(step, brightness):
+    floor = textures.planks(np.random.default_rng(3), 96, 128, 6, LIGHT, LIGHT, step)
+    for seam in np.arange(0, 96, 16) // step:
+        assert np.median(floor[seam] / floor[seam + 1]) == pytest.approx(brightness)
+        assert np.median(floor[seam + 2] / floor[seam + 1]) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("bonded", [False, True])
+@pytest.mark.parametrize("side", [80, 84, 85])
+def test_no_line_of_grout_gets_lost(side, bonded):
+    whole, half = (
+        textures.tiles(
+            np.random.default_rng(0), side, side, 4, 6, (0.9,) * 3, (0.1,) * 3, 0.0, 0.0, 2, bonded, step=step
+        ).mean(axis=2)
+        for step in (1, 2)
+    )
+    dark = np.pad(whole < 0.2, ((0, side % 2), (0, side % 2)), "edge").astype(float)
+    shares = dark.reshape(len(half), 2, len(half), 2).mean(axis=(1, 3))
+    inner = slice(0, -1) if side % 2 else slice(None)
+    assert (0.9 - half)[inner, inner] == pytest.approx(0.8 * shares[inner, inner], abs=0.05)
+    assert (half < 0.6).any(axis=0).sum() > len(half) / 4

@@ -8,7 +8,7 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes import hdf5
-from clearway.scenes.thor_v1 import HDF5_VERSION
+from clearway.scenes.hdf5 import HDF5_VERSION
 
 VALUE = 0x1122334455667788  # bytes that stand nowhere else in a small file
 

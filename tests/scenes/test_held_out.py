@@ -5,6 +5,7 @@ import pytest
 
 from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
 from clearway.scenes.held_out import held_out, held_out_cells
+from helpers.made import scene_of_cells
 
 CELLS = np.argwhere(np.ones((8, 5), bool))
 
@@ -38,3 +39,14 @@ def test_all_headings_of_a_cell_are_held_out_together() -> None:
         features=None,
     )
     np.testing.assert_array_equal(held_out(other), poses[shuffled])
+
+
+def test_cells_halfway_between_whole_numbers_are_told_apart() -> None:
+    names, chosen = [f"room {number}" for number in range(40)], []
+    cells = np.stack([np.arange(10), np.zeros(10, np.int64)], axis=1)
+    for name in names:
+        scene = scene_of_cells(cells, name=name)
+        halfway = replace(scene, locations_m=scene.locations_m + 0.25)
+        np.testing.assert_array_equal(held_out(halfway), held_out(scene))
+        chosen.append(int(np.flatnonzero(held_out(halfway))[0]))
+    assert len(set(chosen)) > 7

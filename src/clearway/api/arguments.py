@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from pathlib import Path
@@ -43,6 +43,18 @@ def as_word(name: str, value: object) -> str:
     if not isinstance(value, str):
         raise ArgumentError(f"{name}={value!r:.80}: expected a word. Give a string")
     return value
+
+
+def as_size(name: str, value: object) -> tuple[int, int]:
+    """Height and width. Raises ArgumentError."""
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        raise ArgumentError(f"{name}={value!r:.80}: expected a height and a width, such as (96, 128). Give two numbers")
+    return as_whole(name, value[0], 1), as_whole(name, value[1], 1)
+
+
+def as_truth(name: str, value: object) -> bool:
+    """True or False, Python's own or NumPy's. Raises ArgumentError."""
+    return bool(_as(name, value, bool))
 
 
 def as_choice(name: str, value: object, choices: tuple[str, ...]) -> str:

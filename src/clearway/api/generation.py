@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
-from clearway.api.arguments import as_choice, as_path, as_whole, as_word
+from clearway.api.arguments import as_choice, as_path, as_size, as_whole, as_word
 from clearway.choices import PlanKind, SplitName
 from clearway.errors import ArgumentError
 from clearway.generation.request import KINDS, MAX_NUMBER, MAX_SEED, SIZE_PX, SPLITS, Request
@@ -69,7 +69,7 @@ def generate(
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"out={str(folder)!r}: a file. Give a folder")
     check_names(sensors)
-    seen = Seen(tuple(sensors), _as_size(size))
+    seen = Seen(tuple(sensors), as_size("size", size))
     seen.check()
     name = as_word("encoder", encoder)
     if name != NO_ENCODER:
@@ -83,10 +83,3 @@ def generate(
     ):
         generate_scenes(requests, folder, seen, name, encoder_seed=encoder_seed, workers=crew, ray=ray, done=show_done)
     return [scene_path(request, folder) for request in requests]
-
-
-def _as_size(size: object) -> tuple[int, int]:
-    """Height and width. Raises ArgumentError."""
-    if not isinstance(size, Sequence) or isinstance(size, str) or len(size) != 2:
-        raise ArgumentError(f"size={size!r:.80}: expected a height and a width, such as (96, 128). Give two numbers")
-    return as_whole("size", size[0], 1), as_whole("size", size[1], 1)

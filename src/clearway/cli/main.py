@@ -30,6 +30,7 @@ from clearway.cli.serve import Serve
 from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.cli.view import ViewRuns, ViewScene
+from clearway.cli.views import TakeViews
 from clearway.errors import ArgumentError, ClearwayError
 
 DESCRIPTION = (
@@ -40,7 +41,7 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build and generate rooms, import dumps, floor plans and photographs, inspect, walk through, export.
+    """Scene files: build and generate rooms, take views of them, import others, inspect, walk through, export.
 
     Example: clearway scenes inspect bathroom.h5
     """
@@ -48,6 +49,7 @@ class Scenes:
     command: (
         Annotated[Build, tyro.conf.subcommand("build")]
         | Annotated[Generate, tyro.conf.subcommand("generate")]
+        | Annotated[TakeViews, tyro.conf.subcommand("views")]
         | Annotated[ImportScenes, tyro.conf.subcommand("import")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
         | Annotated[Export, tyro.conf.subcommand("export")]

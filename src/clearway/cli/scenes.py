@@ -74,13 +74,13 @@ class Build:
 
 @dataclass(frozen=True)
 class Inspect:
-    """Say what a scene file holds, and draw its map.
+    """Say what a scene file holds, and draw its map; or what views of rooms hold, a file of them or a folder.
 
     Example: clearway scenes inspect bathroom.h5 --map bathroom.png
     """
 
     file: Annotated[Path, tyro.conf.Positional]
-    """The scene file."""
+    """The scene file, or views that clearway scenes views took."""
     map: Path | None = None
     """Write a map with the zones here (PNG)."""
     json: bool = False
@@ -90,9 +90,17 @@ class Inspect:
         """Print the figures."""
         from clearway.scenes.inspect import summary
         from clearway.scenes.thor_v1 import read_scene
+        from clearway.views.stream import views_in
+        from clearway.views.summary import are_views
+        from clearway.views.summary import summary as views_summary
         from clearway.zones import scene_zones, zone_counts
 
         check_ending(".png", map=self.map)
+        if are_views(self.file):
+            if self.map:
+                raise ClearwayError(f"{self.file}: holds views, which have no map. Leave out --map")
+            self._print(views_summary(views_in([self.file])))
+            return
         path, *others = scene_files([self.file])
         if others:
             raise ClearwayError(f"{self.file}: a folder of {1 + len(others)} scene files. Name one, such as {path}")
@@ -103,6 +111,9 @@ class Inspect:
             from clearway.viz.maps import draw_map
 
             draw_map(scene, self.map, zones=zones)
+        self._print(content)
+
+    def _print(self, content: dict[str, object]) -> None:
         if self.json:
             print_json(content)
         else:

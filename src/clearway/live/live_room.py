@@ -112,7 +112,7 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
 
     Args:
         scene: of a room of ours, a floor plan, a generated room or flat, or a MuJoCo model.
-        small: modelled less finely, for small pictures (`rooms.detail.SMALL`), as far as the room can be.
+        small: modelled less finely, for small pictures (`rooms.detail.SMALL`); else as finely as the scene was.
         loose: its furniture can be moved, and a new obstacle put into it.
 
     Raises:
@@ -190,9 +190,11 @@ def _live_plan(scene: Scene, plan: FloorPlan, seed: int, small: bool, loose: boo
     if not np.array_equal(floor_plans.plan_poses(plan)[2], scene.graph):
         raise SceneError(scene.name, "its moves are not those of its floor plan", floor_plans.REBUILD, "graph")
     check_mujoco()
+    from clearway.rooms.detail import SMALL, recorded_detail
     from clearway.rooms.plans.plan_room import agent_for, build_plan_room
 
-    room, layout = build_plan_room(plan, seed, loose=loose, detail=_detail(small))
+    detail = SMALL if small else recorded_detail(scene.name, scene.made_by.notes)
+    room, layout = build_plan_room(plan, seed, loose=loose, detail=detail)
     locations_m = scene.locations_m - np.array(layout.origin_m)
     x_m, z_m = layout.origin_m
     view = scene.top_view and replace(

@@ -1,6 +1,7 @@
 """Pictures that hang or stand in a room, as pure functions: window views, paintings, books, clocks, rugs, screens.
 
-Every function gives a (height, width, 3) float64 picture in [0, 1], row 0 at the top.
+Every function gives a (height, width, 3) float64 picture in [0, 1], row 0 at the top. With a `step` it gives every so
+many-th pixel of that picture, as those of `textures` do.
 """
 
 from __future__ import annotations
@@ -8,26 +9,31 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from clearway.rooms.textures import Colour, mix, noise
+from clearway.rooms.textures import Colour, mix, noise, stepped
 
 
-def outdoor(rng: np.random.Generator, height: int = 256, width: int = 256) -> np.ndarray:
+def outdoor(rng: np.random.Generator, height: int = 256, width: int = 256, step: int = 1) -> np.ndarray:
     """The view through a window: sky and clouds, a line of trees or roofs, a lawn."""
-    y = np.repeat(np.linspace(0, 1, height)[:, None], width, axis=1)
+    y = _downwards(height, width, step)
     sky = mix((0.45, 0.66, 0.92), (0.86, 0.92, 0.97), np.clip(y / 0.6, 0, 1))
-    clouds = np.clip((noise(rng, height, width, 1.6, stretch_y=2) - 0.52) * 5, 0, 1) * 0.8
+    clouds = np.clip((noise(rng, height, width, 1.6, stretch_y=2, step=step) - 0.52) * 5, 0, 1) * 0.8
     view = mix(sky, (0.98, 0.98, 0.98), clouds)
-    hills = 0.5 + 0.12 * (noise(rng, 1, width, 1.9)[0] - 0.5) * 2
-    far = mix((0.35, 0.48, 0.5), (0.45, 0.57, 0.55), noise(rng, height, width, 1.0))
+    hills = 0.5 + 0.12 * (noise(rng, 1, width, 1.9, step=step)[0] - 0.5) * 2
+    far = mix((0.35, 0.48, 0.5), (0.45, 0.57, 0.55), noise(rng, height, width, 1.0, step=step))
     view = np.where((y > hills[None])[..., None], far, view)
     if rng.random() < 0.45:
         view = _roofs(rng, view)
-    trees = 0.55 + 0.22 * (noise(rng, 1, width, 1.1)[0] - 0.5) * 2
-    leaves = mix((0.08, 0.16, 0.07), (0.26, 0.4, 0.17), noise(rng, height, width, 0.7))
+    trees = 0.55 + 0.22 * (noise(rng, 1, width, 1.1, step=step)[0] - 0.5) * 2
+    leaves = mix((0.08, 0.16, 0.07), (0.26, 0.4, 0.17), noise(rng, height, width, 0.7, step=step))
     view = np.where((y > trees[None])[..., None], leaves, view)
-    lawn_top = 0.66 + 0.05 * (noise(rng, 1, width, 1.5)[0] - 0.5)
-    lawn = mix((0.24, 0.36, 0.14), (0.46, 0.57, 0.28), noise(rng, height, width, 0.9))
+    lawn_top = 0.66 + 0.05 * (noise(rng, 1, width, 1.5, step=step)[0] - 0.5)
+    lawn = mix((0.24, 0.36, 0.14), (0.46, 0.57, 0.28), noise(rng, height, width, 0.9, step=step))
     return np.clip(np.where((y > lawn_top[None])[..., None], lawn, view), 0, 1)
+
+
+def _downwards(height: int, width: int, step: int) -> np.ndarray:
+    """How far down each pixel lies, 0 to 1."""
+    return np.repeat(np.linspace(0, 1, height)[::step, None], stepped(width, step), axis=1)
 
 
 def _roofs(rng: np.random.Generator, view: np.ndarray) -> np.ndarray:
@@ -46,30 +52,30 @@ def _roofs(rng: np.random.Generator, view: np.ndarray) -> np.ndarray:
     return out
 
 
-def painting(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
+def painting(rng: np.random.Generator, height: int, width: int, step: int = 1) -> np.ndarray:
     """A landscape, circles, colour blocks, a cloud of colour, a vase or a sail, on a white mount."""
     kinds = (_landscape, _circles, _blocks, _clouds, _vase, _sail)
-    picture = np.clip(kinds[int(rng.integers(len(kinds)))](rng, height, width), 0, 1)
-    border = round(0.08 * min(width, height))
-    mount = np.full((height, width, 3), 0.94)
+    picture = np.clip(kinds[int(rng.integers(len(kinds)))](rng, height, width, step), 0, 1)
+    border = round(0.08 * min(width, height) / step)
+    mount = np.full(picture.shape, 0.94)
     mount[border:-border, border:-border] = picture[border:-border, border:-border]
     return mount
 
 
-def _landscape(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
-    y = np.repeat(np.linspace(0, 1, height)[:, None], width, axis=1)
+def _landscape(rng: np.random.Generator, height: int, width: int, step: int) -> np.ndarray:
+    y = _downwards(height, width, step)
     warm = np.array([0.95, 0.75, 0.5]) + rng.normal(0, 0.05, 3)
     out = mix(warm, (0.5, 0.65, 0.85), 1 - y)
     for layer in range(5):
-        ridge = 0.4 + 0.12 * layer + 0.25 * (noise(rng, 1, width, 1.6)[0] - 0.5)
+        ridge = 0.4 + 0.12 * layer + 0.25 * (noise(rng, 1, width, 1.6, step=step)[0] - 0.5)
         colour = np.array([0.25, 0.35, 0.4]) * (1 - 0.13 * layer) + rng.random(3) * 0.18
         out = np.where((y > ridge[None])[..., None], colour, out)
     return out
 
 
-def _circles(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
-    y, x = np.mgrid[:height, :width] / height
-    out = np.ones((height, width, 3)) * (rng.random(3) * 0.3 + 0.65)
+def _circles(rng: np.random.Generator, height: int, width: int, step: int) -> np.ndarray:
+    y, x = np.mgrid[:height:step, :width:step] / height
+    out = np.ones((*y.shape, 3)) * (rng.random(3) * 0.3 + 0.65)
     for _ in range(9):
         centre, radius = rng.random(2) * [width / height, 1], 0.06 + 0.2 * rng.random()
         inside = np.hypot(x - centre[0], y - centre[1]) < radius
@@ -77,9 +83,9 @@ def _circles(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
     return out
 
 
-def _blocks(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
-    y, x = np.mgrid[:height, :width] / np.array([height, width])[:, None, None]
-    out = np.ones((height, width, 3)) * 0.92
+def _blocks(rng: np.random.Generator, height: int, width: int, step: int) -> np.ndarray:
+    y, x = np.mgrid[:height:step, :width:step] / np.array([height, width])[:, None, None]
+    out = np.ones((*y.shape, 3)) * 0.92
     colours = ((0.85, 0.2, 0.15), (0.1, 0.2, 0.5), (0.95, 0.8, 0.2), (0.95, 0.95, 0.92), (0.12, 0.12, 0.12))
     for _ in range(12):
         (left, top), (w, h) = rng.random(2) * 0.8, 0.1 + rng.random(2) * 0.4
@@ -87,13 +93,13 @@ def _blocks(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
     return out
 
 
-def _clouds(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
-    flow = mix(rng.random(3), rng.random(3), np.clip((noise(rng, height, width, 1.5) - 0.3) * 2, 0, 1))
-    return 0.7 * flow + 0.3 * mix(rng.random(3), (1, 1, 1), noise(rng, height, width, 1.5))
+def _clouds(rng: np.random.Generator, height: int, width: int, step: int) -> np.ndarray:
+    flow = mix(rng.random(3), rng.random(3), np.clip((noise(rng, height, width, 1.5, step=step) - 0.3) * 2, 0, 1))
+    return 0.7 * flow + 0.3 * mix(rng.random(3), (1, 1, 1), noise(rng, height, width, 1.5, step=step))
 
 
-def _vase(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
-    y, x = np.mgrid[:height, :width] / height
+def _vase(rng: np.random.Generator, height: int, width: int, step: int) -> np.ndarray:
+    y, x = np.mgrid[:height:step, :width:step] / height
     x = x - width / height / 2
     out = mix(rng.random(3) * 0.2 + 0.72, rng.random(3) * 0.2 + 0.6, (y > 0.78).astype(float))
     body = np.abs(x) < 0.05 + 0.08 * np.sin(np.clip((y - 0.5) / 0.36, 0, 1) * np.pi)
@@ -107,9 +113,9 @@ def _vase(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
     return out
 
 
-def _sail(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
-    y, x = np.mgrid[:height, :width] / height
-    sea = mix((0.1, 0.3, 0.45), (0.3, 0.55, 0.62), noise(rng, height, width, 0.9, stretch_y=4))
+def _sail(rng: np.random.Generator, height: int, width: int, step: int) -> np.ndarray:
+    y, x = np.mgrid[:height:step, :width:step] / height
+    sea = mix((0.1, 0.3, 0.45), (0.3, 0.55, 0.62), noise(rng, height, width, 0.9, stretch_y=4, step=step))
     out = np.where((y > 0.6)[..., None], sea, mix((0.97, 0.85, 0.7), (0.6, 0.78, 0.9), 1 - y))
     for _ in range(int(rng.integers(1, 4))):
         middle, foot, tall = rng.uniform(0.2, 0.8) * width / height, rng.uniform(0.62, 0.75), rng.uniform(0.2, 0.4)
@@ -164,16 +170,18 @@ RUGS = ("lattice", "stripes", "medallion", "chevrons")
 """Patterns of `rug`."""
 
 
-def rug(rng: np.random.Generator, height: int, width: int, colour: Colour, second: Colour, pattern: str) -> np.ndarray:
+def rug(
+    rng: np.random.Generator, height: int, width: int, colour: Colour, second: Colour, pattern: str, step: int = 1
+) -> np.ndarray:
     """A woven rug with a border; `pattern` is one of RUGS. The pattern is as large along both axes."""
-    y, x = np.mgrid[:height, :width] / min(height, width)
+    y, x = np.mgrid[:height:step, :width:step] / min(height, width)
     h, w = height / min(height, width), width / min(height, width)
     edge = np.minimum(np.minimum(x, w - x), np.minimum(y, h - y))
     share = _weave(x - w / 2, y - h / 2, pattern)
     share = np.where(edge < 0.1, 1.0, share)
     share = np.where((edge > 0.03) & (edge < 0.05), 0.0, share)
-    wool = 1 + (noise(rng, height, width, 0.3) - 0.5)[..., None] * 0.4
-    return np.clip(mix(colour, second, ndimage.gaussian_filter(share, 0.6)) * wool, 0, 1)
+    wool = 1 + (noise(rng, height, width, 0.3, step=step) - 0.5)[..., None] * 0.4
+    return np.clip(mix(colour, second, ndimage.gaussian_filter(share, 0.6 / step)) * wool, 0, 1)
 
 
 def _weave(x: np.ndarray, y: np.ndarray, pattern: str) -> np.ndarray:

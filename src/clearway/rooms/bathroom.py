@@ -51,12 +51,12 @@ def _finish(room: Room) -> Finish:
             second=(0.3, 0.33, 0.36),
         )
     covered = finishes.with_rug(room, finishes.floor_of(room, floor), (0.95, 2.7), (1.1, 0.6), "stripes")
-    walls = {side: finishes.aged(room, _wall(room, side)) for side in SIDES}
+    walls = {side: finishes.aged(room, side, _wall(room, side)) for side in SIDES}
     paint = finishes.painted_wall(room, "south", room.colours.wall)
     partition = finishes.tiled_wall(
         room, "south", paint, varied(room.rng, (0.8, 0.82, 0.8), 0.02), 1.45, _rail(room), 0.15
     )
-    return Finish(covered, finishes.plain_ceiling(room), walls, finishes.aged(room, partition), skirting=None)
+    return Finish(covered, finishes.plain_ceiling(room), walls, finishes.aged(room, "south", partition), skirting=None)
 
 
 def _wall(room: Room, side: str) -> np.ndarray:

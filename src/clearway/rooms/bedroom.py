@@ -48,8 +48,8 @@ def _finish(room: Room) -> Finish:
         "west": finishes.boarded_wall(room, "west", paint, boards, 0.6),
     }
     partition = finishes.papered_wall(room, "south", varied(room.rng, colours.wall), "damask", 0.4)
-    walls = {side: finishes.aged(room, wall) for side, wall in walls.items()}
-    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, partition))
+    walls = {side: finishes.aged(room, side, wall) for side, wall in walls.items()}
+    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, "south", partition))
 
 
 def _place_bed(room: Room) -> None:

@@ -10,6 +10,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from clearway.rooms.detail import DETAIL_NOTE, DETAILS, detail_for
 from clearway.scenes import floor_plans
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Provenance, Scene
@@ -93,7 +94,7 @@ def build_floor_plan(
         plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
         seed: with the plan's name chooses furniture, colours and textures.
         sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
-        size_px: height and width of the pictures.
+        size_px: height and width of the pictures; small ones show a room in small detail (`detail.detail_for`).
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
@@ -113,8 +114,9 @@ def build_floor_plan(
 
     locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
     check_moves(graph, plan.source or plan.name)
+    detail = detail_for(size_px[0])
     with _status(f"furnishing and lighting {plan.name}", progress):
-        room, layout = build_plan_room(plan, seed)
+        room, layout = build_plan_room(plan, seed, detail=DETAILS[detail])
         model = room.spec.compile()
     top_view = render_top_view(model, room.width_m, room.depth_m, here=here)
     x_m, z_m = layout.origin_m
@@ -131,7 +133,10 @@ def build_floor_plan(
         headings_deg=headings_deg,
         graph=graph,
         made_by=Provenance(
-            floor_plans.SOURCE, seed=seed, versions=shaping_versions(), notes=floor_plans.plan_notes(plan)
+            floor_plans.SOURCE,
+            seed=seed,
+            versions=shaping_versions(),
+            notes={**floor_plans.plan_notes(plan), DETAIL_NOTE: detail},
         ),
         cell_size_m=plan.cell_size_m,
         top_view=replace(

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+from clearway.errors import SceneError
+
+DETAIL_NOTE = "detail"  # of a scene's record
+MOST_SMALL_PX = 128  # height of pictures up to which rooms are built in small detail
 
 
 @dataclass(frozen=True)
@@ -14,6 +20,7 @@ class Detail:
         most_slices: flat sides of round shapes, at most.
         texel_m: size of a light map's texels.
         ambient_rays: rays that ask each texel's surroundings for light.
+        texture_step: pictures of surfaces, materials and artwork are made of every so many-th pixel, across and down.
         block_m: furniture that is alike is drawn together within squares of this size, so that those out of sight can
             be left out of a picture; None: within the whole room.
     """
@@ -22,6 +29,7 @@ class Detail:
     most_slices: int = 1000
     texel_m: float = 0.11
     ambient_rays: int = 24
+    texture_step: int = 1
     block_m: float | None = None
 
     def segments(self, bevel_m: float, segments: int) -> int:
@@ -32,5 +40,33 @@ class Detail:
 
 
 FULL = Detail()
-SMALL = Detail(least_bevel_m=0.02, most_slices=16, texel_m=0.16, ambient_rays=16, block_m=2.0)
-"""For pictures of about 96 x 128: a bevel of a centimetre is a pixel at one metre; nearer, edges lose their gleam."""
+SMALL = Detail(
+    least_bevel_m=0.01,
+    most_slices=16,
+    texel_m=0.16,
+    ambient_rays=12,
+    texture_step=2,
+    block_m=2.0,
+)
+"""For pictures of about 96 x 128: a bevel of a centimetre is a pixel at one metre. Panels of doors keep the edges that
+they are seen by; finer ones lose their gleam."""
+
+DETAILS = {"full": FULL, "small": SMALL}
+
+
+def detail_for(height_px: int) -> str:
+    """The name of the detail that pictures of this height are taken in."""
+    return "small" if height_px <= MOST_SMALL_PX else "full"
+
+
+def recorded_detail(scene_name: str, notes: Mapping[str, object]) -> Detail:
+    """The detail that a scene's room was built in, by the notes of its record; without one in full.
+
+    Raises:
+        SceneError: there is no such detail in this version.
+    """
+    name = notes.get(DETAIL_NOTE, "full")
+    if not isinstance(name, str) or name not in DETAILS:
+        problem = f"its room has the detail {name!r:.40}, this version knows {', '.join(DETAILS)}"
+        raise SceneError(scene_name, problem, "Make the scene again")
+    return DETAILS[name]

@@ -46,8 +46,8 @@ def _finish(room: Room) -> Finish:
     paint = finishes.painted_wall(room, "east", colours.feature_wall)
     walls["east"] = finishes.boarded_wall(room, "east", paint, WHITE)
     partition = finishes.papered_wall(room, "south", varied(room.rng, colours.wall), "trellis", 0.4)
-    walls = {side: finishes.aged(room, wall) for side, wall in walls.items()}
-    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, partition))
+    walls = {side: finishes.aged(room, side, wall) for side, wall in walls.items()}
+    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, "south", partition))
 
 
 def _place_kitchen(room: Room) -> None:

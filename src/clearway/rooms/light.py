@@ -35,6 +35,7 @@ WEAK_LIGHT = 0.003
 RAYS_AT_ONCE = 1_500_000
 OFF_SURFACE_M = 0.06
 SOURCE_SPARE_M = 0.3  # light that comes so near to its source is not shaded: lamps are solid
+SHARES = (-0.66, 0.0, 0.66)  # of half the length of a part, where its long sides are asked for light
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,17 +262,10 @@ def _through_window(windows: Sequence[Window], points_m: np.ndarray) -> np.ndarr
 
 def _brightness_of(parts: Sequence[Part], scene: _Scene, exposure: float, rng: np.random.Generator) -> np.ndarray:
     """How bright each part is drawn, (N, 3): the light on its open sides, kept between deep shade and bright."""
-    points, normals, areas, owners = [], [], [], []
-    for owner, part in enumerate(parts):
-        for point, normal, area in _samples_of(part):
-            points.append(point)
-            normals.append(normal)
-            areas.append(area)
-            owners.append(owner)
-    places, outward, owner_of = np.array(points), np.array(normals), np.array(owners)
+    owner_of, places, outward, areas = _samples_of(parts)
     open_side = ~scene.solid.is_solid(places)
     light = _irradiance(scene, places[open_side], outward[open_side], rng) * exposure
-    weight = np.array(areas)[open_side, None] + 1e-6
+    weight = areas[open_side, None] + 1e-6
     total, weights = np.zeros((len(parts), 3)), np.zeros((len(parts), 1))
     np.add.at(total, owner_of[open_side], light * weight)
     np.add.at(weights, owner_of[open_side], weight)
@@ -279,19 +273,28 @@ def _brightness_of(parts: Sequence[Part], scene: _Scene, exposure: float, rng: n
     return np.clip(FURNITURE_FLOOR + FURNITURE_GAIN * mean_light, 0.5, 1.3)
 
 
-def _samples_of(part: Part) -> list[tuple[np.ndarray, np.ndarray, float]]:
-    """Places just off the six sides of a part's box, three along its longest side: point, outward normal, area."""
-    samples = []
-    half = part.half_extents_m
-    longest = int(np.argmax(half))
-    for axis in range(3):
-        area = float(np.prod(np.delete(half, axis)))
-        for sign in (-1.0, 1.0):
-            normal = part.rotation[:, axis] * sign
-            middle = part.centre_m + normal * (half[axis] + OFF_SURFACE_M)
-            for share in (0.0,) if axis == longest else (-0.66, 0.0, 0.66):
-                samples.append((middle + part.rotation[:, longest] * half[longest] * share, normal, area))
-    return samples
+def _samples_of(parts: Sequence[Part]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Places just off the six sides of every part's box, one in the middle of its ends, three along other sides.
+
+    Returns:
+        Numbers of the parts (N,), points (N, 3), outward normals (N, 3) and areas of the sides (N,); part by part.
+    """
+    halves_m = np.array([part.half_extents_m for part in parts])  # (P, 3)
+    centres_m = np.array([part.centre_m for part in parts])
+    axes = np.array([part.rotation for part in parts]).transpose(0, 2, 1)  # (P, axis, 3)
+    longest = halves_m.argmax(axis=1)
+    numbers = np.arange(len(parts))
+    normals = axes[:, :, None] * np.array([-1.0, 1.0])[:, None]  # (P, axis, sign, 3)
+    middles_m = centres_m[:, None, None] + normals * (halves_m + OFF_SURFACE_M)[:, :, None, None]
+    along_m = axes[numbers, longest] * halves_m[numbers, longest, None]
+    points_m = middles_m[:, :, :, None] + along_m[:, None, None, None] * np.array(SHARES)[:, None]
+    areas = np.stack(
+        [halves_m[:, 1] * halves_m[:, 2], halves_m[:, 0] * halves_m[:, 2], halves_m[:, 0] * halves_m[:, 1]], axis=1
+    )
+    asked = np.ones(points_m.shape[:-1], bool)
+    asked[numbers, longest] = np.array(SHARES) == 0
+    owner, axis, sign, _ = np.nonzero(asked)
+    return owner, points_m[asked], normals[owner, axis, sign], areas[owner, axis]
 
 
 def _add_lights(room: Room) -> None:

@@ -48,8 +48,8 @@ def _finish(room: Room) -> Finish:
             room, "west", finishes.papered_wall(room, "west", colours.wall, "leaves", 0.4), colours.cabinet, 0.8
         ),
     }
-    walls = {side: finishes.aged(room, wall) for side, wall in walls.items()}
-    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, partition))
+    walls = {side: finishes.aged(room, side, wall) for side, wall in walls.items()}
+    return Finish(floor, finishes.plain_ceiling(room), walls, finishes.aged(room, "south", partition))
 
 
 def _place_sofas(room: Room) -> None:

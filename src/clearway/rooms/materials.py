@@ -102,7 +102,8 @@ class Look:
     alpha: float = 1.0
 
 
-Maker = Callable[[np.random.Generator, Colours], Look]
+Maker = Callable[[np.random.Generator, Colours, int], Look]
+"""Makes a look in a scheme of colours, its picture with a `step` as of `textures`."""
 
 
 def varied(rng: np.random.Generator, colour: Colour, amount: float = 0.03) -> Colour:
@@ -111,16 +112,16 @@ def varied(rng: np.random.Generator, colour: Colour, amount: float = 0.03) -> Co
     return float(red), float(green), float(blue)
 
 
-def look_of(name: str, rng: np.random.Generator, colours: Colours) -> Look:
-    """The look of the named material in a scheme of colours."""
-    return MAKERS[name](rng, colours)
+def look_of(name: str, rng: np.random.Generator, colours: Colours, step: int = 1) -> Look:
+    """The look of the named material in a scheme of colours; `step` as of `textures`."""
+    return MAKERS[name](rng, colours, step)
 
 
 def _wood(dark: Colour | None, light: Colour | None, specular: float = 0.2) -> Maker:
     """Wood between two colours, by default the scheme's."""
 
-    def make(rng: np.random.Generator, colours: Colours) -> Look:
-        image = textures.wood(rng, 256, 512, dark or colours.dark_wood, light or colours.light_wood)
+    def make(rng: np.random.Generator, colours: Colours, step: int) -> Look:
+        image = textures.wood(rng, 256, 512, dark or colours.dark_wood, light or colours.light_wood, step=step)
         return Look(image, size_m=(1.2, 0.6), specular=specular, shininess=0.4)
 
     return make
@@ -129,9 +130,10 @@ def _wood(dark: Colour | None, light: Colour | None, specular: float = 0.2) -> M
 def _cloth(part: str, strength: float = 0.16) -> Maker:
     """A cloth in one of the scheme's colours."""
 
-    def make(rng: np.random.Generator, colours: Colours) -> Look:
+    def make(rng: np.random.Generator, colours: Colours, step: int) -> Look:
         colour = varied(rng, getattr(colours, part))
-        return Look(textures.fabric(rng, 256, 256, colour, strength), size_m=(0.3, 0.3), specular=0.03, shininess=0.05)
+        image = textures.fabric(rng, 256, 256, colour, strength, step)
+        return Look(image, size_m=(0.3, 0.3), specular=0.03, shininess=0.05)
 
     return make
 
@@ -146,14 +148,14 @@ def _plain(
 ) -> Maker:
     """One colour without a picture."""
     look = Look(None, colour, (1.0, 1.0), specular, shininess, emission, reflectance, alpha)
-    return lambda rng, colours: look
+    return lambda rng, colours, step: look
 
 
 def _painted(colour: Colour | None, strength: float = 0.02, specular: float = 0.2, shininess: float = 0.4) -> Maker:
     """Paint or clay, by default in the scheme's cabinet colour."""
 
-    def make(rng: np.random.Generator, colours: Colours) -> Look:
-        image = textures.plaster(rng, 128, 128, colour or varied(rng, colours.cabinet, 0.02), strength)
+    def make(rng: np.random.Generator, colours: Colours, step: int) -> Look:
+        image = textures.plaster(rng, 128, 128, colour or varied(rng, colours.cabinet, 0.02), strength, step)
         return Look(image, specular=specular, shininess=shininess)
 
     return make
@@ -161,41 +163,45 @@ def _painted(colour: Colour | None, strength: float = 0.02, specular: float = 0.
 
 def _metal(colour: Colour) -> Maker:
     """Brushed metal."""
-    return lambda rng, colours: Look(
-        textures.brushed(rng, 128, 128, colour), size_m=(0.5, 0.5), specular=0.7, shininess=0.6
+    return lambda rng, colours, step: Look(
+        textures.brushed(rng, 128, 128, colour, step), size_m=(0.5, 0.5), specular=0.7, shininess=0.6
     )
 
 
-def _duvet(rng: np.random.Generator, colours: Colours) -> Look:
+def _duvet(rng: np.random.Generator, colours: Colours, step: int) -> Look:
     """A bed cover: striped or printed."""
     base, second = varied(rng, colours.accent), colours.rug_second
     if rng.random() < 0.5:
-        image = textures.striped(rng, 256, 256, second, base, 4)
+        image = textures.striped(rng, 256, 256, second, base, 4, step)
     else:
         pattern = textures.WALLPAPERS[int(rng.integers(1, len(textures.WALLPAPERS)))]
-        image = textures.wallpaper(rng, 256, 256, base, second, pattern, 3)
-        image = image * textures.fabric(rng, 256, 256, (1, 1, 1), 0.1)
+        image = textures.wallpaper(rng, 256, 256, base, second, pattern, 3, step)
+        image = image * textures.fabric(rng, 256, 256, (1, 1, 1), 0.1, step)
     return Look(np.clip(image, 0, 1), size_m=(0.8, 0.8), specular=0.03, shininess=0.05)
 
 
-def _basket(rng: np.random.Generator, colours: Colours) -> Look:
-    return Look(textures.wicker(rng, 192, 192, (0.72, 0.55, 0.34)), size_m=(0.36, 0.3), specular=0.05)
+def _basket(rng: np.random.Generator, colours: Colours, step: int) -> Look:
+    return Look(textures.wicker(rng, 192, 192, (0.72, 0.55, 0.34), step=step), size_m=(0.36, 0.3), specular=0.05)
 
 
-def _granite(rng: np.random.Generator, colours: Colours) -> Look:
+def _granite(rng: np.random.Generator, colours: Colours, step: int) -> Look:
     tone = float(rng.choice([0.2, 0.3, 0.55]))
     return Look(
-        textures.stone(rng, 256, 256, (tone, tone, tone * 1.03)), size_m=(0.6, 0.6), specular=0.5, shininess=0.7
+        textures.stone(rng, 256, 256, (tone, tone, tone * 1.03), step=step),
+        size_m=(0.6, 0.6),
+        specular=0.5,
+        shininess=0.7,
     )
 
 
-def _brick(rng: np.random.Generator, colours: Colours) -> Look:
-    image = textures.tiles(rng, 256, 256, 4, 12, (0.62, 0.34, 0.26), (0.72, 0.68, 0.62), 0.16, 0.2, 2, bonded=True)
+def _brick(rng: np.random.Generator, colours: Colours, step: int) -> Look:
+    colour, grout = (0.62, 0.34, 0.26), (0.72, 0.68, 0.62)
+    image = textures.tiles(rng, 256, 256, 4, 12, colour, grout, 0.16, 0.2, 2, bonded=True, step=step)
     return Look(image, size_m=(0.84, 0.84), specular=0.03)
 
 
-def _marble(rng: np.random.Generator, colours: Colours) -> Look:
-    image = textures.tiles(rng, 256, 256, 1, 1, (0.86, 0.85, 0.83), (1, 1, 1), 0.0, 0.22, 0)
+def _marble(rng: np.random.Generator, colours: Colours, step: int) -> Look:
+    image = textures.tiles(rng, 256, 256, 1, 1, (0.86, 0.85, 0.83), (1, 1, 1), 0.0, 0.22, 0, step=step)
     return Look(image, size_m=(1.0, 1.0), specular=0.5, shininess=0.7)
 
 
@@ -208,11 +214,11 @@ MAKERS: dict[str, Maker] = {
     "accent": _cloth("accent", 0.22),
     "second accent": _cloth("second_accent", 0.22),
     "curtain": _cloth("curtain", 0.12),
-    "linen": lambda rng, colours: Look(
-        textures.fabric(rng, 256, 256, (0.9, 0.89, 0.85), 0.07), size_m=(0.3, 0.3), specular=0.03, shininess=0.05
+    "linen": lambda rng, colours, step: Look(
+        textures.fabric(rng, 256, 256, (0.9, 0.89, 0.85), 0.07, step), size_m=(0.3, 0.3), specular=0.03, shininess=0.05
     ),
-    "shade": lambda rng, colours: Look(
-        textures.fabric(rng, 128, 128, (1.0, 0.93, 0.78), 0.1), size_m=(0.3, 0.3), specular=0.0, emission=0.7
+    "shade": lambda rng, colours, step: Look(
+        textures.fabric(rng, 128, 128, (1.0, 0.93, 0.78), 0.1, step), size_m=(0.3, 0.3), specular=0.0, emission=0.7
     ),
     "duvet": _duvet,
     "basket": _basket,

@@ -6,7 +6,7 @@ Every mesh is symmetric in its local x, so that a room can be mirrored by moving
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -32,12 +32,12 @@ class Mesh:
     normals: np.ndarray
     uvs: np.ndarray
 
-    @property
+    @cached_property
     def half_extents_m(self) -> np.ndarray:
         """(3,) half the size of the bounding box."""
         return np.ptp(self.vertices_m, axis=0) / 2
 
-    @property
+    @cached_property
     def centre_m(self) -> np.ndarray:
         """(3,) the middle of the bounding box."""
         return (self.vertices_m.max(axis=0) + self.vertices_m.min(axis=0)) / 2
@@ -55,11 +55,30 @@ def bevelled_box(size_m: tuple[float, float, float], bevel_m: float, segments: i
         grain_up: keep u horizontal on every face; otherwise u runs along the longer side, as wood grain does.
     """
     half = np.array(size_m) / 2
+    if not segments:
+        return _plain_box(half, grain_up)
     if segments == 1:
         return _chamfered_box(half, min(bevel_m, float(half.min()) * 0.9), grain_up)
-    bevel = min(bevel_m, float(half.min()) * 0.98) if segments else 0.0
+    bevel = min(bevel_m, float(half.min()) * 0.98)
     parts = [_box_face(half, bevel, segments, axis, sign, grain_up) for axis in range(3) for sign in (-1.0, 1.0)]
     return _joined(parts)
+
+
+def _plain_box(half: np.ndarray, grain_up: bool) -> Mesh:
+    """Six flat faces: those of the cube, stretched."""
+    cube = _cube()
+    vertices = cube.vertices_m * half
+    uvs = [
+        vertices[4 * face : 4 * face + 4, [v, u] if not grain_up and half[v] > half[u] else [u, v]]
+        for face, (u, v) in enumerate(axes for axes in FACE_AXES for _ in range(2))
+    ]
+    return Mesh(vertices, cube.faces, cube.normals, np.concatenate(uvs))
+
+
+@lru_cache(maxsize=1)
+def _cube() -> Mesh:
+    """The plain box that reaches from -1 to 1."""
+    return _joined([_box_face(np.ones(3), 0.0, 0, axis, sign, False) for axis in range(3) for sign in (-1.0, 1.0)])
 
 
 def _chamfered_box(half: np.ndarray, bevel: float, grain_up: bool) -> Mesh:

@@ -42,7 +42,7 @@ class Window:
     width_m: float
     height_m: float
 
-    @property
+    @cached_property
     def right(self) -> np.ndarray:
         """(3,) unit vector along the sill."""
         return np.cross([0.0, 0.0, 1.0], self.normal)

@@ -212,14 +212,16 @@ class Room:
         frame: Frame,
         centre_m: Point,
         size_m: tuple[float, float],
-        make: Callable[[np.random.Generator], np.ndarray],
+        make: Callable[[np.random.Generator, int], np.ndarray],
         specular: float = 0.1,
         shininess: float = 0.3,
         emission: float = 0.0,
     ) -> None:
-        """A flat picture (width, height) that faces the frame's +y."""
+        """A flat picture (width, height) that faces the frame's +y; `make` is given the detail's `texture_step`."""
         if self.looks:
-            look = Look(make(self.rng), specular=specular, shininess=shininess, emission=emission)
+            look = Look(
+                make(self.rng, self.detail.texture_step), specular=specular, shininess=shininess, emission=emission
+            )
             material = self._one_off(look)
             mesh = meshes.panel(round(size_m[0], 4), round(size_m[1], 4))
             self._add(mesh, frame, centre_m, material, UPRIGHT, SEEN_GROUP, stretch=True)
@@ -281,7 +283,7 @@ class Room:
         """The look of a material, added to the spec the first time it is asked for."""
         if name not in self._looks:
             rng = np.random.default_rng([self.seed, zlib.crc32(f"{self.name} {name}".encode()), 2])
-            self._looks[name] = look_of(name, rng, self.colours)
+            self._looks[name] = look_of(name, rng, self.colours, self.detail.texture_step)
             add_material(self.spec, name, self._looks[name])
         return self._looks[name]
 

@@ -60,7 +60,9 @@ class Face:
 
 @dataclass(frozen=True, eq=False)
 class Finish:
-    """What the shell is covered with; every picture is (height, width, 3) at PIXELS_PER_METRE, row 0 at the bottom.
+    """What the shell is covered with; every picture is (height, width, 3), row 0 at the bottom.
+
+    Pixels are as of `surfaces.pixels` with the detail's `texture_step`.
 
     Attributes:
         floor: as large as the floor.
@@ -174,7 +176,7 @@ def _add_column(room: Room, number: int, column: Column, finish: Finish) -> None
         length, reach = (width, depth / 2) if yaw % 180 == 0 else (depth, width / 2)
         face = Frame(frame.x_m, frame.y_m, yaw)  # its y points away from the column
         corner, other = face.point(length / 2, reach, 0), face.point(-length / 2, reach, 0)
-        albedo = _piece_of(finish.partitions, length, height, 97 * number + 2 * yaw)
+        albedo = _piece_of(finish.partitions, length, height, 97 * number + 2 * yaw, room.detail.texture_step)
         _surface(room, f"column {number} face {yaw}", corner, other - corner, up, albedo)
         if finish.skirting:
             room.box(face, (0, reach + 0.008, 0), (length + 0.032, 0.016, 0.09), finish.skirting, 0.004)
@@ -196,13 +198,15 @@ def add_faces(
     """
     for column in columns:
         room.shadow_box(*_column_box(room, column))
+    step = room.detail.texture_step
     for number, (face, picture) in enumerate(zip(faces, finish.faces, strict=True)):
         tall_m = room.height_m - face.bottom_m
         corner, other = (face.at.point(x_m, 0, face.bottom_m) for x_m in (face.length_m / 2, -face.length_m / 2))
         along = (other - corner) / face.length_m
         start_m = float(corner @ along) if along.sum() > 0 else float(corner @ along) + _extent_m(room, along)
-        first, low = min(pixels(start_m), picture.shape[1] - pixels(face.length_m)), pixels(face.bottom_m)
-        albedo = picture[low if face.bottom_m else 0 :, max(first, 0) : max(first, 0) + pixels(face.length_m)]
+        broad, low = pixels(face.length_m, step), pixels(face.bottom_m, step) if face.bottom_m else 0
+        first = max(0, min(pixels(start_m, step), picture.shape[1] - broad))
+        albedo = picture[low:, first : first + broad]
         group = CEILING_GROUP if face.bottom_m else SEEN_GROUP  # the view from above shows the way through
         _surface(room, f"face {number}", corner, other - corner, np.array([0, 0, tall_m]), albedo, group)
         if finish.skirting and not face.bottom_m:
@@ -228,8 +232,9 @@ def _add_board(
         room.box(face.at, place, (length_m, thick_m, high_m), material, bevel_m, group=group)
 
 
-def _piece_of(picture: np.ndarray, width_m: float, height_m: float, shift_px: int) -> np.ndarray:
+def _piece_of(picture: np.ndarray, width_m: float, height_m: float, shift_px: int, step: int) -> np.ndarray:
     """A piece of a wall's picture, cut out at a place that depends on `shift_px`."""
-    spare = max(picture.shape[1] - pixels(width_m), 0)
-    first = shift_px % (spare + 1)
-    return picture[: pixels(height_m), first : first + pixels(width_m)]
+    broad = pixels(width_m, step)
+    spare = max(picture.shape[1] - broad, 0)
+    first = shift_px % (spare * step + 1) // step
+    return picture[: pixels(height_m, step), first : first + broad]

@@ -17,10 +17,11 @@ import h5py
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.files import parse_json
+from clearway.files import parse_json, written_whole
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
+HDF5_VERSION = ("v110", "v110")  # before 1.10 (2016) the index of chunks has no checksum: damage there went unnoticed
 MAX_ARRAY_BYTES = MOST_BYTES // COPIES  # of the largest array, in the largest file
 MAX_JSON_BYTES = 4 * 1024**2
 MAX_GROUP_ARRAYS = 1000
@@ -66,6 +67,18 @@ def opened(path: Path) -> Iterator[h5py.File]:
     finally:
         with faults_named(path, problem="cannot be closed"):
             file.close()
+
+
+@contextmanager
+def written(path: Path) -> Iterator[h5py.File]:
+    """A new HDF5 file for `path`, written whole or not at all. Raises SceneError where it cannot be written."""
+    try:
+        with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
+            yield file
+    except (OSError, RuntimeError) as fault:  # HDF5 raises the second where the disk fills up as a file is closed
+        reason = getattr(fault, "strerror", None) or " ".join(str(fault).split())
+        problem = f"cannot be written ({reason})"
+        raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
 
 
 def find_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset | None:

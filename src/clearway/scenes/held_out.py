@@ -13,6 +13,7 @@ import numpy as np
 from clearway.scenes.scene import Scene
 
 SHARE = 0.1
+ROUNDING = 1e-6  # of places, in cells
 
 
 def held_out_cells(name: str, cells: np.ndarray) -> np.ndarray:
@@ -35,5 +36,6 @@ def held_out(scene: Scene) -> np.ndarray:
     A scene that is renamed has others, so keep the names of generated files.
     """
     _, first = np.unique(scene.cells, return_index=True)
-    grid = np.rint(scene.locations_m[first] / scene.cell_size_m).astype(np.int64)
+    steps = scene.locations_m[first] / scene.cell_size_m
+    grid = np.ceil(steps - 0.5 - ROUNDING).astype(np.int64)  # cells may lie halfway
     return held_out_cells(scene.name, grid)[scene.cells]

@@ -107,13 +107,18 @@ def write_readings(file: h5py.File, readings: Readings) -> None:
         compression_opts=SENSOR_GZIP_LEVEL,
         fletcher32=True,
     )
+    write_sensor(dataset, sensor)
+    for start in range(0, raw.shape[0], BLOCK_PICTURES):
+        dataset[start : start + BLOCK_PICTURES] = readings.checked(slice(start, start + BLOCK_PICTURES))
+
+
+def write_sensor(dataset: h5py.Dataset, sensor: Sensor) -> None:
+    """Keep what a sensor is as attributes of what it measured."""
     hdf5.write_text(dataset, "dtype", sensor.dtype)
     hdf5.write_text(dataset, "unit", sensor.unit)
     for key in SENSOR_NUMBERS:
         if getattr(sensor, key) is not None:
             dataset.attrs[key] = float(getattr(sensor, key))
-    for start in range(0, raw.shape[0], BLOCK_PICTURES):
-        dataset[start : start + BLOCK_PICTURES] = readings.checked(slice(start, start + BLOCK_PICTURES))
 
 
 def write_provenance(file: h5py.File, made_by: Provenance) -> None:

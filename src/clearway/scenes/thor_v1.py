@@ -16,7 +16,6 @@ import h5py
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.files import written_whole
 from clearway.scenes import hdf5
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 from clearway.scenes.features import DATASET as FEATURES
@@ -48,7 +47,6 @@ from clearway.version import __version__
 FORMAT_VERSION = 1
 DISTANCE_TABLE_STATES = 4_096  # beyond it the (S, S) table is neither written nor checked; nothing here reads it
 DEFAULT_CELL_SIZE_M = 0.5
-HDF5_VERSION = ("v110", "v110")  # before 1.10 (2016) the index of chunks has no checksum: damage there went unnoticed
 PICTURE_GZIP_LEVEL = 2  # 0.42 of the raw size in 8 ms a 400x300 picture; level 4 saves 2 % more, lzf needs 0.58
 
 
@@ -102,13 +100,8 @@ def write_scene(scene: Scene, path: str | Path) -> None:
     """Write a scene as a `thor_v1` file, whole or not at all. Raises SceneError for a scene that is unsound."""
     path = Path(path)
     check_scene(scene, path)
-    try:
-        with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
-            _write_all(file, scene, path)
-    except (OSError, RuntimeError) as fault:  # HDF5 raises the second where the disk fills up as a file is closed
-        reason = getattr(fault, "strerror", None) or " ".join(str(fault).split())
-        problem = f"cannot be written ({reason})"
-        raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
+    with hdf5.written(path) as file:
+        _write_all(file, scene, path)
 
 
 def step_length_m(locations_m: np.ndarray, graph: np.ndarray) -> float:

@@ -34,7 +34,7 @@ def test_every_wall_and_face_has_a_picture_that_covers_it(areas: tuple[Area, ...
 def test_areas_have_papers_of_their_own_that_meet_in_the_wall(monkeypatch) -> None:
     shades = {"bathroom": 0.25, "bedroom": 0.75}
     monkeypatch.setattr(finish_module, "_paper", lambda room, side, use: np.full((416, 592, 3), shades[use]))
-    monkeypatch.setattr(finishes, "aged", lambda room, wall: wall)
+    monkeypatch.setattr(finishes, "aged", lambda room, side, wall: wall)
     _, layout, finish = finished(walled(areas=AREAS))  # 3.7 x 1.7 m; the wall's faces are at x = 1.7 and 2.0
     by_place = {round(face.at.x_m, 6): picture.mean() for face, picture in zip(layout.faces, finish.faces, strict=True)}
     assert by_place[1.7] == 0.25 and by_place[2.0] == 0.75

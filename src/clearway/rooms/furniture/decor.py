@@ -25,7 +25,7 @@ def painting(room: Room, at: Frame, width_m: float, height_m: float, frame: str 
         at,
         (0, 0.02, 0),
         (width_m, height_m),
-        lambda rng: artwork.painting(rng, 256, round(256 * width_m / height_m)),
+        lambda rng, step: artwork.painting(rng, 256, round(256 * width_m / height_m), step),
         specular=0.1,
     )
     _border(room, at, width_m, height_m, 0.03, frame)
@@ -56,7 +56,7 @@ def clock(room: Room, at: Frame, radius_m: float = 0.16, frame: str = "black") -
     rim = [(0, 0), (radius_m, 0), (radius_m, 0.035), (radius_m - 0.02, 0.04), (radius_m - 0.02, 0.02), (0, 0.02)]
     room.turned(at, (0, 0, 0), rim, frame, LYING, slices=28)
     side = 1.32 * radius_m
-    room.picture(at, (0, 0.024, 0), (side, side), artwork.clock, specular=0.2)
+    room.picture(at, (0, 0.024, 0), (side, side), lambda rng, _: artwork.clock(rng), specular=0.2)
 
 
 def wall_shelf(room: Room, at: Frame, width_m: float = 0.8, material: str = "wood") -> None:
@@ -76,7 +76,7 @@ def row_of_books(room: Room, at: Frame, width_m: float, height_m: float, depth_m
         at,
         (0, depth_m / 2 + 0.003, height_m / 2),
         (width_m, height_m),
-        lambda rng: artwork.books(rng, 112, max(48, round(112 * width_m / height_m))),
+        lambda rng, _: artwork.books(rng, 112, max(48, round(112 * width_m / height_m))),
         specular=0.1,
     )
     room.box(at, (0, 0, 0), (width_m, depth_m, height_m * 0.66), "linen", 0.004, segments=0)

@@ -25,7 +25,7 @@ def window(room: Room, at: Frame, width_m: float, height_m: float, curtains: boo
         at,
         (0, 0.012, height_m / 2),
         (width_m, height_m),
-        lambda rng: artwork.outdoor(rng, 256, round(256 * width_m / height_m)),
+        lambda rng, step: artwork.outdoor(rng, 256, round(256 * width_m / height_m), step),
         emission=0.95,
         specular=0.0,
     )

@@ -142,7 +142,7 @@ def television(room: Room, at: Frame, width_m: float = 1.8, depth_m: float = 0.4
     room.box(at, (0, 0, 0.48), (0.42, 0.2, 0.015), "black", 0.005)
     room.box(at, (0, 0, 0.49), (0.07, 0.04, 0.08), "black", 0.005)
     room.box(at, (0, 0, 0.56), (1.15, 0.045, 0.67), "black", 0.01)
-    room.picture(at, (0, 0.025, 0.895), (1.11, 0.63), artwork.screen, specular=0.6, shininess=0.8)
+    room.picture(at, (0, 0.025, 0.895), (1.11, 0.63), lambda rng, _: artwork.screen(rng), specular=0.6, shininess=0.8)
     decor.ornament(room, at.moved(-width_m / 2 + 0.14, 0), 0.48)
     decor.candles(room, at.moved(width_m / 2 - 0.18, 0.05), 0.48)
     room.block(at, (0, 0, 0.62), (width_m, depth_m, 1.24))

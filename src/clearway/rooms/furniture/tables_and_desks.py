@@ -104,4 +104,6 @@ def monitor(room: Room, at: Frame, z_m: float) -> None:
     room.box(at, (0, 0, z_m), (0.25, 0.18, 0.012), "black", 0.005)
     room.box(at, (0, -0.03, z_m), (0.05, 0.03, 0.2), "black", 0.005)
     room.box(at, (0, 0, z_m + 0.12), (0.58, 0.035, 0.36), "black", 0.007)
-    room.picture(at, (0, 0.019, z_m + 0.3), (0.55, 0.33), artwork.screen, specular=0.7, shininess=0.8)
+    room.picture(
+        at, (0, 0.019, z_m + 0.3), (0.55, 0.33), lambda rng, _: artwork.screen(rng), specular=0.7, shininess=0.8
+    )

@@ -29,12 +29,12 @@ def finish_of(room: Room, layout: Layout) -> Finish:
     longest = "south" if room.width_m >= room.depth_m else "west"
     if (layout.area_map >= 0).any():
         floor, ceiling = _floor_by_area(room, layout), finishes.plain_ceiling(room)
-        papers = [finishes.aged(room, _paper(room, longest, area.use)) for area in layout.areas]
+        papers = [finishes.aged(room, longest, _paper(room, longest, area.use)) for area in layout.areas]
         walls = {side: _papered_by_area(room, side, papers, layout) for side in SIDES}
         return Finish(floor, ceiling, walls, papers[0], [papers[_area_before(face, layout)] for face in layout.faces])
-    walls = {side: finishes.aged(room, _wall(room, side)) for side in SIDES}
+    walls = {side: finishes.aged(room, side, _wall(room, side)) for side in SIDES}
     floor = _with_rug(room, _floor(room), _roomiest_m(layout), layout)
-    ceiling, inner = finishes.plain_ceiling(room), finishes.aged(room, _wall(room, longest))
+    ceiling, inner = finishes.plain_ceiling(room), finishes.aged(room, longest, _wall(room, longest))
     return Finish(floor, ceiling, walls, inner, [inner] * len(layout.faces))
 
 
@@ -54,7 +54,7 @@ def _papered_by_area(room: Room, side: str, papers: Sequence[np.ndarray], layout
     numbers = {"south": areas[:, 0], "north": areas[:, -1], "west": areas[0], "east": areas[-1]}[side]
     if side in ("south", "east"):  # their pictures run to lower coordinates
         numbers = numbers[::-1]
-    rows, columns = (pixels(length_m) for length_m in wall_size_m(room, side)[::-1])
+    rows, columns = (pixels(length_m, room.detail.texture_step) for length_m in wall_size_m(room, side)[::-1])
     covered = np.empty((rows, columns, 3))
     marks = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
     for start, end in pairwise(marks):
@@ -71,13 +71,13 @@ def _area_before(face: Face, layout: Layout) -> int:
 
 def _floor_by_area(room: Room, layout: Layout) -> np.ndarray:
     """Tiles in bathrooms and kitchens, one floor in all other areas, a rug in the roomiest living room or bedroom."""
-    floor = _floor(room)
+    floor, step = _floor(room), room.detail.texture_step
     rugs = [number for number, area in enumerate(layout.areas) if area.use in ("living room", "bedroom")]
     x_m, y_m = layout.middles_m(np.indices(layout.free.shape).transpose(1, 2, 0)).transpose(2, 0, 1)
     roomy = layout.free & np.isin(layout.area_at(x_m, y_m), rugs)
     if roomy.any():
         floor = _with_rug(room, floor, _roomiest_m(layout, roomy), layout)
-    y_m, x_m = ((np.arange(count) + 0.5) / PIXELS_PER_METRE for count in floor.shape[:2])
+    y_m, x_m = ((np.arange(count) + 0.5) * step / PIXELS_PER_METRE for count in floor.shape[:2])
     numbers = layout.area_at(x_m[None], y_m[:, None])
     for use in sorted(WET):
         here = np.isin(numbers, [number for number, area in enumerate(layout.areas) if area.use == use])
@@ -85,7 +85,7 @@ def _floor_by_area(room: Room, layout: Layout) -> np.ndarray:
             continue
         colour, second = varied(room.rng, (0.8, 0.78, 0.74)), None if room.rng.random() < 0.5 else (0.36, 0.38, 0.4)
         tiles = textures.tiles(
-            room.rng, pixels(4), pixels(4), 12, 12, colour, (0.55, 0.54, 0.5), 0.08, 0.15, second=second
+            room.rng, pixels(4), pixels(4), 12, 12, colour, (0.55, 0.54, 0.5), 0.08, 0.15, second=second, step=step
         )
         floor[here] = finishes.floor_of(room, tiles)[here]
     return floor
@@ -117,16 +117,17 @@ def _pattern(room: Room) -> str:
 
 def _floor(room: Room) -> np.ndarray:
     """Planks, parquet, tiles or carpet."""
-    kind = int(room.rng.integers(4))
+    kind, step = int(room.rng.integers(4)), room.detail.texture_step
     if kind == 0:
         return finishes.plank_floor(room)
     if kind == 1:
         return finishes.parquet_floor(room)
     if kind == 2:
         tile, grout = varied(room.rng, (0.72, 0.62, 0.5)), (0.52, 0.47, 0.4)
-        return finishes.floor_of(room, textures.tiles(room.rng, pixels(4), pixels(4), 8, 8, tile, grout, 0.1, 0.25))
+        image = textures.tiles(room.rng, pixels(4), pixels(4), 8, 8, tile, grout, 0.1, 0.25, step=step)
+        return finishes.floor_of(room, image)
     pile = varied(room.rng, (0.62, 0.57, 0.5), 0.05)
-    return finishes.floor_of(room, textures.pile(room.rng, pixels(3), pixels(3), pile, (0.52, 0.47, 0.41)))
+    return finishes.floor_of(room, textures.pile(room.rng, pixels(3), pixels(3), pile, (0.52, 0.47, 0.41), step))
 
 
 def _wall(room: Room, side: str) -> np.ndarray:
