@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.rooms import finishes, textures
-from clearway.rooms.detail import Detail
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.frame import Frame
 from clearway.rooms.furniture import bathroom as fittings
 from clearway.rooms.furniture import decor, lamps, openings, storage
@@ -21,7 +21,7 @@ WALL = Column(0.0, 1.69, 3.4, 1.81)
 COLUMNS = (WALL,)
 
 
-def build(seed: int, looks: bool, detail: Detail) -> Room:
+def build(seed: int, looks: bool, detail: Detail = FULL) -> Room:
     """The bathroom without its light."""
     room = Room(
         "bathroom", WIDTH_M, DEPTH_M, HEIGHT_M, (0.25, 0.25), seed, looks, mirrored=seed % 2 == 1, detail=detail

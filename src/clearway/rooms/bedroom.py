@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clearway.rooms import finishes, textures
-from clearway.rooms.detail import Detail
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.frame import Frame
 from clearway.rooms.furniture import beds, decor, lamps, openings, seating, storage, tables_and_desks
 from clearway.rooms.furniture.small import any_small_piece
@@ -18,7 +18,7 @@ STUDY_WALL = Column(3.69, 1.6, 3.81, 4.19)
 COLUMNS = (DRESSING_WALL, STUDY_WALL)
 
 
-def build(seed: int, looks: bool, detail: Detail) -> Room:
+def build(seed: int, looks: bool, detail: Detail = FULL) -> Room:
     """The bedroom without its light."""
     room = Room("bedroom", WIDTH_M, DEPTH_M, HEIGHT_M, (0.25, 0.25), seed, looks, mirrored=seed % 2 == 1, detail=detail)
     add_walls(room, COLUMNS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clearway.rooms import finishes, textures
-from clearway.rooms.detail import Detail
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.finishes import WHITE
 from clearway.rooms.frame import Frame
 from clearway.rooms.furniture import decor, kitchen, lamps, openings, seating, storage, tables_and_desks
@@ -18,7 +18,7 @@ DINING_WALL = Column(4.69, 0.0, 4.81, 5.9)
 COLUMNS = (DINING_WALL,)
 
 
-def build(seed: int, looks: bool, detail: Detail) -> Room:
+def build(seed: int, looks: bool, detail: Detail = FULL) -> Room:
     """The kitchen without its light."""
     room = Room("kitchen", WIDTH_M, DEPTH_M, HEIGHT_M, (0.25, 0.25), seed, looks, mirrored=seed % 2 == 1, detail=detail)
     add_walls(room, COLUMNS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from clearway.rooms import finishes
-from clearway.rooms.detail import Detail
+from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.finishes import WHITE
 from clearway.rooms.frame import Frame
 from clearway.rooms.furniture import decor, lamps, openings, seating, storage, tables_and_desks
@@ -18,7 +18,7 @@ LIBRARY_WALL = Column(1.6, 4.69, 4.69, 4.81)
 COLUMNS = (DINING_WALL, LIBRARY_WALL)
 
 
-def build(seed: int, looks: bool, detail: Detail) -> Room:
+def build(seed: int, looks: bool, detail: Detail = FULL) -> Room:
     """The living room without its light."""
     room = Room(
         "living_room", WIDTH_M, DEPTH_M, HEIGHT_M, (0.25, 0.25), seed, looks, mirrored=seed % 2 == 1, detail=detail
