@@ -29,6 +29,7 @@ ACROSS = {"room": 6, "flat": 2}
 VIEWED = ("living room", "kitchen", "bedroom", "bathroom")
 LARGER = 2  # pictures are drawn larger and made smaller
 WALL = (70, 70, 70)  # around the view from above, whose outer walls have no thickness
+WORTH = 8  # cells that two free ones ahead are worth
 SLOPE = 0.75  # of the sides of what is before a pose
 
 
@@ -84,7 +85,7 @@ def best_poses(plan: FloorPlan, count: int) -> list[tuple[np.ndarray, int]]:
 
 
 def best_pose(plan: FloorPlan, areas: list[Area]) -> tuple[np.ndarray, int]:
-    """The cell and heading in some areas before which most cells of them lie; if possible with two free cells ahead."""
+    """The cell and heading in some areas before which most cells of them lie; two free cells ahead are worth more."""
     free = {(x, z) for x, z in plan.cells.tolist()}
     cells = np.concatenate([np.argwhere(np.ones(np.subtract(a.high, a.low) + 1, bool)) + a.low for a in areas])
     inside = [cell for cell in plan.cells if any((cell >= a.low).all() and (cell <= a.high).all() for a in areas)]
@@ -94,7 +95,7 @@ def best_pose(plan: FloorPlan, areas: list[Area]) -> tuple[np.ndarray, int]:
             x, z = (cells - cell).T
             ahead, aside = x * dx + z * dz, np.abs(x * dz - z * dx)
             open_ahead = all((int(cell[0]) + n * dx, int(cell[1]) + n * dz) in free for n in (1, 2))
-            found.append(((open_ahead, int(((ahead > 1) & (aside <= SLOPE * ahead)).sum())), cell, heading))
+            found.append((WORTH * open_ahead + int(((ahead > 1) & (aside <= SLOPE * ahead)).sum()), cell, heading))
     _, cell, heading = max(found, key=lambda one: one[0])
     return cell, heading
 
