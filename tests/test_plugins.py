@@ -17,7 +17,7 @@ from clearway.errors import EncoderError, PluginError
 from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.presets import PRESETS
-from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record
+from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record, eyes
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -46,7 +46,7 @@ def offer(folder: Path, group: str, lines: str, module: str = "", package: str =
 def test_the_built_in_names_are_those_that_there_are() -> None:
     kinds = get_args(get_type_hints(ImportScenes, include_extras=True)["kind"])
     importers = [get_args(kind)[1].name for kind in kinds if get_args(kind)[0] is not ImportPlugin]
-    assert BUILT_IN["encoders"] == (encode.AUTO, encode.TRAINED, encode.RANDOM, depth_grid.NAME)
+    assert BUILT_IN["encoders"] == (encode.AUTO, encode.TRAINED, encode.RANDOM, depth_grid.NAME, eyes.NAME)
     assert BUILT_IN["importers"] == tuple(importers)
     assert set(BUILT_IN["rewards"]) == set(REWARDS)
     assert BUILT_IN["algorithms"] == (*ALGORITHMS, *PRESETS)

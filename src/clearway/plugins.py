@@ -19,11 +19,11 @@ Kind = Literal["encoders", "rewards", "agents", "importers", "algorithms"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 BUILT_IN: dict[Kind, tuple[str, ...]] = {
-    "encoders": ("auto", "resnet50", "random-resnet50", "depth-grid"),
+    "encoders": ("auto", "resnet50", "random-resnet50", "depth-grid", "clearway"),
     "rewards": ("collision-aware", "shortest", "bump", "clearance"),
     "agents": ("random", "shortest path"),
     "importers": ("thor-v1", "floor-plan", "images", "savn", "avd", "ai2thor", "mjcf", "miniworld"),
-    "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "default", "paper", "paper-a3c"),
+    "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "recurrent", "default", "paper", "paper-a3c"),
 }
 """Names that are ours, which no other package can take."""
 

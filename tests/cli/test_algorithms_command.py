@@ -2,28 +2,40 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from helpers.small_eyes import seen_by_eyes
 
 SETTINGS = ("--frames", 400, "--threads", 1, "--set", "envs=10")
+
+
+def seen(scene: Path, folder: Path) -> Path:
+    """The file of the same scene, seen by small eyes."""
+    path = folder / "seen" / scene.name
+    write_scene(seen_by_eyes(folder / "eyes", read_scene(scene))[0], path)
+    return path
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, name):
     width = () if name == "q-learning" else ("width=16",)
-    words = ("train", trained.scene, "--out", tmp_path, "--algorithm", name, *SETTINGS, "rollout_steps=8", *width)
+    scene = trained.scene if name != "recurrent" else seen(trained.scene, tmp_path)
+    run = tmp_path / "run"
+    words = ("train", scene, "--out", run, "--algorithm", name, *SETTINGS, "rollout_steps=8", *width)
     answer = clearway(*words)
     assert answer.code == 0, answer
-    record = json.loads((tmp_path / "run.json").read_text())
+    record = json.loads((run / "run.json").read_text())
     assert (record["learner"]["algorithm"], record["learner"]["envs"]) == (name, 10)
-    assert isinstance(RunFolder(tmp_path).read_record().learner, ALGORITHMS[name])
-    found = clearway("evaluate", tmp_path, "--episodes", 1, "--step-limit", 20, "--json").json
+    assert isinstance(RunFolder(run).read_record().learner, ALGORITHMS[name])
+    found = clearway("evaluate", run, "--episodes", 1, "--step-limit", 20, "--json").json
     assert {"random", "shortest path"} <= {other["agent"] for other in found["others"]}
-    assert clearway("evaluate", tmp_path, "--episodes", 1, "--step-limit", 20, "--pictures", tmp_path / "p").code == 0
+    assert clearway("evaluate", run, "--episodes", 1, "--step-limit", 20, "--pictures", tmp_path / "p").code == 0
 
 
 @pytest.mark.parametrize("command", ["export", "view", "serve"])
@@ -31,7 +43,7 @@ def test_what_needs_a_network_says_that_a_table_has_none(clearway, trained, tmp_
     run = tmp_path / "run"
     assert clearway("train", trained.scene, "--out", run, "--algorithm", "q-learning", *SETTINGS).code == 0
     out = () if command in ("view", "serve") else ("--out", tmp_path / "out.onnx")
-    assert clearway(command, run, *out).refusal("an agent of q-learning has no network")
+    assert clearway(command, run, *out).refusal("an agent of q-learning has none")
 
 
 def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):

@@ -13,11 +13,12 @@ from clearway.learn.learner import Learner
 from clearway.learn.ppo import PPO
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.q_learning import QLearning
+from clearway.learn.recurrent import Recurrent
 from clearway.reward import COLLISION_AWARE
 
 
 def test_algorithms_are_found_by_name() -> None:
-    assert {"ppo": PPO, "a2c": A2C, "a3c": A3C, "bc": BC, "q-learning": QLearning} == ALGORITHMS
+    assert {"ppo": PPO, "a2c": A2C, "a3c": A3C, "bc": BC, "q-learning": QLearning, "recurrent": Recurrent} == ALGORITHMS
     assert algorithm("a3c") is A3C
     with pytest.raises(RunError, match=r"algorithm 'dqn': expected one of ppo, a2c, a3c, bc, q-learning"):
         algorithm("dqn")

@@ -98,7 +98,7 @@ def test_a_run_evaluates_at_the_shortest_paths_and_has_no_network(tmp_path: Path
     by_name = {evaluation.agent: evaluation.to_json()["average"] for evaluation in found}
     learnt, shortest = by_name["shortest"], by_name["shortest path"]
     assert learnt["steps"] == pytest.approx(shortest["steps"], rel=0.02)
-    with pytest.raises(RunError, match="an agent of q-learning has no network"):
+    with pytest.raises(RunError, match="an agent of q-learning has none"):
         load_network(tmp_path)
 
 

@@ -14,9 +14,10 @@ from clearway.learn.bc import BC
 from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
 from clearway.learn.q_learning import QLearning
+from clearway.learn.recurrent import Recurrent
 from clearway.plugins import find_plugin, load_plugin
 
-ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C, BC, QLearning)}
+ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C, BC, QLearning, Recurrent)}
 Kind = TypeVar("Kind", bound=Learner)
 
 

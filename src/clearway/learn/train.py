@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import signal
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -27,6 +26,7 @@ from clearway.learn.checkpoint import (
     write_checkpoint,
 )
 from clearway.learn.figures import Figures
+from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.learn.progress import ProgressView, progress_view
@@ -142,7 +142,7 @@ def train(
         with (
             closing(trainer),
             progress_view(trainer.learner.frames, show_progress) as view,
-            _interruption() as interrupted,
+            interruption() as interrupted,
         ):
             _run(trainer, folder, view, interrupted, seconds, milestones)
     return folder
@@ -265,29 +265,6 @@ def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor
 def _acts(trainer: Learning, name: str) -> bool:
     """Whether an agent needs the trainer's tensor of that name to act."""
     return name.startswith(f"{trainer.learner.acts_on}.")
-
-
-@contextmanager
-def _interruption() -> Iterator[threading.Event]:
-    """An event that Ctrl+C or SIGTERM sets, so that an update is finished and saved; a second Ctrl+C stops at once."""
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def handler(number: int, frame: object) -> None:
-        if event.is_set():
-            raise KeyboardInterrupt
-        event.set()
-
-    for number in before:
-        signal.signal(number, handler)
-    try:
-        yield event
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)
 
 
 def usable_device(name: str) -> torch.device:

@@ -6,11 +6,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from clearway.errors import EncoderError, SceneError
-from clearway.perception import depth_grid, plugged, pretrained, random_resnet
+from clearway.perception import depth_grid, eyes, plugged, pretrained, random_resnet
 from clearway.perception.cache import Entry, cached, content_key, joint_key
 from clearway.perception.encoder import Encoder, EncoderWarning, sensor_of
 from clearway.perception.preprocess import Preprocessing
@@ -40,9 +41,10 @@ def find_record(
     """The record of the encoder that a user asks for by name.
 
     Args:
-        name: "resnet50" (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto"
-            (the first if it can be had, else the second), "depth-grid" (of depth, without a network), one of another
-            package (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
+        name: "clearway" (our own, pretrained on generated rooms) or a folder of such (`clearway pretrain`), "resnet50"
+            (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto" ("resnet50" if it
+            can be had, else "random-resnet50"), "depth-grid" (of depth, without a network), one of another package
+            (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
         scenes: what "random-resnet50" calibrates on, in any order; or what gives them, asked only if it is needed.
         seed: of "random-resnet50".
         shape, preprocessing: of "random-resnet50".
@@ -58,6 +60,8 @@ def find_record(
         return _fitted(scenes, seed, shape, preprocessing)
     if name == depth_grid.NAME:
         return depth_grid.find_record()
+    if name == eyes.NAME or eyes.is_eyes(Path(name)):
+        return eyes.find_record(name)
     if name == TRAINED:
         return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
     if name != AUTO:
@@ -91,6 +95,8 @@ def encoder_from_record(record: EncoderRecord) -> Encoder:
         return random_resnet.from_record(record)
     if kind == depth_grid.KIND:
         return depth_grid.from_record(record)
+    if kind == eyes.KIND:
+        return eyes.from_record(record)
     if kind == pretrained.KIND:
         return pretrained.from_record(record)
     if kind == plugged.KIND:

@@ -23,7 +23,7 @@ from clearway.errors import SceneError
 from clearway.reward import Moves
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.world.feature_store import joined_features
 from clearway.world.targets import NO_TARGETS, WalkedScene, target_tables
 from clearway.zones import scene_zones
@@ -48,6 +48,7 @@ class World:
         start_steps: (K,) int64, the shortest-path distance of each of those starts.
         start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
         feature_store: where features are kept, see there.
+        encoder: the record of what made the features; None where the scenes have none, or do not say.
     """
 
     scene_names: tuple[str, ...]
@@ -65,6 +66,7 @@ class World:
     start_offset: Tensor
     start_count: Tensor
     feature_store: FeatureStore = "memory"
+    encoder: EncoderRecord | None = None
 
     @property
     def scene_count(self) -> int:
@@ -200,6 +202,7 @@ def make_world(
         largest_part=torch.tensor(largest),
         features=joined_features(scenes, feature_store),
         feature_store=feature_store,
+        encoder=scenes[0].encoder if scenes else None,
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
         clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
         **{name: torch.from_numpy(table) for name, table in found.items()},

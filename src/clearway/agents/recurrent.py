@@ -1,0 +1,70 @@
+"""The recurrent agent: by features, or behind a camera, in any room.
+
+Axis letters: B episodes, F features, H width.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from clearway.agents.agent import FEATURES, Decisions, Observation, State
+from clearway.agents.chance import CHANCE, chance_of, drawn
+from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, SeenPairs, last_step
+from clearway.perception.encoder import Encoder, sensor_of
+
+PICTURES_AT_ONCE = 32
+
+
+class RecurrentAgent:
+    """Draws its actions by a recurrent network.
+
+    Args:
+        network: the parameters.
+        pairs: compares what is seen with the target.
+        encoder: makes the features of what is seen; None: features themselves are seen.
+    """
+
+    def __init__(self, network: RecurrentActorCritic, pairs: SeenPairs, encoder: Encoder | None = None) -> None:
+        self._network, self._pairs, self._encoder = network.eval(), pairs.eval(), encoder
+        self.sees: tuple[str, ...] = (FEATURES if encoder is None else sensor_of(encoder.record),)
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
+        features = target[FEATURES] if FEATURES in target else self._features(target)
+        count = len(features)
+        return {
+            "target": features,
+            "hidden": np.zeros((count, self._network.shape.width), np.float32),
+            "begun": np.zeros(count, bool),
+            "seen": np.zeros_like(features),
+            "action": np.zeros(count, np.int64),
+            CHANCE: chance_of(seed),
+        }
+
+    @torch.inference_mode()
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        """Actions drawn by the policy; see `Agent.act`."""
+        seen = self._features(observation)
+        now, target, before = (torch.from_numpy(features) for features in (seen, state["target"], state["seen"]))
+        last = last_step(torch.from_numpy(state["action"]), self._pairs.likeness(now, before))
+        last = torch.where(torch.from_numpy(state["begun"])[:, None], last, torch.zeros(LAST_COUNT))
+        said = self._network(self._pairs(now, target), last, torch.from_numpy(state["hidden"]))
+        probabilities = torch.softmax(said.scores, dim=1, dtype=torch.float64)
+        decisions, chance = drawn(probabilities.numpy(), state[CHANCE], said.value.numpy())
+        after = {
+            "hidden": said.hidden.numpy(),
+            "begun": np.ones_like(state["begun"]),
+            "seen": seen,
+            "action": decisions.action,
+            CHANCE: chance,
+        }
+        return decisions, {**state, **after}
+
+    def _features(self, seen: Observation) -> np.ndarray:
+        """(B, F) float32."""
+        given = seen[self.sees[0]]
+        if self._encoder is None:
+            return given
+        parts = range(0, len(given), PICTURES_AT_ONCE)
+        return np.concatenate([self._encoder.encode(given[b : b + PICTURES_AT_ONCE]) for b in parts])

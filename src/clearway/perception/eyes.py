@@ -1,0 +1,198 @@
+"""The encoder `clearway`: the project's own eyes, pretrained on views of generated rooms.
+
+Eyes are a folder of two files: `eyes.json` says how large the network is, how it was trained, and the SHA-256 of
+`eyes.safetensors`, its parameters. The shipped ones lie in the package; `clearway pretrain` makes others, which are
+used by the name of their folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clearway.errors import EncoderError
+from clearway.files import json_text, read_json, written_whole
+from clearway.perception.encoder import IDENTITY_LETTERS
+from clearway.perception.preprocess import Preprocessing, to_pixels
+from clearway.scenes.scene import EncoderRecord
+
+if TYPE_CHECKING:
+    from clearway.perception.eyes_network import Eyes, EyesShape
+
+NAME, KIND = "clearway", "eyes"
+CARD_FILE, WEIGHTS_FILE = "eyes.json", "eyes.safetensors"
+FORMAT_VERSION = 1
+SHIPPED = Path(__file__).parent / "weights"
+MEAN, STD = (0.45, 0.45, 0.45), (0.25, 0.25, 0.25)  # of colours from 0 to 1
+MAX_WIDTH, MAX_SIDE_PX = 4096, 512  # of a network; a card that asks for more is refused
+MAX_WEIGHTS_BYTES = 256 * 1024**2
+STATISTICS = ("running_mean", "running_var")  # kept as they are; all else in half precision
+
+
+@dataclass(frozen=True)
+class EyesCard:
+    """What eyes are.
+
+    Attributes:
+        shape: sizes of the network.
+        sha256: of its parameters' file.
+        trained: how, and on what, for people.
+    """
+
+    shape: EyesShape
+    sha256: str
+    trained: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class EyesEncoder:
+    """The encoder: the description of a picture, then its tokens, row by row from the upper left.
+
+    Attributes:
+        record: what it is.
+        eyes: the network.
+    """
+
+    record: EncoderRecord
+    eyes: Eyes
+
+    @property
+    def feature_count(self) -> int:
+        """F."""
+        shape = self.eyes.shape
+        return shape.description_width + shape.grid.count * shape.token_width
+
+    def encode(self, pictures: np.ndarray) -> np.ndarray:
+        """Features (B, F) float32 of pictures (B, height, width, 3) uint8, which may have another size.
+
+        Raises:
+            EncoderError: the pictures are of another shape or type.
+        """
+        import torch
+
+        with torch.inference_mode():
+            shape = self.eyes.shape
+            tokens = self.eyes(to_pixels(pictures, Preprocessing(shape.height_px, shape.width_px, MEAN, STD)))
+            features = torch.cat([self.eyes.glance(tokens).description, tokens.flatten(1)], dim=1)
+        return np.ascontiguousarray(features.numpy())
+
+
+def find_record(name: str = NAME) -> EncoderRecord:
+    """The record of the shipped eyes, or of those in a folder of that name.
+
+    Raises:
+        EncoderError: there are none, or they are damaged.
+    """
+    card = read_card(_folder(name))
+    settings = {"kind": KIND, "eyes": name, "shape": card.shape.to_json(), "sha256": card.sha256}
+    return EncoderRecord(NAME if name == NAME else Path(name).name, card.sha256[:IDENTITY_LETTERS], settings)
+
+
+def from_record(record: EncoderRecord) -> EyesEncoder:
+    """The encoder that a record names. Raises EncoderError where there are other eyes now, none, or damaged ones."""
+    name = str(record.settings.get("eyes"))
+    if find_record(name).identity != record.identity:
+        problem = f"encoder {record.name}: the eyes '{name}' are others than those that made the features"
+        raise EncoderError(f"{problem}. Get those, or encode the scene again")
+    return EyesEncoder(record, read_eyes(_folder(name)))
+
+
+def is_eyes(folder: Path) -> bool:
+    """Whether a folder holds eyes."""
+    return (folder / CARD_FILE).is_file()
+
+
+def write_eyes(folder: Path, eyes: Eyes, trained: Mapping[str, Any]) -> None:
+    """Write eyes into a folder, the card last.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    from safetensors.torch import save_file
+
+    state = {name: tensor for name, tensor in eyes.state_dict().items() if not name.endswith("num_batches_tracked")}
+    half = {
+        name: tensor.float().contiguous() if name.endswith(STATISTICS) else tensor.half().contiguous()
+        for name, tensor in state.items()
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    with written_whole(folder / WEIGHTS_FILE) as part:
+        save_file(half, part)
+    card = {
+        "format_version": FORMAT_VERSION,
+        "shape": eyes.shape.to_json(),
+        "sha256": _sha256(folder / WEIGHTS_FILE),
+        "trained": dict(trained),
+    }
+    with written_whole(folder / CARD_FILE) as part:
+        part.write_text(json_text(card))
+
+
+def read_card(folder: Path) -> EyesCard:
+    """What the eyes in a folder are. Raises EncoderError where there are none, or the card is damaged."""
+    path = folder / CARD_FILE
+    try:
+        content = read_json(path)
+        version = content["format_version"]
+        if version != FORMAT_VERSION:
+            raise EncoderError(f"{path}: of format {version}, this clearway reads {FORMAT_VERSION}. Upgrade clearway")
+        return EyesCard(_shape_of(content["shape"]), str(content["sha256"]), dict(content["trained"]))
+    except FileNotFoundError as fault:
+        raise EncoderError(
+            f"{folder}: no eyes here ({CARD_FILE} is missing). Give what clearway pretrain made"
+        ) from fault
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise EncoderError(f"{path}: damaged ({' '.join(str(fault).split())[:200]}). Get the eyes again") from fault
+
+
+def read_eyes(folder: Path) -> Eyes:
+    """The eyes in a folder, frozen. Raises EncoderError where they are not as they were written."""
+    import torch
+    from safetensors import SafetensorError
+    from safetensors.torch import load
+
+    from clearway.perception.eyes_network import Eyes
+
+    card, path = read_card(folder), folder / WEIGHTS_FILE
+    try:
+        if path.stat().st_size > MAX_WEIGHTS_BYTES:
+            raise EncoderError(f"{path}: larger than {MAX_WEIGHTS_BYTES >> 20} MiB. Get the eyes again")
+        content = path.read_bytes()
+        if hashlib.sha256(content).hexdigest() != card.sha256:
+            raise EncoderError(f"{path}: altered, its SHA-256 is not what {CARD_FILE} says. Get the eyes again")
+        eyes = Eyes(card.shape)
+        state = {name: tensor.float() for name, tensor in load(content).items()}
+        counts = {name: tensor for name, tensor in eyes.state_dict().items() if name.endswith("num_batches_tracked")}
+        eyes.load_state_dict({**counts, **state})
+    except (OSError, SafetensorError, RuntimeError) as fault:
+        reason = " ".join(str(fault).split())[:200]
+        raise EncoderError(f"{path}: cannot be read ({reason}). Get the eyes again") from fault
+    return eyes.eval().requires_grad_(False).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+
+
+def _folder(name: str) -> Path:
+    return SHIPPED if name == NAME else Path(name)
+
+
+def _shape_of(content: Mapping[str, Any]) -> EyesShape:
+    """The shape that a card tells. Raises ValueError, KeyError or TypeError where it is none."""
+    from clearway.perception.eyes_network import EyesShape
+
+    shape = EyesShape(**{**content, "widths": tuple(content["widths"])})
+    widths = (*shape.widths, shape.token_width, shape.description_width, shape.hidden_width)
+    if len(shape.widths) != 3 or not all(isinstance(width, int) and 1 <= width <= MAX_WIDTH for width in widths):
+        raise ValueError(f"widths {widths}")
+    for side in (shape.height_px, shape.width_px):
+        if not isinstance(side, int) or side % 16 or not 16 <= side <= MAX_SIDE_PX:
+            raise ValueError(f"pictures of {shape.height_px} x {shape.width_px}")
+    return shape
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

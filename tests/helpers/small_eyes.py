@@ -1,0 +1,33 @@
+"""Small random eyes, and scenes seen by them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from clearway.perception import encode_scenes
+from clearway.perception.eyes import write_eyes
+from clearway.perception.eyes_network import Eyes, EyesShape
+from clearway.scenes.scene import Scene
+
+SMALL = EyesShape(widths=(8, 8, 8), token_width=4, description_width=16, hidden_width=16, height_px=32, width_px=48)
+
+
+def small_eyes(seed: int = 0, shape: EyesShape = SMALL) -> Eyes:
+    """Eyes that have learnt nothing."""
+    with torch.random.fork_rng(devices=()):
+        torch.manual_seed(seed)
+        made = Eyes(shape)
+        for module in made.modules():
+            if isinstance(module, torch.nn.BatchNorm2d):
+                torch.nn.init.uniform_(module.running_mean, -0.1, 0.1)
+                torch.nn.init.uniform_(module.running_var, 1e-6, 2.0)
+    return made
+
+
+def seen_by_eyes(folder: Path, *scenes: Scene, seed: int = 0) -> list[Scene]:
+    """The scenes with features of small eyes, which are written to a folder."""
+    write_eyes(folder, small_eyes(seed), {})
+    return encode_scenes([replace(scene, features=None, encoder=None) for scene in scenes], str(folder), threads=1)

@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from clearway.agents.agent import FEATURES
+from clearway.agents.by_pose import RandomWalk
+from clearway.errors import RunError
+from clearway.evaluation.episodes import run_episodes
+from clearway.learn.load import load_agent
+from clearway.learn.recurrent import Recurrent
+from clearway.learn.recurrent_trainer import RecurrentTrainer
+from clearway.learn.train import RunRequest, train
+from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, RecurrentShape, SeenPairs, last_step
+from clearway.reward import COLLISION_AWARE
+from clearway.scenes.scene import Scene
+from clearway.world.world import World, make_world
+from helpers.made import corridor_scene, grid_scene
+from helpers.small_eyes import SMALL, seen_by_eyes, small_eyes
+
+LEARNER = Recurrent(frames=16 * 8 * 6, envs=16, rollout_steps=8, step_limit=20, width=16, minibatches=2)
+TARGETS = {"corridor": [0, 8, 16], "grid": [5, 22]}
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> list[Scene]:
+    return seen_by_eyes(tmp_path / "eyes", corridor_scene(5), grid_scene(1, width=4, depth=3))
+
+
+@pytest.fixture
+def world(scenes: list[Scene]) -> World:
+    return make_world(scenes, TARGETS)
+
+
+def trainer_of(world: World, learner: Recurrent = LEARNER, seed: int = 0) -> RecurrentTrainer:
+    trainer = learner.trainer(world, COLLISION_AWARE, seed)
+    assert isinstance(trainer, RecurrentTrainer)
+    return trainer
+
+
+def test_a_training_goes_on_bit_for_bit_in_both_parts(world: World):
+    whole = trainer_of(world)
+    told = [whole.update() for _ in range(6)]
+    assert ["agreement" in figures for figures in told] == [True] * 3 + [False] * 3
+    assert whole.finished and whole.frames == LEARNER.frames
+    for done in (2, 4):
+        first = trainer_of(world)
+        for _ in range(done):
+            first.update()
+        kept = {name: tensor.clone() for name, tensor in first.tensors().items()}
+        second = trainer_of(world, seed=0)
+        second.load_tensors(kept, first.frames, first.updates)
+        assert [second.update() for _ in range(6 - done)] == told[done:]
+        for name, tensor in second.tensors().items():
+            assert torch.equal(tensor, whole.tensors()[name]), name
+
+
+def test_a_seed_repeats_and_another_does_not(world: World):
+    one, again, other = (trainer_of(world, seed=seed).update() for seed in (1, 1, 2))
+    assert one == again != other
+
+
+def test_it_learns_what_the_planner_teaches_and_walks_better_than_by_chance(tmp_path: Path, scenes: list[Scene]):
+    learner = replace(LEARNER, frames=40_000, taught=0.8, envs=40, width=48, taught_lr_start=3e-3)
+    request = RunRequest(scenes, TARGETS, learner, COLLISION_AWARE)
+    folder = train(request, tmp_path / "run")
+    rows = folder.metrics()
+    taught = [row for row in rows if "agreement" in row]
+    assert taught[-1]["agreement"] > taught[0]["agreement"] + 0.15
+    world = make_world(scenes, TARGETS)
+    agent = load_agent(tmp_path / "run").on_poses(world)
+    steps = [
+        run_episodes(world, walker, episodes_per_target=40, step_limit=1000, seed=1).steps.mean()
+        for walker in (agent, RandomWalk())
+    ]
+    assert steps[0] < 0.6 * steps[1]
+
+
+def test_the_agent_says_in_an_episode_what_the_network_said_in_training(world: World):
+    trainer = trainer_of(world)
+    trainer.update()
+    tensors = {**trainer.tensors(), **trainer.fixed_tensors()}
+    agent = LEARNER.agent(None, tensors, 0).on_poses(world)  # type: ignore[arg-type]  # no run, no record
+    assert world.features is not None
+    target, hidden, last = world.features[[8, 22]], torch.zeros(2, 16), torch.zeros(2, LAST_COUNT)
+    state = agent.reset({FEATURES: target.numpy()}, np.array([3, 4]))
+    before = None
+    for poses in ([0, 30], [4, 30], [5, 34]):
+        seen = world.features[poses]
+        if before is not None:
+            last = last_step(torch.from_numpy(decisions.action), trainer.pairs.likeness(seen, before))  # noqa: F821
+        with torch.no_grad():
+            said = trainer.network(trainer.pairs(seen, target), last, hidden)
+        decisions, state = agent.act({FEATURES: seen.numpy()}, state)
+        np.testing.assert_allclose(decisions.probabilities, torch.softmax(said.scores, 1).numpy(), atol=1e-5)
+        np.testing.assert_allclose(decisions.value, said.value.numpy(), atol=1e-5)
+        before, hidden = seen, said.hidden
+    assert trainer.pairs.likeness(world.features[[30]], world.features[[30]]).item() == pytest.approx(1)
+
+
+def test_scenes_of_another_encoder_are_refused():
+    world = make_world([corridor_scene(5)], {"corridor": [8]})
+    with pytest.raises(RunError, match=r"the scenes are encoded by made-up\. Encode them with --encoder clearway"):
+        LEARNER.trainer(world, COLLISION_AWARE, 0)
+
+
+@pytest.mark.parametrize("name", ["taught", "teacher_share"])
+def test_shares_of_more_than_all_are_refused(name: str):
+    with pytest.raises(RunError, match=f"{name} is 1.5, expected 0 to 1"):
+        replace(LEARNER, **{name: 1.5})
+
+
+def test_the_last_step_is_told_by_action_and_likeness():
+    told = last_step(torch.tensor([2, 0]), torch.tensor([0.5, 1.0]))
+    assert told.tolist() == [[0, 0, 1, 0, 1, 0.5], [1, 0, 0, 0, 1, 1]] and told.shape[1] == LAST_COUNT
+
+
+def test_pairs_are_standardised_and_kept_by_their_tensors(world: World):
+    pairs = SeenPairs(small_eyes())
+    assert world.features is not None
+    seen, target = world.features[:30], world.features[torch.arange(30) % 7]
+    pairs.fit(seen, target)
+    told = pairs(seen, target)
+    assert told.shape == (30, pairs.count) == (30, 16 + 5 + 1 + 4 + SMALL.grid.count)
+    np.testing.assert_allclose(told.mean(0), 0, atol=1e-4)
+    again = SeenPairs.from_tensors(pairs.tensors())
+    torch.testing.assert_close(again(seen, target), told, rtol=0, atol=0)
+    torch.testing.assert_close(pairs.likeness(seen, seen), torch.ones(30))
+
+
+def test_what_is_remembered_changes_what_is_said():
+    network = RecurrentActorCritic(RecurrentShape(5, 8), seed=1)
+    pairs, last = torch.randn(3, 5), torch.zeros(3, LAST_COUNT)
+    first = network(pairs, last, torch.zeros(3, 8))
+    second = network(pairs, last, first.hidden)
+    assert (first.scores.shape, first.value.shape, first.hidden.shape) == ((3, 4), (3,), (3, 8))
+    assert not torch.allclose(first.scores, second.scores)
