@@ -41,6 +41,7 @@ ORDER = (
     {"live"},
     {"live_envs"},
     {"views"},
+    {"pretraining"},
     {"experiments"},
     {"deploy"},
     {"viz"},

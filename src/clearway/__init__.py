@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from clearway.api.environments import make_env
     from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
     from clearway.api.generation import generate
+    from clearway.api.pretraining import pretrain
     from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
     from clearway.api.training import TrainResult, train
     from clearway.api.views import open_views, take_views
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from clearway.learn.ppo import PPO
     from clearway.learn.presets import PAPER_A2C, PAPER_A3C
     from clearway.learn.q_learning import QLearning
+    from clearway.learn.recurrent import Recurrent
     from clearway.reward import Reward
     from clearway.scenes.scene import Scene
 
@@ -36,6 +38,7 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "generate": "clearway.api.generation",
     "take_views": "clearway.api.views",
     "open_views": "clearway.api.views",
+    "pretrain": "clearway.api.pretraining",
     "encode_scenes": "clearway.api.scenes",
     "Reward": "clearway.reward",
     "make_env": "clearway.api.environments",
@@ -45,6 +48,7 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "A3C": "clearway.learn.a3c.config",
     "BC": "clearway.learn.bc",
     "QLearning": "clearway.learn.q_learning",
+    "Recurrent": "clearway.learn.recurrent",
     "PAPER_A2C": "clearway.learn.presets",
     "PAPER_A3C": "clearway.learn.presets",
     "train": "clearway.api.training",
@@ -72,6 +76,7 @@ __all__ = [
     "Learner",
     "Navigator",
     "QLearning",
+    "Recurrent",
     "Reward",
     "Scene",
     "TrainResult",
@@ -85,6 +90,7 @@ __all__ = [
     "load_scenes",
     "make_env",
     "open_views",
+    "pretrain",
     "take_views",
     "train",
 ]

@@ -24,6 +24,7 @@ from clearway.cli.imports.command import ImportScenes
 from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.plugins import Plugins
+from clearway.cli.pretrain import Pretrain
 from clearway.cli.reproduce import Report, Reproduce
 from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.serve import Serve
@@ -64,6 +65,7 @@ class Scenes:
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
+    | Annotated[Pretrain, tyro.conf.subcommand("pretrain")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Oracle, tyro.conf.subcommand("oracle")]

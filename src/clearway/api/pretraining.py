@@ -1,0 +1,66 @@
+"""`pretrain`: eyes trained on views of many rooms."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from clearway.api.arguments import as_path, as_whole
+
+if TYPE_CHECKING:
+    from clearway.pretraining.judge import Judgement
+
+PathLike = str | os.PathLike[str]
+MAX_PICTURES = 10**12
+MAX_SEED = 2**31 - 1
+
+
+def pretrain(
+    views: Sequence[PathLike],
+    *,
+    out: PathLike,
+    pictures: int = 2_000_000,
+    seed: int = 0,
+    try_on: Sequence[PathLike] = (),
+    threads: int | None = None,
+    resume: bool = False,
+    show_progress: bool = False,
+) -> Judgement | None:
+    """Train eyes and leave them in a folder, whose name is then an encoder's.
+
+    Args:
+        views: files of views or folders of them, with colour and depth, two takes of each pose.
+        out: the folder.
+        pictures: to learn from in all; views that are seen again count again.
+        seed: of the first parameters and of all chances.
+        try_on: views of other rooms, to try the eyes on once they are trained.
+        threads: of torch; None leaves its own choice. Results repeat bit for bit at one number.
+        resume: go on from the newest checkpoint in `out`.
+        show_progress: draw a progress bar, if standard error is a terminal.
+
+    Returns:
+        How well they see in the rooms of `try_on`; None where there are none.
+
+    Raises:
+        ArgumentError: an argument is out of range, or the views are of another kind.
+        ClearwayError: views are missing or damaged, or `out` holds something else.
+    """
+    from clearway.perception.eyes import read_eyes
+    from clearway.pretraining.judge import judge
+    from clearway.pretraining.pretrain import PretrainRequest
+    from clearway.pretraining.pretrain import pretrain as train_eyes
+    from clearway.pretraining.settings import PretrainSettings
+    from clearway.progress import picture_progress
+    from clearway.torch_threads import torch_threads
+    from clearway.views.stream import views_in
+
+    settings = PretrainSettings(pictures=as_whole("pictures", pictures, 1, MAX_PICTURES))
+    count = None if threads is None else as_whole("threads", threads, 1)
+    tried = views_in([as_path("try_on", path) for path in try_on]) if try_on else None
+    shown = views_in([as_path("views", path) for path in views])
+    request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED))
+    folder = as_path("out", out)
+    with torch_threads(count), picture_progress("learning to see", settings.pictures, show_progress) as show_done:
+        train_eyes(request, folder, resume=resume, done=show_done)
+        return None if tried is None else judge(read_eyes(folder), tried)
