@@ -92,8 +92,8 @@ def load_network(folder: Path, checkpoint: Path | None = None) -> TrainedNetwork
     if not isinstance(agent, TrainedNetwork):
         name = agent.record.learner.algorithm
         raise RunError(
-            f"{folder}: this needs the siamese network, and an agent of {name} has none. Walk with it by clearway evaluate "
-            "without --live, or train another algorithm"
+            f"{folder}: this needs the siamese network, and an agent of {name} has none. Walk with it by "
+            "clearway evaluate without --live, or train another algorithm"
         )
     return agent
 
