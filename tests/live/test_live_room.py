@@ -78,7 +78,7 @@ def test_the_camera_sees_the_room_in_the_detail_of_the_scene():
     scene = build_floor_plan(plan_of("nook", ("..#", "#..")), 1, size_px=(30, 40), workers=1)
     assert scene.made_by.notes["detail"] == "small"
     live = live_room(scene)
-    view = first_person_view(live.scene.locations_m, scene.headings_deg, height_px=30, width_px=40)
+    view = first_person_view(live.scene.locations_m, scene.headings_deg, height_px=30, width_px=40, fast=True)
     seen = render(live.model, view, workers=1)
     assert np.abs(seen.astype(int) - scene.observations).mean() < 0.1
     unrecorded = live_room(replace(scene, made_by=replace(scene.made_by, notes={})))

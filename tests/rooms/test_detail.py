@@ -101,7 +101,8 @@ def test_a_room_in_small_detail_is_made_by_the_same_draws(monkeypatch, plan, see
 
 
 def test_the_height_of_pictures_decides_the_detail_and_a_record_tells_it():
-    assert [detail_for(height_px) for height_px in (96, 128, 129, 300)] == ["small", "small", "full", "full"]
+    sizes = ((96, 128), (160, 200), (160, 202), (95, 128), (96, 127), (300, 400))
+    assert [detail_for(*size) for size in sizes] == ["small", "small", "full", "full", "full", "full"]
     assert recorded_detail("hall", {"detail": "small"}) == SMALL
     assert recorded_detail("hall", {}) == recorded_detail("hall", {"detail": "full"}) == FULL
     for odd in ("huge", 3, None, ["small"]):

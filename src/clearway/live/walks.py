@@ -20,6 +20,7 @@ from clearway.live.results import Figures, LiveReport, LiveResult, grid_figures,
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
 from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
+from clearway.rooms.detail import taken_fast
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
@@ -88,9 +89,8 @@ def stages(
             live = live_room(scene)
             encoder = encoder_from_record(record_of_encoder)
             world = make_world([scene], {scene.name: targets[scene.name]}, record.zone_level)
-            found.append(
-                LiveScene(live, world, encoder, opened.enter_context(studio(live.model, live.lens(*_size_px(scene)))))
-            )
+            lens = live.lens(*_size_px(scene), fast=taken_fast(scene.made_by.notes))
+            found.append(LiveScene(live, world, encoder, opened.enter_context(studio(live.model, lens))))
         yield found
 
 

@@ -13,20 +13,15 @@ import numpy as np
 
 from clearway.live.live_room import LiveRoom
 from clearway.rooms.camera import Shot
+from clearway.rooms.detail import are_small
 from clearway.rooms.render import core_count, photographers
 from clearway.scenes.sensors import Sensor
 
 Pictures = Callable[[], np.ndarray]
 """Waits for pictures: (shots, *sensor.shape) in the sensor's unit."""
 
-SMALL_PX = 160 * 200  # above it, fast pictures cost no less
 MOST_SHARE = 8
 SHARES = 2  # for each process in a step: fewer, and it waits for the last agent's move
-
-
-def are_small(height_px: int, width_px: int) -> bool:
-    """Whether pictures of a size are taken the fast way, of rooms in small detail: the same to the eye alone."""
-    return height_px * width_px <= SMALL_PX and height_px % 2 == 0 and width_px % 2 == 0
 
 
 class Eyes:

@@ -39,9 +39,10 @@ from clearway.live_envs.arguments import (
     opened_room,
 )
 from clearway.live_envs.episode import End, Episodes, LiveEpisode, Rules
-from clearway.live_envs.eyes import Eyes, Pictures, are_small
+from clearway.live_envs.eyes import Eyes, Pictures
 from clearway.reward import Reward, reward_named
 from clearway.rooms.camera import first_person_shot
+from clearway.rooms.detail import are_small
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.sensors import RGB, Sensor
 

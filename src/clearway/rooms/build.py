@@ -10,7 +10,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from clearway.rooms.detail import DETAIL_NOTE, DETAILS, detail_for
+from clearway.rooms.detail import DETAIL_NOTE, DETAILS, are_small, detail_for
 from clearway.scenes import floor_plans
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Provenance, Scene
@@ -94,7 +94,7 @@ def build_floor_plan(
         plan: the plan. Parts of it that cannot be reached from each other stay in the scene.
         seed: with the plan's name chooses furniture, colours and textures.
         sensors: what takes the pictures, names of `clearway.scenes.sensors.SENSORS`; "rgb" among them.
-        size_px: height and width of the pictures; small ones show a room in small detail (`detail.detail_for`).
+        size_px: height and width of the pictures; small ones are taken fast, of a room in small detail (`detail`).
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show what is going on, if standard error is a terminal.
@@ -114,14 +114,14 @@ def build_floor_plan(
 
     locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
     check_moves(graph, plan.source or plan.name)
-    detail = detail_for(size_px[0])
+    detail = detail_for(*size_px)
     with _status(f"furnishing and lighting {plan.name}", progress):
         room, layout = build_plan_room(plan, seed, detail=DETAILS[detail])
         model = room.spec.compile()
     top_view = render_top_view(model, room.width_m, room.depth_m, here=here)
     x_m, z_m = layout.origin_m
     (height_px, width_px), inside_m = size_px, locations_m - np.array(layout.origin_m)
-    view = first_person_view(inside_m, headings_deg, height_px=height_px, width_px=width_px)
+    view = first_person_view(inside_m, headings_deg, height_px=height_px, width_px=width_px, fast=are_small(*size_px))
     pictures, further = sense(
         model, view, sensors, title=plan.name, workers=workers, ray=ray, progress=progress, here=here
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from clearway.errors import SceneError
 
 DETAIL_NOTE = "detail"  # of a scene's record
-MOST_SMALL_PX = 128  # height of pictures up to which rooms are built in small detail
+MOST_SMALL_PX = 160 * 200  # pixels of a picture; above it, fast pictures cost no less
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,14 @@ they are seen by; finer ones lose their gleam."""
 DETAILS = {"full": FULL, "small": SMALL}
 
 
-def detail_for(height_px: int) -> str:
-    """The name of the detail that pictures of this height are taken in."""
-    return "small" if height_px <= MOST_SMALL_PX else "full"
+def are_small(height_px: int, width_px: int) -> bool:
+    """Whether pictures of a size are taken the fast way (`camera.View`), of rooms in small detail: alike to the eye."""
+    return height_px * width_px <= MOST_SMALL_PX and height_px % 2 == 0 and width_px % 2 == 0
+
+
+def detail_for(height_px: int, width_px: int) -> str:
+    """The name of the detail that pictures of this size are taken in."""
+    return "small" if are_small(height_px, width_px) else "full"
 
 
 def recorded_detail(scene_name: str, notes: Mapping[str, object]) -> Detail:
@@ -70,3 +75,8 @@ def recorded_detail(scene_name: str, notes: Mapping[str, object]) -> Detail:
         problem = f"its room has the detail {name!r:.40}, this version knows {', '.join(DETAILS)}"
         raise SceneError(scene_name, problem, "Make the scene again")
     return DETAILS[name]
+
+
+def taken_fast(notes: Mapping[str, object]) -> bool:
+    """Whether a scene's pictures were taken the fast way, by the notes of its record."""
+    return notes.get(DETAIL_NOTE) == "small"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clearway.live.live_room import live_room
-from clearway.live_envs.eyes import are_small
+from clearway.rooms.detail import are_small
 from clearway.rooms.sense import sense
 from clearway.scenes.held_out import held_out
 from clearway.scenes.scene import Scene
