@@ -39,6 +39,7 @@ COMMANDS = {
     "scenes inspect",
     "scenes export",
     "scenes view",
+    "pretrain",
     "train",
     "evaluate",
     "oracle",

@@ -123,7 +123,7 @@ def test_a_run_that_is_stopped_before_it_went_on_keeps_its_checkpoint(
     saved = newest_checkpoint(RunFolder(tmp_path).checkpoints)
     number = (saved / "network.safetensors").stat().st_ino
     with monkeypatch.context() as patch:
-        patch.setattr(train, "_interruption", stopped_already)
+        patch.setattr(train, "interruption", stopped_already)
         with pytest.raises(KeyboardInterrupt):
             train.train(small_request(), tmp_path, resume=True)
     assert newest_checkpoint(RunFolder(tmp_path).checkpoints) == saved

