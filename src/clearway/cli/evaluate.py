@@ -29,6 +29,8 @@ class Evaluate:
 
     folder: Annotated[Path, tyro.conf.Positional]
     """The run folder; or the .onnx file of an exported agent."""
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Scene files or folders, as --scenes; with --goals any scenes."""
     episodes: int | None = None
     """Episodes a target; by default 100, live 10."""
     step_limit: int | None = None
@@ -45,6 +47,9 @@ class Evaluate:
     """Print a row for each target too."""
     pictures: Path | None = None
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
+    goals: int | None = None
+    """Walk to so many goals a scene, drawn by the seed among all its poses, one episode of 500 steps each; an agent of
+    the algorithm recurrent does in any scenes with pictures."""
     held_out: bool = False
     """Evaluate at five targets a scene that trainings in generated rooms and flats leave out, and leave held-out.json
     and held-out.md, live held-out-live.json and held-out-live.md, in the run folder."""
@@ -54,6 +59,9 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
+        if self.goals is not None:
+            self._at_goals(self.goals)
+            return
         self.room.check()
         self._check_file()
         if self.held_out and self.pictures is not None and not self.room.live:
@@ -68,13 +76,39 @@ class Evaluate:
         evaluate_live(
             self.folder,
             self.checkpoint,
-            self.scenes,
+            self.files + self.scenes,
             self.room,
             episodes=_or(self.episodes, LIVE_EPISODES),
             step_limit=_or(self.step_limit, LIVE_STEP_LIMIT),
             seed=self.seed,
             pictures=self.pictures,
             held_out=self.held_out,
+            json=self.json,
+        )
+
+    def _at_goals(self, goals: int) -> None:
+        from clearway.api.goals import STEP_LIMIT
+        from clearway.cli.goals import evaluate_at_goals
+
+        given = {
+            "--live": self.room.live,
+            "--beside": self.beside,
+            "--targets": self.targets,
+            "--pictures": self.pictures,
+            "--held-out": self.held_out,
+            "--episodes": self.episodes,
+        }
+        if asked := [option for option, value in given.items() if value]:
+            raise ClearwayError(
+                f"{asked[0]}: not with --goals, which walks once to each goal. Leave one of the two out"
+            )
+        evaluate_at_goals(
+            self.folder,
+            self.checkpoint,
+            self.files + self.scenes,
+            goals=goals,
+            step_limit=_or(self.step_limit, STEP_LIMIT),
+            seed=self.seed,
             json=self.json,
         )
 
@@ -93,7 +127,7 @@ class Evaluate:
         from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 
         episodes, step_limit = _or(self.episodes, EPISODES_PER_TARGET), _or(self.step_limit, STEP_LIMIT)
-        files = scene_files(self.scenes) if self.scenes else None
+        files = scene_files(self.files + self.scenes) if self.files + self.scenes else None
         exported = is_exported(self.folder)
         agent = self.folder if exported else load_agent(self.folder, self.checkpoint)
         result = evaluate(
