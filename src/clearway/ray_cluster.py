@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from clearway.errors import RunError
 
 LOCAL = "local"
+PATIENCE_S = 10.0  # for a cluster's address to answer; Ray by itself tries for many minutes
 
 
 @contextmanager
@@ -37,8 +39,9 @@ def connected(address: str, cores: int | None = None) -> Iterator[Any]:
         del options["include_dashboard"]
     try:
         if not started_before:
+            _check_answers(address)
             ray.init(address=address, **options)
-    except (ConnectionError, RuntimeError, ValueError) as error:
+    except (OSError, OverflowError, RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise RunError(
             f"--ray {address}: no cluster to be reached ({reason}). Start one, or give --ray local"
@@ -58,3 +61,10 @@ def kept_connected(address: str | None, cores: int | None = None) -> Iterator[No
         return
     with connected(address, cores):
         yield
+
+
+def _check_answers(address: str) -> None:
+    """Raise OSError or OverflowError where nobody listens at "host:port"; all other addresses are Ray's to judge."""
+    host, _, port = address.rpartition(":")
+    if host and "/" not in host and port.isdecimal():
+        socket.create_connection((host, int(port)), PATIENCE_S).close()
