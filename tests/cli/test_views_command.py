@@ -108,7 +108,7 @@ def test_views_are_inspected_a_file_or_a_folder(clearway, tmp_path):
         ({"held_out": 1}, "held_out=1: expected True or False"),
         ({"size": 96}, "size=96"),
         ({"out": 3}, "out=3"),
-        ({"scenes": 3}, "path=3"),
+        ({"scenes": 3}, "scenes=3"),
         ({"sensors": "rgb"}, "is a text"),
     ],
 )

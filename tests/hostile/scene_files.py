@@ -101,7 +101,7 @@ def cases(flips: int) -> Iterator[Case]:
         yield Case("faulty attributes", name, _changed_attribute(attribute, value), read, says)
     for name, (content, says) in NO_SCENES.items():
         yield Case("no scene files", name, _written(content), read, says)
-    yield Case("no scene files", "a folder", lambda folder: folder, read, "there is no such file")
+    yield Case("no scene files", "a folder", lambda folder: folder, read, "is a folder")
     yield Case("no scene files", "nothing", lambda folder: folder / "none.h5", read, "there is no such file")
 
 

@@ -232,6 +232,10 @@ def test_scenes_without_a_room_are_refused(tmp_path) -> None:
         LiveImageGoalEnv(corridor_scene())
     with pytest.raises(SceneError, match=r"none\.h5"):
         LiveImageGoalEnv(tmp_path / "none.h5")
+    with pytest.raises(SceneError, match=r"is a folder\. Name a scene file in it$"):
+        LiveImageGoalEnv(str(tmp_path))
+    with pytest.raises(EnvError, match=r"flat\.txt.: a floor plan, no scene yet. .*clearway scenes import floor-plan"):
+        LiveImageGoalEnv(str(tmp_path / "flat.txt"))
 
 
 @pytest.mark.parametrize("action", [4, -1, 1.0, None, "forward", [0]])

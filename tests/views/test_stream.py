@@ -161,8 +161,8 @@ def test_what_does_not_belong_together_is_refused(tmp_path) -> None:
     with pytest.raises(ClearwayError, match="shows a, as another file does"):
         clearway.open_views([tmp_path / "a.h5", str(tmp_path / "a2.h5")])
     for wrong, said in (
-        (3, "path=3"),
-        ([3], "path=3"),
+        (3, "views=3"),
+        ([3], "views=3"),
         (tmp_path / "none", "no such file"),
         ([], "none given"),
     ):

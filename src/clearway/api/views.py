@@ -85,7 +85,7 @@ def take_views(
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"out={str(folder)!r}: a file. Give a folder")
     crew = None if workers is None else as_whole("workers", workers, 1)
-    files = scene_files(_paths(scenes))
+    files = scene_files(_paths("scenes", scenes))
     with (
         kept_connected(ray, crew),
         picture_progress("taking views", len(files), show_progress, unit="rooms") as show_done,
@@ -106,14 +106,14 @@ def open_views(views: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
     """
     from clearway.views.stream import views_in
 
-    return views_in(_paths(views))
+    return views_in(_paths("views", views))
 
 
-def _paths(sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
+def _paths(name: str, sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
     if isinstance(sources, str | os.PathLike):
-        return [as_path("path", sources)]
+        return [as_path(name, sources)]
     if not isinstance(sources, Iterable):
-        raise ArgumentError(f"path={sources!r:.80}: expected a file, a folder, or several. Give one of these")
-    if not (paths := [as_path("path", source) for source in sources]):
-        raise ArgumentError("path: none given. Give at least one file or folder")
+        raise ArgumentError(f"{name}={sources!r:.80}: expected a file, a folder, or several. Give one of these")
+    if not (paths := [as_path(name, source) for source in sources]):
+        raise ArgumentError(f"{name}: none given. Give at least one file or folder")
     return paths

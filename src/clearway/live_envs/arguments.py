@@ -14,6 +14,7 @@ from clearway.errors import EnvError
 from clearway.live.conditions import MOST, Perturbations
 from clearway.live.live_room import LiveRoom, live_room, live_room_named
 from clearway.rooms import ROOM_NAMES
+from clearway.scenes.floor_plan_files import SUFFIXES as PLAN_SUFFIXES
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import SENSORS, Sensor
 
@@ -55,6 +56,9 @@ def opened_room(room: RoomSource, seed: int, *, small: bool, loose: bool) -> Liv
         from clearway.live.model_room import live_model
 
         return live_model(Path(room))
+    if Path(room).suffix.lower() in PLAN_SUFFIXES:
+        remedy = f"Import it with clearway scenes import floor-plan {room} --out scenes, and name the file in scenes"
+        raise EnvError(f"room='{room}': a floor plan, no scene yet. {remedy}")
     from clearway.scenes.thor_v1 import read_scene
 
     return live_room(read_scene(Path(room)), small=small, loose=loose)

@@ -56,6 +56,8 @@ def faults_named(source: Path, dataset: str = "", problem: str = "cannot be read
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
     """The HDF5 file at `path`, open for reading. Raises SceneError where it is missing or not HDF5."""
+    if path.is_dir():
+        raise SceneError(path, "is a folder", "Name a scene file in it")
     if not path.is_file():
         raise SceneError(path, "there is no such file", "Check the path")
     with faults_named(path, problem="cannot be opened as HDF5"):
