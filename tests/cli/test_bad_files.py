@@ -63,6 +63,8 @@ def test_a_picture_that_turns_out_damaged_leaves_nothing_half_written(clearway, 
     path.write_bytes(content)
     answer = clearway("scenes", "import", "thor-v1", path, "--out", tmp_path / "out")
     assert answer.refusal(str(path), "dataset 'observation'", "is damaged")
+    answer = clearway("scenes", "inspect", path, "--map", tmp_path / "map.png")
+    assert answer.refusal(str(path), "dataset 'observation'", "is damaged")
     assert list((tmp_path / "out").iterdir()) == []
 
 

@@ -88,6 +88,7 @@ class Inspect:
 
     def run(self) -> None:
         """Print the figures."""
+        from clearway.scenes.contents import check_contents
         from clearway.scenes.inspect import summary
         from clearway.scenes.thor_v1 import read_scene
         from clearway.views.stream import views_in
@@ -105,6 +106,7 @@ class Inspect:
         if others:
             raise ClearwayError(f"{self.file}: a folder of {1 + len(others)} scene files. Name one, such as {path}")
         scene = read_scene(path)
+        check_contents(scene)
         zones = scene_zones(scene)
         content = {**summary(scene).to_json(), "zones": zone_counts(zones)}
         if self.map:
