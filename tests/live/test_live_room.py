@@ -74,6 +74,14 @@ def test_a_generated_room_is_one_to_walk_in_and_another_plan_is_not_taken_for_it
         live_room(replace(scene, graph=moves))
 
 
+def test_a_room_of_another_version_of_the_generator_is_refused():
+    request = Request("room", "test", 0, 0)
+    notes = {**notes_of(request), "generator": 99}
+    scene = replace(floor_plan_scene(generated_plan(request), feature_count=4))
+    with pytest.raises(SceneError, match="was made by version 99 of the generator, this clearway has version"):
+        live_room(replace(scene, made_by=Provenance("generated", seed=0, notes=notes)))
+
+
 def test_the_camera_sees_the_room_in_the_detail_of_the_scene():
     scene = build_floor_plan(plan_of("nook", ("..#", "#..")), 1, size_px=(30, 40), workers=1)
     assert scene.made_by.notes["detail"] == "small"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from clearway.errors import ClearwayError, RenderError, SceneError
 from clearway.generation.plans import generated_plan
-from clearway.generation.request import GENERATOR_VERSION, SIZE_PX, Request
+from clearway.generation.request import GENERATOR_VERSION, SIZE_PX, Request, other_version
 from clearway.rooms.build import build_floor_plan, check_mujoco
 from clearway.rooms.library import cached_plan_scene
 from clearway.rooms.render import core_count
@@ -118,10 +118,13 @@ def generate_scenes(
 def check_kept(scene: Scene, path: Path, request: Request, seen: Seen) -> None:
     """Check that a file that is there is what is asked for. Raises SceneError, which says what differs."""
     wanted, found = notes_of(request), scene.made_by.notes
-    ours = scene.made_by.source == GENERATED
-    if not ours or found.get("generator") != GENERATOR_VERSION:
-        made = f"by version {found.get('generator')} of the generator" if ours else f"from {scene.made_by.source}"
-        raise SceneError(path, f"was made {made}, this clearway has version {GENERATOR_VERSION}", OTHER_FOLDER)
+    if scene.made_by.source != GENERATED:
+        problem = (
+            f"was made from {scene.made_by.source}, this clearway has version {GENERATOR_VERSION} of the generator"
+        )
+        raise SceneError(path, problem, OTHER_FOLDER)
+    if problem := other_version(found):
+        raise SceneError(path, problem, OTHER_FOLDER)
     if {key: found.get(key) for key in wanted} != wanted or scene.made_by.seed != request.seed:
         raise SceneError(path, f"is no {request.name} of seed {request.seed}", OTHER_FOLDER)
     sensors = {sensor.name: sensor.shape[:2] for sensor in scene.sensors}

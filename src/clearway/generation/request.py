@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import get_args
 
@@ -68,3 +69,11 @@ class Request:
         """The random numbers of one attempt; no two requests or attempts share them."""
         key = zlib.crc32(f"clearway plan: {self.kind}, {self.split}".encode())
         return np.random.default_rng([key, self.seed, self.number, attempt])
+
+
+def other_version(notes: Mapping[str, object]) -> str:
+    """What the notes of a generated scene say of another version of the generator, in words; empty of this one."""
+    version = notes.get("generator")
+    if version == GENERATOR_VERSION:
+        return ""
+    return f"was made by version {version} of the generator, this clearway has version {GENERATOR_VERSION}"

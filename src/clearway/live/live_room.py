@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.generation.request import other_version
 from clearway.live.conditions import REARRANGING, Perturbations
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
 from clearway.rooms.camera import CAMERA_HEIGHT_M, View, eye_view
@@ -123,6 +124,8 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
         from clearway.live.model_room import live_model_scene
 
         return live_model_scene(scene)
+    if made.source == floor_plans.GENERATED and (problem := other_version(made.notes)):
+        raise SceneError(scene.name, problem, "Its looks may differ: generate it again, or use that clearway")
     if made.source in floor_plans.SOURCES and made.seed is not None:
         return _live_plan(scene, floor_plans.plan_of(scene), made.seed, small, loose)
     if made.source != "room" or made.room is None or made.seed is None:
