@@ -81,9 +81,10 @@ def test_parts_that_cannot_be_reached_are_reported(clearway, tmp_path):
     assert (found["cells"], found["components"], found["component_sizes"]) == (7, 2, [24, 4])
 
 
-def test_a_door_in_no_wall_is_one_line(clearway, tmp_path):
+@pytest.mark.parametrize("words", [(), ("--features", 4)])
+def test_a_door_in_no_wall_is_one_line(clearway, tmp_path, words):
     (tmp_path / "flat.txt").write_text("...\n.D.\n...\n")
-    answer = clearway("scenes", "import", "floor-plan", tmp_path / "flat.txt", "--out", tmp_path / "scenes")
+    answer = clearway("scenes", "import", "floor-plan", tmp_path / "flat.txt", "--out", tmp_path / "scenes", *words)
     assert answer.refusal("flat.txt", "has a door in the cell (1, 1) that is in no wall", "Put walls")
     assert not (tmp_path / "scenes").exists()
 

@@ -47,6 +47,7 @@ class ImportFloorPlan:
 
     def run(self) -> None:
         """Make and write."""
+        from clearway.rooms.plans.cell_map import check_doors
         from clearway.scenes.floor_plan_files import read_floor_plans
         from clearway.scenes.floor_plans import floor_plan_scene, parts_apart
 
@@ -59,6 +60,8 @@ class ImportFloorPlan:
                 raise ClearwayError(
                     "--sensors says what to render, but --features renders nothing. Leave out one of them"
                 )
+            for plan in plans:
+                check_doors(plan)
             for plan in plans:
                 write_scenes([floor_plan_scene(plan, self.features, self.seed)], self.out)
         for apart in filter(None, map(parts_apart, plans)):  # last: a refusal is one line

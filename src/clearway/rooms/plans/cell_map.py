@@ -49,6 +49,12 @@ class CellMap:
     rooms: np.ndarray
 
 
+def check_doors(plan: FloorPlan) -> None:
+    """Raises SceneError where a door of a plan is in no wall."""
+    if plan.has_walls:
+        cell_map(plan)
+
+
 def cell_map(plan: FloorPlan) -> CellMap:
     """The map of a plan with walls.
 
