@@ -5,7 +5,8 @@ import pytest
 import torch
 
 from clearway.agents.agent import FEATURES
-from clearway.agents.by_features import PICTURES_AT_ONCE, FeatureAgent
+from clearway.agents.by_features import FeatureAgent
+from clearway.agents.encoded import PICTURES_AT_ONCE
 from clearway.perception import depth_grid
 from clearway.scenes.scene import EncoderRecord
 from clearway.scenes.sensors import DEPTH, RGB

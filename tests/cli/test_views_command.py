@@ -43,10 +43,10 @@ def rooms(tmp_path) -> Path:
 def test_what_is_asked_for_is_taken_and_told(clearway, tmp_path, rooms, asked):
     out = tmp_path / "views"
     first = clearway("scenes", "views", rooms / "one.h5", "--out", out)
-    assert first.code == 0 and "views of 1 rooms, one.h5" in first.err
+    assert first.code == 0 and "1 made, one.h5" in first.err
     words = ("--poses", 50, "--perturb", "all", "light=0.1", "--sensors", "rgb", "depth", "--size", 48, 64)
     second = clearway("scenes", "views", rooms, "--out", out, *words, "--seed", 3, "--held-out", "--scene-headings")
-    assert "views of 1 rooms, 1 were there, one.h5 to two.h5" in second.err
+    assert "1 made, 1 were there, one.h5 to two.h5" in second.err
     third = clearway("scenes", "views", rooms, "--out", out, "--perturb", "none", "--compress")
     assert third.code == 0
     lit = Perturbations(**{**REFERENCE.to_json(), "light": 0.1})

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
@@ -22,7 +19,7 @@ from clearway.scenes.floor_plans import GENERATED, floor_plan_scene, plan_of
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.sensors import Readings, depth
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.spread.workers import Workers
+from helpers.made_files import Made
 
 REQUESTS = [Request("room", "train", 0, number) for number in (3, 7)]
 SEEN = Seen(size_px=(24, 32))
@@ -38,32 +35,15 @@ def stand_in(request: Request, seen: Seen = SEEN, record: EncoderRecord | None =
     return replace(scene, observations=pictures, made_by=made_by, encoder=record, features=features)
 
 
-class Made(list[str]):
-    """Names of what is made, and of what cannot be."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.failing: set[str] = set()
-
-
 @pytest.fixture
 def made(monkeypatch) -> Made:
     """Names of what is made; workers are stood in for by this process, and rooms by grey ones."""
     names = Made()
 
-    @contextmanager
-    def workers_for(work, *, workers, ray) -> Iterator[Workers]:
-        def submit(request: Request) -> Future:
-            if request.name in names.failing:
-                raise SceneError(request.name, "cannot be written (No space left on device)", "Make room")
-            names.append(request.name)
-            write_scene(stand_in(request), scene_path(request, work.set_up().folder))
-            done: Future = Future()
-            done.set_result(request.name)
-            return done
+    def make(work, request: Request) -> None:
+        write_scene(stand_in(request), scene_path(request, work.set_up().folder))
 
-        yield Workers(submit, here=True)
-
+    workers_for = names.workers_for(lambda request: request.name, make)
     monkeypatch.setattr(files, "workers_for", workers_for)
     monkeypatch.setattr(files, "check_mujoco", lambda: None)
     return names

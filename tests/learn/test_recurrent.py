@@ -88,17 +88,15 @@ def test_the_agent_says_in_an_episode_what_the_network_said_in_training(world: W
     assert world.features is not None
     target, hidden, last = world.features[[8, 22]], torch.zeros(2, 16), torch.zeros(2, LAST_COUNT)
     state = agent.reset({FEATURES: target.numpy()}, np.array([3, 4]))
-    before = None
-    for poses in ([0, 30], [4, 30], [5, 34]):
-        seen = world.features[poses]
-        if before is not None:
-            last = last_step(torch.from_numpy(decisions.action), trainer.pairs.likeness(seen, before))  # noqa: F821
+    path = [world.features[poses] for poses in ([0, 30], [4, 30], [5, 34])]
+    for seen, onward in zip(path, [*path[1:], path[-1]], strict=True):
         with torch.no_grad():
             said = trainer.network(trainer.pairs(seen, target), last, hidden)
         decisions, state = agent.act({FEATURES: seen.numpy()}, state)
         np.testing.assert_allclose(decisions.probabilities, torch.softmax(said.scores, 1).numpy(), atol=1e-5)
         np.testing.assert_allclose(decisions.value, said.value.numpy(), atol=1e-5)
-        before, hidden = seen, said.hidden
+        hidden = said.hidden
+        last = last_step(torch.from_numpy(decisions.action), trainer.pairs.likeness(onward, seen))
     assert trainer.pairs.likeness(world.features[[30]], world.features[[30]]).item() == pytest.approx(1)
 
 

@@ -219,5 +219,5 @@ def _check_that_sb3_learns(room) -> None:
         seen, _, ended, infos = envs.step(model.predict(seen)[0])
         for env in np.flatnonzero(ended):
             assert set(infos[env]["terminal_observation"]) == {"observation", "target"}
-    assert ended.all() or any(ended)
+    assert ended.any()
     envs.close()

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,13 +14,13 @@ from clearway.generation.request import Request
 from clearway.live.words import GEOMETRY
 from clearway.scenes.floor_plans import floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
-from clearway.spread.workers import Workers
 from clearway.views import files
 from clearway.views.files import take_missing
 from clearway.views.settings import ViewSettings
 from clearway.views.shard import read_shard
 from helpers.imported import imported_by
 from helpers.made import corridor_scene
+from helpers.made_files import Made
 from helpers.made_views import SETTINGS, made_views, write_made
 
 
@@ -36,31 +33,11 @@ def scenes(tmp_path: Path) -> list[Path]:
     return paths
 
 
-class Made(list[str]):
-    """Names of what is made, and of what cannot be."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.failing: set[str] = set()
-
-
 @pytest.fixture
 def made(monkeypatch) -> Made:
     """Names of what is made; this process stands in for workers, and made-up pictures for rendered ones."""
     names = Made()
-
-    @contextmanager
-    def workers_for(work, *, workers, ray) -> Iterator[Workers]:
-        def submit(path: Path) -> Future:
-            if path.stem in names.failing:
-                raise SceneError(path, "cannot be written (No space left on device)", "Make room")
-            names.append(work.do(work.set_up(), path))
-            done: Future = Future()
-            done.set_result(path.stem)
-            return done
-
-        yield Workers(submit, here=True)
-
+    workers_for = names.workers_for(lambda path: path.stem, lambda work, path: work.do(work.set_up(), path))
     monkeypatch.setattr(files, "workers_for", workers_for)
     monkeypatch.setattr(files, "check_mujoco", lambda: None)
     monkeypatch.setattr(files, "room_views", lambda scene, settings: made_views(settings))

@@ -9,12 +9,11 @@ import numpy as np
 import torch
 
 from clearway.agents import memory
-from clearway.agents.agent import FEATURES, Decisions, Observation, State
+from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
+from clearway.agents.encoded import Encoded
 from clearway.model.policy import ScenePolicy
-from clearway.perception.encoder import Encoder, sensor_of
-
-PICTURES_AT_ONCE = 32
+from clearway.perception.encoder import Encoder
 
 
 class FeatureAgent:
@@ -26,12 +25,13 @@ class FeatureAgent:
     """
 
     def __init__(self, policy: ScenePolicy, encoder: Encoder | None = None) -> None:
-        self._policy, self._encoder = policy, encoder
-        self.sees: tuple[str, ...] = (FEATURES if encoder is None else sensor_of(encoder.record),)
+        self._policy = policy
+        self._features = Encoded(encoder)
+        self.sees: tuple[str, ...] = (self._features.sees,)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
         """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
-        features = target[FEATURES] if FEATURES in target else self._features(target)
+        features = self._features.of_target(target)
         count, size = features.shape
         return {
             "target": features,
@@ -48,11 +48,3 @@ class FeatureAgent:
         decisions, chance = drawn(probabilities.numpy(), state[CHANCE], value.numpy()[:, 0])
         after = {"earlier": seen[:, 1:], "begun": np.ones_like(state["begun"]), CHANCE: chance}
         return decisions, {**state, **after}
-
-    def _features(self, seen: Observation) -> np.ndarray:
-        """(B, F) float32."""
-        given = seen[self.sees[0]]
-        if self._encoder is None:
-            return given
-        parts = range(0, len(given), PICTURES_AT_ONCE)
-        return np.concatenate([self._encoder.encode(given[b : b + PICTURES_AT_ONCE]) for b in parts])

@@ -8,12 +8,11 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from clearway.agents.agent import FEATURES, Decisions, Observation, State
+from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
+from clearway.agents.encoded import Encoded
 from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, SeenPairs, last_step
-from clearway.perception.encoder import Encoder, sensor_of
-
-PICTURES_AT_ONCE = 32
+from clearway.perception.encoder import Encoder
 
 
 class RecurrentAgent:
@@ -26,12 +25,13 @@ class RecurrentAgent:
     """
 
     def __init__(self, network: RecurrentActorCritic, pairs: SeenPairs, encoder: Encoder | None = None) -> None:
-        self._network, self._pairs, self._encoder = network.eval(), pairs.eval(), encoder
-        self.sees: tuple[str, ...] = (FEATURES if encoder is None else sensor_of(encoder.record),)
+        self._network, self._pairs = network.eval(), pairs.eval()
+        self._features = Encoded(encoder)
+        self.sees: tuple[str, ...] = (self._features.sees,)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
         """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
-        features = target[FEATURES] if FEATURES in target else self._features(target)
+        features = self._features.of_target(target)
         count = len(features)
         return {
             "target": features,
@@ -60,11 +60,3 @@ class RecurrentAgent:
             CHANCE: chance,
         }
         return decisions, {**state, **after}
-
-    def _features(self, seen: Observation) -> np.ndarray:
-        """(B, F) float32."""
-        given = seen[self.sees[0]]
-        if self._encoder is None:
-            return given
-        parts = range(0, len(given), PICTURES_AT_ONCE)
-        return np.concatenate([self._encoder.encode(given[b : b + PICTURES_AT_ONCE]) for b in parts])

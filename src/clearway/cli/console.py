@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clearway.errors import printable
@@ -36,6 +37,14 @@ def stderr_console() -> Console:
 def say(text: str) -> None:
     """Print a line on standard error as it is, however long, but for characters that are not printable."""
     stderr_console().print(printable(text), soft_wrap=True)
+
+
+def say_made(folder: Path, paths: Sequence[Path], there: Set[Path]) -> None:
+    """Say how many of some files of a folder were made, how many were there, and which they are."""
+    made = sum(path not in there for path in paths)
+    kept = f", {len(paths) - made} were there" if made < len(paths) else ""
+    which = paths[0].name if len(paths) == 1 else f"{paths[0].name} to {paths[-1].name}"
+    say(f"{folder}: {made} made{kept}, {which}")
 
 
 def say_held_out(targets: Mapping[str, Sequence[int]]) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from clearway.choices import PlanKind, SensorName, SplitName
-from clearway.cli.console import say
+from clearway.cli.console import say_made
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,4 @@ class Generate:
             ray=self.ray,
             show_progress=True,
         )
-        made = [path for path in paths if path not in there]
-        kept = f", {len(paths) - len(made)} were there" if len(made) < len(paths) else ""
-        last = f", {paths[0].name}" if len(paths) == 1 else f", {paths[0].name} to {paths[-1].name}"
-        say(f"{self.out}: {len(made)} made{kept}{last}")
+        say_made(self.out, paths, there)

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from clearway.choices import SensorName
-from clearway.cli.console import say
+from clearway.cli.console import say_made
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,4 @@ class TakeViews:
             ray=self.ray,
             show_progress=True,
         )
-        made = [path for path in paths if path not in there]
-        kept = f", {len(paths) - len(made)} were there" if len(made) < len(paths) else ""
-        last = f", {paths[0].name}" if len(paths) == 1 else f", {paths[0].name} to {paths[-1].name}"
-        say(f"{self.out}: views of {len(made)} rooms{kept}{last}")
+        say_made(self.out, paths, there)

@@ -152,7 +152,6 @@ def read_card(folder: Path) -> EyesCard:
 
 def read_eyes(folder: Path) -> Eyes:
     """The eyes in a folder, frozen. Raises EncoderError where they are not as they were written."""
-    import torch
     from safetensors import SafetensorError
     from safetensors.torch import load
 
@@ -172,7 +171,7 @@ def read_eyes(folder: Path) -> Eyes:
     except (OSError, SafetensorError, RuntimeError) as fault:
         reason = " ".join(str(fault).split())[:200]
         raise EncoderError(f"{path}: cannot be read ({reason}). Get the eyes again") from fault
-    return eyes.eval().requires_grad_(False).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    return eyes.eval().requires_grad_(False)
 
 
 def _folder(name: str) -> Path:

@@ -121,6 +121,9 @@ class Eyes(nn.Module):
             nn.ReLU(),
         )
         self.told = nn.Linear(shape.hidden_width, 5)
+        for parameter in self.trunk.parameters():
+            if parameter.ndim == 4:  # pictures come with their colours last
+                parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Tokens (B, T, C)."""

@@ -42,10 +42,9 @@ class TokenGrid:
 
     def middles(self, height_px: int, width_px: int) -> tuple[np.ndarray, np.ndarray]:
         """Pixel rows (rows,) and columns (columns,) of the middles of the tokens."""
-        return tuple(  # type: ignore[return-value]  # two of them
-            ((np.arange(count) + 0.5) / count * pixels).astype(int)
-            for count, pixels in ((self.rows, height_px), (self.columns, width_px))
-        )
+        rows = (np.arange(self.rows) + 0.5) / self.rows * height_px
+        columns = (np.arange(self.columns) + 0.5) / self.columns * width_px
+        return rows.astype(int), columns.astype(int)
 
     @property
     def _edge(self) -> float:

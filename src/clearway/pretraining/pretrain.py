@@ -125,7 +125,7 @@ class Pretrainer:
         self.request, self.settings = request, request.settings
         with torch.random.fork_rng(devices=()):
             torch.manual_seed(request.seed)
-            self.eyes = Eyes(self.settings.shape).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+            self.eyes = Eyes(self.settings.shape)
         self._named = dict(self.eyes.named_parameters())
         parameters = list(self._named.values())
         self._optimiser = torch.optim.AdamW(parameters, lr=0.0, weight_decay=self.settings.weight_decay, fused=True)
