@@ -10,13 +10,17 @@ import torch
 from clearway.agents.agent import FEATURES, POSE, Agent, Decisions, Observation, joined, rows
 from clearway.agents.by_features import FeatureAgent
 from clearway.agents.by_pose import RandomWalk, network_on_poses, shortest_paths
+from clearway.agents.recurrent import RecurrentAgent
 from clearway.agents.selection import Argmax, ArgmaxUntried
 from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.learn.q_learning import QLearning, TrainedTable
 from clearway.learn.run_folder import record_of
+from clearway.model.recurrent import RecurrentActorCritic, RecurrentShape, SeenPairs
+from clearway.perception.eyes_network import EyesShape
 from clearway.reward import COLLISION_AWARE
 from clearway.world.world import World
 from helpers.agents import alike, by_rule, check_agent, equal
+from helpers.small_eyes import small_eyes
 from helpers.small_runs import small_learner, small_request, small_world, trained_network
 
 EPISODES, STEPS = 9, 7
@@ -36,6 +40,13 @@ def network(world: World) -> Agent:
     return network_on_poses(found.lookup(world), world, found.record.learner.reward_scale)
 
 
+def recurrent(world: World) -> Agent:
+    """One that has learnt nothing, by eyes whose features are as many as the world's."""
+    pairs = SeenPairs(small_eyes(0, EyesShape((4, 4, 4), 4, 4, 8, height_px=16, width_px=32)))
+    assert world.features is not None and world.features.shape[1] == 4 + 2 * 4
+    return RecurrentAgent(RecurrentActorCritic(RecurrentShape(pairs.count, 8)), pairs)
+
+
 def optimum(world: World, which: int) -> Agent:
     return optimum_agents(world, world_yardsticks(world, COLLISION_AWARE))[which]
 
@@ -53,6 +64,8 @@ AGENTS: dict[str, tuple[Callable[[World], Agent], bool]] = {
     "argmax-untried of the random walk": (lambda world: ArgmaxUntried(RandomWalk(), world), False),
     "argmax of argmax-untried": (lambda world: Argmax(ArgmaxUntried(network(world), world)), False),
     "features": (lambda world: FeatureAgent(trained_network().in_scene(1)), True),
+    "recurrent": (recurrent, True),
+    "argmax of recurrent": (lambda world: Argmax(recurrent(world)), False),
     "argmax of features": (lambda world: Argmax(FeatureAgent(trained_network().in_scene(1))), False),
 }
 
