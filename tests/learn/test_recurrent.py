@@ -102,7 +102,9 @@ def test_the_agent_says_in_an_episode_what_the_network_said_in_training(world: W
 
 def test_scenes_of_another_encoder_are_refused():
     world = make_world([corridor_scene(5)], {"corridor": [8]})
-    with pytest.raises(RunError, match=r"the scenes are encoded by made-up\. Encode them with --encoder clearway"):
+    with pytest.raises(
+        RunError, match=r"the scenes are encoded by made-up\. Encode them with --encoder FOLDER of eyes"
+    ):
         LEARNER.trainer(world, COLLISION_AWARE, 0)
 
 

@@ -125,3 +125,11 @@ def test_other_eyes_in_the_folder_are_told(folder: Path):
     eyes.write_eyes(folder, random_eyes(1), {})
     with pytest.raises(EncoderError, match="are others than those that made the features"):
         encoder_from_record(record)
+
+
+def test_without_shipped_eyes_the_name_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setattr(eyes, "SHIPPED", tmp_path)
+    with pytest.raises(EncoderError, match=r"no trained eyes come with this version\. Train some by clearway pretrain"):
+        find_record("clearway", [])
+    eyes.write_eyes(tmp_path, random_eyes(), {})
+    assert find_record("clearway", []).name == "clearway"

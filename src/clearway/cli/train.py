@@ -38,8 +38,8 @@ class Train:
     zones: ZoneLevel = "pose"
     """Whether zones are those of poses or of whole cells."""
     algorithm: str | None = None
-    """ppo (our recipe, and the default), a2c, a3c, bc, q-learning or recurrent (for many rooms, seen by clearway's own
-    encoder), with its own settings; or a preset, see there."""
+    """ppo (our recipe, and the default), a2c, a3c, bc, q-learning or recurrent (for many rooms, seen by eyes), with
+    its own settings; or a preset, see there."""
     preset: PresetName | None = None
     """Named settings: default is our recipe, PPO; paper is the published settings, synchronous; paper-a3c is the
     published algorithm. With --algorithm, its settings go with that algorithm as far as it has them."""

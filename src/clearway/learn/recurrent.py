@@ -92,8 +92,8 @@ class Recurrent(Learner):
         """A trainer at its first frame. Raises RunError where the scenes are not seen by eyes."""
         if world.encoder is None or world.encoder.settings.get("kind") != eyes.KIND:
             seen = "have no features" if world.encoder is None else f"are encoded by {world.encoder.name}"
-            problem = f"algorithm {self.algorithm} compares pictures by the encoder {eyes.NAME}, and the scenes {seen}"
-            raise RunError(f"{problem}. Encode them with --encoder {eyes.NAME}")
+            problem = f"algorithm {self.algorithm} compares pictures by eyes, and the scenes {seen}"
+            raise RunError(f"{problem}. Encode them with --encoder FOLDER of eyes that clearway pretrain made")
         return RecurrentTrainer(world, self, reward, seed, eyes.from_record(world.encoder).eyes)
 
     def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedRecurrent:

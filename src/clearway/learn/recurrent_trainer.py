@@ -70,7 +70,7 @@ class RecurrentTrainer:
     """Learns one policy for all scenes of a world.
 
     Args:
-        world: tables of the scenes and targets; must hold features of the encoder `clearway`.
+        world: tables of the scenes and targets; must hold features that the eyes made.
         learner: the settings.
         reward: what is earned, and what the teacher's actions are best under.
         seed: of parameters, environments and actions.

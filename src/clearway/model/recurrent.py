@@ -1,7 +1,7 @@
 """The recurrent actor-critic: what a picture and the target's have to do with each other, remembered over an episode.
 
 It knows no room and no target, so that one network serves all. What is seen and what the target's picture shows are
-features of the encoder `clearway`; frozen eyes compare them (`SeenPairs`), and a gated recurrent unit (Cho et al.,
+features that eyes made; frozen, they compare them (`SeenPairs`), and a gated recurrent unit (Cho et al.,
 2014) remembers what came of it.
 
 Axis letters: B episodes, F features, D numbers that tell of a pair, H width, A actions.

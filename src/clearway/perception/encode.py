@@ -41,8 +41,8 @@ def find_record(
     """The record of the encoder that a user asks for by name.
 
     Args:
-        name: "clearway" (our own, pretrained on generated rooms) or a folder of such (`clearway pretrain`), "resnet50"
-            (trained, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto" ("resnet50" if it
+        name: a folder of eyes (`clearway pretrain`), or "clearway" for those that come along, "resnet50" (trained,
+            `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto" ("resnet50" if it
             can be had, else "random-resnet50"), "depth-grid" (of depth, without a network), one of another package
             (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
         scenes: what "random-resnet50" calibrates on, in any order; or what gives them, asked only if it is needed.
