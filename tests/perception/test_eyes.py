@@ -64,7 +64,7 @@ def test_pictures_of_another_size_are_resized(folder: Path):
     encoder = encoder_from_record(find_record(str(folder), []))
     small = np.random.default_rng(1).integers(256, size=(2, 6, 8, 3), dtype=np.uint8)
     large = small.repeat(16, axis=1).repeat(16, axis=2).repeat(3, axis=1).repeat(3, axis=2)
-    np.testing.assert_allclose(encoder.encode(large), encoder.encode(large[:, ::3, ::3]), atol=0.05)
+    np.testing.assert_allclose(encoder.encode(large), encoder.encode(large[:, ::3, ::3]), atol=0.2)
 
 
 def test_what_is_told_of_pictures_has_its_shapes():
@@ -102,8 +102,8 @@ def huge(folder: Path) -> str:
 
 def newer(folder: Path) -> str:
     path = folder / "eyes.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "format_version": 2}))
-    return "of format 2, this clearway reads 1. Upgrade clearway"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "format_version": 3}))
+    return "of format 3, this clearway reads 2. Upgrade clearway"
 
 
 def gone(folder: Path) -> str:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clearway.perception.around import PLACES_M
 from clearway.perception.token_grid import TokenGrid
 from clearway.pretraining.labels import pair_labels, token_depth_m
 from clearway.views.table import ViewTable
@@ -29,6 +30,7 @@ def table_of_poses(*poses: tuple[float, float, float, float, float]) -> ViewTabl
         zone=np.zeros(count, np.int8),
         clearance_m=np.zeros(count),
         free_m=np.zeros((count, 4)),
+        stands=np.zeros((count, len(PLACES_M)), bool),
     )
 
 

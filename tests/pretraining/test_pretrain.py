@@ -81,16 +81,16 @@ def test_the_folder_is_an_encoder_that_says_how_it_was_trained(tmp_path: Path, v
 
 def test_another_seed_gives_other_eyes(views: Views):
     one, again, other = (Pretrainer(PretrainRequest(views, SETTINGS, seed)) for seed in (1, 1, 2))
-    figures = [trainer.update(next(trainer.batches()))["loss"] for trainer in (one, again, other)]
+    figures = [trainer.update(next(trainer.lessons()))["loss"] for trainer in (one, again, other)]
     assert figures[0] == figures[1] != figures[2]
 
 
 def test_eyes_learn(tmp_path: Path):
     views = made(tmp_path / "views", rooms=2)
     trainer = Pretrainer(PretrainRequest(views, replace(SETTINGS, pictures=16 * 60, learning_rate=5e-3)))
-    batches = trainer.batches()
-    rows = [trainer.update(next(batches)) for _ in range(60)]
-    for part in ("loss", "loss_depth", "loss_match"):
+    lessons = trainer.lessons()
+    rows = [trainer.update(next(lessons)) for _ in range(60)]
+    for part in ("loss_stands", "loss_match"):
         early, late = (np.mean([row[part] for row in some]) for some in (rows[:10], rows[-10:]))
         assert late < 0.9 * early, part
 

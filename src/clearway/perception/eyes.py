@@ -26,12 +26,18 @@ if TYPE_CHECKING:
 
 NAME, KIND = "clearway", "eyes"
 CARD_FILE, WEIGHTS_FILE = "eyes.json", "eyes.safetensors"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 SHIPPED = Path(__file__).parent / "weights"
 MEAN, STD = (0.45, 0.45, 0.45), (0.25, 0.25, 0.25)  # of colours from 0 to 1
 MAX_WIDTH, MAX_SIDE_PX = 4096, 512  # of a network; a card that asks for more is refused
 MAX_WEIGHTS_BYTES = 256 * 1024**2
-STATISTICS = ("running_mean", "running_var")  # kept as they are; all else in half precision
+STATISTICS = (
+    "running_mean",
+    "running_var",
+    "whereabouts_seen",
+    "stood",
+)
+"""Buffers that are kept as they are; all else is kept in half precision."""
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from clearway.perception.around import PLACES_M
 from clearway.perception.token_grid import TokenGrid
+from clearway.perception.whereabouts import WHEREABOUTS
 
 DIRECTIONS = 4  # ahead, left, right, behind
+GIST = 64  # numbers of a whole picture that two are compared by
 SHARPNESS = 10.0  # of matches, before it is learnt
 NEAREST_M = 0.1  # added to distances before their logarithm
 
@@ -58,11 +61,13 @@ class Glance(NamedTuple):
     Attributes:
         description: (B, description_width) unit vectors, alike for pictures of one place.
         free: (B, 4) log(metres + 0.1) that the body could move ahead, left, right and behind.
+        stands: (B, 63) logits: the body could stand at each of `around.PLACES_M`.
         depth: (B, T) log(metres) of what each token sees.
     """
 
     description: Tensor
     free: Tensor
+    stands: Tensor
     depth: Tensor
 
 
@@ -76,6 +81,7 @@ class Comparison(NamedTuple):
         matches: (P, T, T + 1) logits: token of the second picture that sees what each of the first one's sees; the last
             says that none does.
         vector: (P, hidden_width), what the poses are told from.
+        whereabouts: (P, 2313) logits: the second camera's pose is in each of the bins of `whereabouts`.
     """
 
     place_m: Tensor
@@ -83,12 +89,15 @@ class Comparison(NamedTuple):
     overlap: Tensor
     matches: Tensor
     vector: Tensor
+    whereabouts: Tensor
 
 
 class Eyes(nn.Module):
     """Called with pictures (B, 3, height_px, width_px), standardised, it gives their tokens (B, T, C)."""
 
     slopes: Tensor
+    whereabouts_seen: Tensor
+    stood: Tensor
 
     def __init__(self, shape: EyesShape) -> None:
         super().__init__()
@@ -106,21 +115,25 @@ class Eyes(nn.Module):
             nn.Conv2d(third, width, 1),
         )
         self.description = nn.Linear(count * width, shape.description_width)
-        self.free = nn.Sequential(
-            nn.Linear(count * width, shape.hidden_width // 2), nn.ReLU(), nn.Linear(shape.hidden_width // 2, DIRECTIONS)
-        )
+        self.around = nn.Sequential(nn.Linear(count * width, shape.hidden_width // 2), nn.ReLU())
+        self.free = nn.Linear(shape.hidden_width // 2, DIRECTIONS)
+        self.stands = nn.Linear(shape.hidden_width // 2, len(PLACES_M))
         self.depth = nn.Linear(width, 1)
         self.asking, self.asked = nn.Linear(width, width), nn.Linear(width, width)
         self.no_match = nn.Parameter(torch.zeros(1))
         self.sharpness = nn.Parameter(torch.zeros(1))
         self.register_buffer("slopes", torch.tensor(shape.grid.slopes, dtype=torch.float32), persistent=False)
+        self.gist = nn.Linear(count * width, GIST)
         self.pose = nn.Sequential(
-            nn.Linear(count * 6, shape.hidden_width),
+            nn.Linear(count * 7 + 2 * GIST, shape.hidden_width),
             nn.ReLU(),
             nn.Linear(shape.hidden_width, shape.hidden_width),
             nn.ReLU(),
         )
         self.told = nn.Linear(shape.hidden_width, 5)
+        self.whereabouts = nn.Linear(shape.hidden_width, WHEREABOUTS)
+        self.register_buffer("whereabouts_seen", torch.ones(WHEREABOUTS))
+        self.register_buffer("stood", torch.ones(len(PLACES_M) + 1))  # at each place, and of so many pictures
         for parameter in self.trunk.parameters():
             if parameter.ndim == 4:  # pictures come with their colours last
                 parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
@@ -133,7 +146,14 @@ class Eyes(nn.Module):
         """What tokens (B, T, C) tell of each picture."""
         flat = tokens.flatten(1)
         description = functional.normalize(self.description(flat).float(), dim=1)
-        return Glance(description, self.free(flat).float(), self.depth(tokens)[..., 0].float())
+        around = self.around(flat)
+        depth = self.depth(tokens)[..., 0].float()
+        return Glance(description, self.free(around).float(), self.stands(around).float(), depth)
+
+    def count(self, where: Tensor, stands: Tensor) -> None:
+        """Keep how often what it has learnt from was so: bins (P,) int64 of pairs, and places to stand (B, 63) bool."""
+        self.whereabouts_seen += torch.bincount(where, minlength=WHEREABOUTS)
+        self.stood += torch.cat([stands.sum(dim=0), torch.tensor([len(stands)])])
 
     def compare(self, first: Tensor, second: Tensor, first_depth: Tensor, second_depth: Tensor) -> Comparison:
         """What tokens (P, T, C) of two pictures, and their depth (P, T) as `glance` tells it, tell of the cameras."""
@@ -151,10 +171,12 @@ class Eyes(nn.Module):
             first_depth.unsqueeze(2),
             where @ second_depth.unsqueeze(2) * found,
             where.amax(dim=2, keepdim=True),
+            second_depth.unsqueeze(2),
         ]
-        vector = self.pose(torch.cat(seen, dim=2).flatten(1))
+        gists = [self.gist(tokens.flatten(1)).float() for tokens in (first, second)]
+        vector = self.pose(torch.cat([torch.cat(seen, dim=2).flatten(1), *gists], dim=1))
         told = self.told(vector)
-        return Comparison(told[:, :2], told[:, 2:4], told[:, 4], matches, vector)
+        return Comparison(told[:, :2], told[:, 2:4], told[:, 4], matches, vector, self.whereabouts(vector))
 
 
 class _Residual(nn.Module):

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from clearway.perception.around import PLACES_M
 from clearway.perception.eyes_network import NEAREST_M, Eyes
 from clearway.pretraining.augment import relit, standardised
 from clearway.pretraining.labels import pair_labels, token_depth_m
@@ -22,6 +23,7 @@ from clearway.views.stream import Views
 NEAR_M, NEAR_DEG = 0.5, 30.0  # poses no farther apart count as one step
 CLOSE_M, CLOSE_DEG = 0.5, 15.0  # relative poses told no worse are right
 FREE_M = 0.25  # free ways told no worse are right
+STEP_AHEAD = PLACES_M.index((0.5, 0.0))
 PAIRS = 4000  # of a room
 BATCH = 64
 
@@ -36,10 +38,13 @@ class Judgement:
         recognised_near: the nearest one is of a pose within half a metre and 30 degrees.
         free_ahead: share of free ways ahead told within a quarter of a metre.
         free: the same of all four directions, three of which are out of sight.
+        stands: share of the places around the body of which it is rightly told whether it could stand there.
+        step_ahead: the same of the place half a metre ahead.
         depth: median error of depth, share of it.
         place_m, turn_deg: median errors of relative poses of pictures that see a quarter alike or more.
         poses: share of these right within half a metre and 15 degrees.
         overlap: share of pairs rightly told to see a quarter alike, or not.
+        where_nats: mean surprise of the true bin of the relative pose, all pairs.
     """
 
     rooms: int
@@ -47,11 +52,14 @@ class Judgement:
     recognised_near: float
     free_ahead: float
     free: float
+    stands: float
+    step_ahead: float
     depth: float
     place_m: float
     turn_deg: float
     poses: float
     overlap: float
+    where_nats: float
 
     def to_json(self) -> dict[str, float]:
         """As JSON values."""
@@ -83,11 +91,14 @@ def _in_room(eyes: Eyes, shard: Shard, rng: np.random.Generator) -> dict[str, fl
     glance = eyes.glance(tokens)
     free_m = (glance.free.exp() - NEAREST_M).numpy()
     free_right = np.abs(free_m - table.free_m) < FREE_M
+    stands_right = (glance.stands > 0).numpy() == table.stands
     told_m, true_m = glance.depth.exp().numpy(), np.maximum(token_depth_m(depth, eyes.shape.grid), SHALLOWEST_M)
     return {
         **recognition(glance.description, np.column_stack([table.x_m, table.z_m, table.heading_deg])),
         "free_ahead": float(free_right[:, 0].mean()),
         "free": float(free_right.mean()),
+        "stands": float(stands_right.mean()),
+        "step_ahead": float(stands_right[:, STEP_AHEAD].mean()),
         "depth": float(np.median(np.abs(told_m / true_m - 1))),
         **_relative_poses(eyes, tokens, glance.depth, shard, rng),
     }
@@ -128,4 +139,5 @@ def _relative_poses(
         "turn_deg": float(np.median(off_deg[alike])) if some else float("nan"),
         "poses": float(right[alike].mean()) if some else float("nan"),
         "overlap": float(np.mean((told.overlap.numpy() > 0) == alike)),
+        "where_nats": float(torch.nn.functional.cross_entropy(told.whereabouts, torch.from_numpy(labels.where))),
     }

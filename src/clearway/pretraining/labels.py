@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.perception.token_grid import TokenGrid
+from clearway.perception.whereabouts import bin_of
 from clearway.views.table import ViewTable
 
 MILLIMETRE = 0.001
@@ -27,12 +28,14 @@ class PairLabels:
         turn: (P, 2) float32, cosine and sine of how far the second camera is turned to the right.
         match: (P, T) int64, token of the second picture that sees what each of the first one's sees; T where none does.
         overlap: (P,) float32, share of the first one's tokens that have a match.
+        where: (P,) int64, bin of `perception.whereabouts` that the second camera's pose is in.
     """
 
     place_m: np.ndarray
     turn: np.ndarray
     match: np.ndarray
     overlap: np.ndarray
+    where: np.ndarray
 
 
 def token_depth_m(depth: np.ndarray, grid: TokenGrid) -> np.ndarray:
@@ -63,6 +66,7 @@ def pair_labels(
         turn=np.stack([np.cos(turn), np.sin(turn)], axis=1).astype(np.float32),
         match=match,
         overlap=(match < grid.count).astype(np.float32).mean(axis=1),
+        where=bin_of(ahead_m, right_m, np.degrees(turn)),
     )
 
 

@@ -14,10 +14,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from clearway.perception.eyes_network import NEAREST_M, Comparison, Eyes, Glance
-from clearway.pretraining.labels import PairLabels, pair_labels, token_depth_m
+from clearway.pretraining.labels import PairLabels, token_depth_m
 from clearway.views.stream import ViewBatch
 
-FREE, DEPTH, POSE, OVERLAP, MATCH, PLACE = 1.0, 1.0, 3.0, 0.5, 0.5, 0.3
+FREE, STANDS, DEPTH, POSE, OVERLAP, MATCH, PLACE, WHERE = 1.0, 1.0, 1.0, 3.0, 0.5, 0.5, 0.3, 0.2
 """Weights of the parts."""
 BEND = 0.1  # where errors begin to count as they are, not squared
 SHALLOWEST_M = 0.05
@@ -32,54 +32,63 @@ class Parts:
 
     Attributes:
         free: of free ways, log metres.
+        stands: of whether the body could stand at places around it, nats.
         depth: of depth at the tokens, log metres.
         pose: of relative poses.
         overlap: of whether two pictures see the same.
         match: of which tokens do, nats.
         place: of telling the other take of a pose among all pictures of the batch, nats.
+        where: of bins of relative poses, nats.
     """
 
     free: Tensor
+    stands: Tensor
     depth: Tensor
     pose: Tensor
     overlap: Tensor
     match: Tensor
     place: Tensor
+    where: Tensor
 
     @property
     def total(self) -> Tensor:
         """The loss."""
-        weighted = FREE * self.free + DEPTH * self.depth + POSE * self.pose
-        return weighted + OVERLAP * self.overlap + MATCH * self.match + PLACE * self.place
+        glance = FREE * self.free + STANDS * self.stands + DEPTH * self.depth + PLACE * self.place
+        return glance + POSE * self.pose + OVERLAP * self.overlap + MATCH * self.match + WHERE * self.where
 
     def figures(self) -> dict[str, float]:
         """For metrics.jsonl."""
         return {f"loss_{name}": part.item() for name, part in vars(self).items()} | {"loss": self.total.item()}
 
 
-def losses(
-    eyes: Eyes, pixels: Tensor, batch: ViewBatch, partners: int, group: int, rng: np.random.Generator, bfloat16: bool
-) -> Parts:
-    """The loss of a batch.
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """A batch with all that an update needs.
 
-    Args:
-        eyes: the network.
+    Attributes:
+        batch: what is known of its B pictures, with depth.
         pixels: (B, 3, height, width), its pictures, relit.
-        batch: what is known of them, with depth.
-        partners: pictures that each one is compared with.
-        group: pictures of one room that come one after the other.
-        rng: chooses partners.
-        bfloat16: whether the trunk multiplies in it.
+        first, second: (P,) numbers of the pictures that are compared.
+        labels: what is true of these pairs.
     """
-    with torch.autocast(pixels.device.type, torch.bfloat16, enabled=bfloat16):
-        tokens = eyes(pixels)
+
+    batch: ViewBatch
+    pixels: Tensor
+    first: np.ndarray
+    second: np.ndarray
+    labels: PairLabels
+
+
+def losses(eyes: Eyes, lesson: Lesson, bfloat16: bool) -> Parts:
+    """The loss of a batch; `bfloat16`: the trunk multiplies in it."""
+    with torch.autocast(lesson.pixels.device.type, torch.bfloat16, enabled=bfloat16):
+        tokens = eyes(lesson.pixels)
         glance = eyes.glance(tokens)
-    first, second = drawn_pairs(len(batch), partners, group, rng)
-    labels = pair_labels(batch.table, batch.seen["depth"], first, second, eyes.shape.grid)
-    tokens = tokens.float()
+    tokens, first, second = tokens.float(), lesson.first, lesson.second
     comparison = eyes.compare(tokens[first], tokens[second], glance.depth[first], glance.depth[second])
-    free, depth, place = _of_glance(glance, batch, eyes)
-    return Parts(free, depth, *_of_comparison(comparison, labels), place)
+    free, stands, depth, place = _of_glance(glance, lesson.batch, eyes)
+    pose, overlap, match, where = _of_comparison(comparison, lesson.labels)
+    return Parts(free, stands, depth, pose, overlap, match, place, where)
 
 
 def drawn_pairs(count: int, partners: int, group: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -88,25 +97,28 @@ def drawn_pairs(count: int, partners: int, group: int, rng: np.random.Generator)
     return first, np.minimum(first // group * group + rng.integers(group, size=len(first)), count - 1)
 
 
-def _of_glance(glance: Glance, batch: ViewBatch, eyes: Eyes) -> tuple[Tensor, Tensor, Tensor]:
-    """Losses of free ways, depth, and descriptions."""
+def _of_glance(glance: Glance, batch: ViewBatch, eyes: Eyes) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Losses of free ways, of places to stand at, of depth, and of descriptions."""
     free = torch.from_numpy(np.log(batch.table.free_m + NEAREST_M).astype(np.float32))
     deep = torch.from_numpy(np.log(np.maximum(token_depth_m(batch.seen["depth"], eyes.shape.grid), SHALLOWEST_M)))
     alike = glance.description[0::2] @ glance.description[1::2].T * SHARPNESS
     same = torch.arange(len(alike))
     place = (functional.cross_entropy(alike, same) + functional.cross_entropy(alike.T, same)) / 2
-    return _bent(glance.free, free).mean(), _bent(glance.depth, deep).mean(), place
+    stands = torch.from_numpy(batch.table.stands.astype(np.float32))
+    standing = functional.binary_cross_entropy_with_logits(glance.stands, stands)
+    return _bent(glance.free, free).mean(), standing, _bent(glance.depth, deep).mean(), place
 
 
-def _of_comparison(comparison: Comparison, labels: PairLabels) -> tuple[Tensor, Tensor, Tensor]:
-    """Losses of poses (metres count less the farther the cameras stand apart), overlap, and matches."""
-    place_m, turn, match, overlap = (torch.from_numpy(part) for part in vars(labels).values())
+def _of_comparison(comparison: Comparison, labels: PairLabels) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Losses of poses (metres count less the farther the cameras stand apart), overlap, matches, and bins of poses."""
+    place_m, turn, match, overlap, where = (torch.from_numpy(part) for part in vars(labels).values())
     weight = (overlap + WITHOUT_OVERLAP).unsqueeze(1)
     scale = 1 / (0.5 + place_m.norm(dim=1, keepdim=True))
     placed = (_bent(comparison.place_m * scale, place_m * scale) * weight).mean()
     turned = (_bent(comparison.turn, turn) * weight).mean()
     shared = functional.binary_cross_entropy_with_logits(comparison.overlap, (overlap > OVERLAPPING).float())
-    return placed + turned, shared, functional.cross_entropy(comparison.matches.flatten(0, 1), match.flatten())
+    matched = functional.cross_entropy(comparison.matches.flatten(0, 1), match.flatten())
+    return placed + turned, shared, matched, functional.cross_entropy(comparison.whereabouts, where)
 
 
 def _bent(told: Tensor, true: Tensor) -> Tensor:

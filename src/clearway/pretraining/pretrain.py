@@ -29,9 +29,11 @@ from clearway.learn.metrics_log import MetricsLog
 from clearway.learn.optimiser import clip_gradients
 from clearway.model.precision import multiplies_bfloat16
 from clearway.perception.eyes_network import Eyes
+from clearway.pretraining.ahead import made_ahead
 from clearway.pretraining.augment import relit, standardised
 from clearway.pretraining.eyes_folder import EyesFolder, record_of
-from clearway.pretraining.losses import losses
+from clearway.pretraining.labels import pair_labels
+from clearway.pretraining.losses import Lesson, drawn_pairs, losses
 from clearway.pretraining.settings import PretrainSettings
 from clearway.scenes.sensors import DEPTH, RGB
 from clearway.views.stream import ViewBatch, Views
@@ -159,15 +161,26 @@ class Pretrainer:
             yield from (batch for batch in batches if len(batch) == settings.batch)
             epoch, start = epoch + 1, 0
 
-    def update(self, batch: ViewBatch) -> dict[str, float]:
-        """Learn from a batch; gives its figures."""
-        settings, number = self.settings, [self.request.seed, self.updates]
+    def lessons(self) -> Iterator[Lesson]:
+        """The batches that are next, relit and paired, without end."""
+        for update, batch in enumerate(self.batches(), self.updates):
+            yield self._lesson(batch, update)
+
+    def _lesson(self, batch: ViewBatch, update: int) -> Lesson:
+        """A batch, relit and paired by the chances of an update."""
+        settings, number = self.settings, [self.request.seed, update]
         levels = relit(batch.seen[RGB], np.random.default_rng([*number, LIGHT]))
-        pixels = torch.from_numpy(standardised(levels))
-        self.eyes.train()
-        group = 2 * settings.together
         rng = np.random.default_rng([*number, PARTNERS])
-        parts = losses(self.eyes, pixels, batch, settings.partners, group, rng, self._bfloat16)
+        first, second = drawn_pairs(len(batch), settings.partners, 2 * settings.together, rng)
+        labels = pair_labels(batch.table, batch.seen[DEPTH], first, second, settings.shape.grid)
+        return Lesson(batch, torch.from_numpy(standardised(levels)), first, second, labels)
+
+    def update(self, lesson: Lesson) -> dict[str, float]:
+        """Learn from the next lesson; gives its figures."""
+        settings = self.settings
+        self.eyes.train()
+        parts = losses(self.eyes, lesson, self._bfloat16)
+        self.eyes.count(torch.from_numpy(lesson.labels.where), torch.from_numpy(lesson.batch.table.stands))
         self._optimiser.zero_grad()
         parts.total.backward()
         gradients = [parameter.grad for parameter in self._named.values() if parameter.grad is not None]
@@ -217,9 +230,9 @@ def _run(trainer: Pretrainer, folder: EyesFolder, done: Callable[[int], object],
     saved_at = time.monotonic()
     with interruption() as interrupted:
         try:
-            for batch in trainer.batches():
+            for lesson in made_ahead(trainer.lessons()):
                 begun = time.monotonic()
-                figures = trainer.update(batch)
+                figures = trainer.update(lesson)
                 seconds += time.monotonic() - begun
                 if not np.isfinite(figures["loss"]):
                     problem = f"the loss is {figures['loss']} after {trainer.pictures} pictures"

@@ -21,6 +21,7 @@ from clearway.live.draws import Draws
 from clearway.live.live_room import LiveRoom, layout_of_episode
 from clearway.live.walker import Pose, Walker
 from clearway.live_envs.arguments import CLEARANCE_REACH_M
+from clearway.perception.around import PLACES_M
 from clearway.rooms.camera import Shot, first_person_shot
 from clearway.views.settings import ViewSettings
 from clearway.views.table import COLUMNS, TURNS_DEG, ViewTable, table_of
@@ -156,11 +157,24 @@ def _layouts(live: LiveRoom, settings: ViewSettings) -> list[Arrangement]:
 
 
 def _felt(body: Body, pose: Pose, draws: Draws, live: LiveRoom) -> Sequence[float]:
-    """Zone, clearance and the free ways of the body at a pose, the last columns of the table."""
+    """Zone, clearance, free ways and where the body could stand, at a pose: the last columns of the table."""
     scene = live.scene
     walker = Walker(body, pose, draws, step_m=scene.cell_size_m, turn_deg=scene.turn_deg, measured=False)
     ways_m = (_free_way_m(body, pose[2] + turn_deg) for turn_deg in TURNS_DEG)
-    return float(walker.zone()), max(0.0, body.gap_m(REACH_M)), *ways_m
+    felt = (float(walker.zone()), max(0.0, body.gap_m(REACH_M)), *ways_m)
+    return *felt, *_stands(body, pose[2], live)
+
+
+def _stands(body: Body, heading_deg: float, live: LiveRoom) -> list[float]:
+    """Whether the body could stand at each of `PLACES_M`, a cell or less from one of the scene."""
+    start_m, heading = body.place_m, np.radians(heading_deg)
+    ahead = np.array([[np.sin(heading), np.cos(heading)], [np.cos(heading), -np.sin(heading)]])
+    places_m = start_m + np.array(PLACES_M) @ ahead
+    cells_m = np.unique(live.scene.locations_m, axis=0)
+    inside = np.abs(places_m[:, None] - cells_m).max(axis=2).min(axis=1) <= live.scene.cell_size_m
+    found = [float(near and _is_free(body, place_m)) for near, place_m in zip(inside.tolist(), places_m, strict=True)]
+    body.stand_at(start_m)
+    return found
 
 
 def _free_way_m(body: Body, heading_deg: float) -> float:

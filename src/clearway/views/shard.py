@@ -32,7 +32,7 @@ from clearway.views.table import COLUMNS, WHOLE, ViewTable, table_of
 from clearway.views.take import RoomViews
 
 FORMAT = "clearway views"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 TABLE = "table"
 CHUNK_BYTES = 512 * 1024
 LARGEST = 1e6  # of what the table holds

@@ -7,11 +7,16 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from clearway.perception.around import PLACES_M
+
 DIRECTIONS = ("ahead", "left", "right", "behind")
 TURNS_DEG = (0.0, -90.0, 90.0, 180.0)  # of the directions, from the heading
 FREE = tuple(f"free_{direction}_m" for direction in DIRECTIONS)
-WHOLE = {"pose": "int32", "take": "int32", "arrangement": "int32", "zone": "int8"}
+STANDS = tuple(f"stands_{ahead_m:g}_{right_m:g}" for ahead_m, right_m in PLACES_M)
+WHOLE = {"pose": "int32", "take": "int32", "arrangement": "int32", "zone": "int8"} | dict.fromkeys(STANDS, "bool")
 """Columns of whole numbers."""
+WIDE = {"free_m": FREE, "stands": STANDS}
+"""Attributes of several numbers a picture, and the columns that they are kept in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +35,7 @@ class ViewTable:
         clearance_m: (N,) float64, from the body to the nearest obstacle, at most `REACH_M`.
         free_m: (N, 4) float64, how far the body could move ahead, to the left, to the right and behind, at most
             `REACH_M`.
+        stands: (N, 63) bool, whether the body could stand at each of `PLACES_M`, whatever lies between.
     """
 
     pose: np.ndarray
@@ -43,6 +49,7 @@ class ViewTable:
     zone: np.ndarray
     clearance_m: np.ndarray
     free_m: np.ndarray
+    stands: np.ndarray
 
     def __len__(self) -> int:
         """N."""
@@ -57,15 +64,15 @@ class ViewTable:
         return np.column_stack([getattr(self, field.name) for field in fields(self)]).astype(np.float64)
 
 
-COLUMNS = (*(field.name for field in fields(ViewTable) if field.name != "free_m"), *FREE)
-"""Of `ViewTable.to_array`; `free_m` is the last four."""
+COLUMNS = tuple(name for field in fields(ViewTable) for name in WIDE.get(field.name, (field.name,)))
+"""Of `ViewTable.to_array`."""
 
 
 def table_of(values: np.ndarray) -> ViewTable:
     """The table that `ViewTable.to_array` made an array of."""
     plain = {name: column.astype(WHOLE.get(name, "float64")) for name, column in zip(COLUMNS, values.T, strict=True)}
-    free_m = np.column_stack([plain.pop(name) for name in FREE])
-    return ViewTable(**plain, free_m=free_m)
+    wide = {name: np.column_stack([plain.pop(column) for column in columns]) for name, columns in WIDE.items()}
+    return ViewTable(**plain, **wide)
 
 
 def joined(tables: Sequence[ViewTable]) -> ViewTable:
