@@ -11,6 +11,7 @@ from clearway.errors import SceneError
 from clearway.live.conditions import Perturbations
 from clearway.live.live_room import LiveRoom
 from clearway.live.words import GEOMETRY
+from clearway.perception.around import PLACES_M
 from clearway.rooms.camera import first_person_shot
 from clearway.scenes.held_out import held_out
 from clearway.views import poses
@@ -121,18 +122,25 @@ def test_distances_are_the_body_s(live):
     body = live.body(live.as_built())
     draws = drawn(live, STILL).draws[0]
     felt = poses._felt(body, (table.x_m[row], table.z_m[row], 180.0), draws, live)
-    zone, clearance_m, ahead_m, left_m, right_m, _ = felt
+    zone, clearance_m, ahead_m, left_m, right_m = felt[:5]
     x_m, z_m = table.x_m[row], table.z_m[row]
     assert ahead_m == pytest.approx(z_m - RADIUS_M, abs=0.011)
     assert left_m == pytest.approx(2 - x_m - RADIUS_M, abs=0.011)
     assert 0 < right_m <= x_m - RADIUS_M + 1e-9
     assert clearance_m == pytest.approx(min(z_m, 2 - x_m) - RADIUS_M, abs=1e-6)
     assert zone == Zone.COLLISION and ahead_m < 0.5
+    stands = dict(zip(PLACES_M, felt[6:], strict=True))
+    assert stands[0.0, 0.0] and stands[0.0, 0.5] == (right_m > 0.5)
+    assert not stands[0.5, 0.0] and not stands[3.0, 0.0] and not stands[0.0, -2.0]
+    assert body.place_m.tolist() == [x_m, z_m]
     np.testing.assert_allclose(np.rint(table.free_m / 0.01) * 0.01, table.free_m, atol=1e-9)
     assert (table.clearance_m <= table.free_m.min(axis=1) + 0.011).all()
     step_ahead = np.minimum(table.free_m[:, 0], table.free_m[:, 3])
     assert (table.zone[step_ahead < 0.49] == Zone.COLLISION).all()
     assert (table.zone[step_ahead > 1.01] == Zone.FREE).all()
+    assert table.stands[:, PLACES_M.index((0.0, 0.0))].all()
+    a_metre_ahead = table.stands[:, PLACES_M.index((1.0, 0.0))]
+    assert a_metre_ahead[table.free_m[:, 0] > 1.0].all() and not a_metre_ahead[table.free_m[:, 0] < 0.7].all()
 
 
 def test_parts_that_cannot_be_reached_have_no_poses(live):

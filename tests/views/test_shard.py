@@ -14,7 +14,7 @@ from clearway.errors import SceneError
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views import shard as shards
 from clearway.views.shard import is_shard, read_shard, room_key, write_shard
-from clearway.views.table import ViewTable
+from clearway.views.table import COLUMNS, ViewTable
 from helpers.made import corridor_scene
 from helpers.made_views import SETTINGS, made_views, write_made
 
@@ -103,7 +103,7 @@ FAULTS = {
     "no views": (lambda file: file.attrs.__delitem__("format"), "holds no views"),
     "newer": (
         lambda file: file.attrs.__setitem__("format_version", 9),
-        "has version 9.* reads 1. Take them again",
+        "has version 9.* reads 2. Take them again",
     ),
     "no version": (lambda file: file.attrs.__delitem__("format_version"), "has version None"),
     "no pictures": (lambda file: file.__delitem__("rgb"), "dataset 'rgb': is missing"),
@@ -128,14 +128,14 @@ FAULTS = {
     "huge count": (other("rgb", shape=(HUGE, 16, 16, 3), dtype="u1", chunks=(1, 16, 16, 3)), "values were written"),
     "huge settings": (settings_of(size_px=[1024, 1024], poses=100_000), "would take 976.6 GiB"),
     "no values": (
-        other("table", shape=(20, 14), dtype="f8", chunks=(20, 14)),
-        "not all of its 280 values",
+        other("table", shape=(20, len(COLUMNS)), dtype="f8", chunks=(20, len(COLUMNS))),
+        f"not all of its {20 * len(COLUMNS):,} values",
     ),
     "other columns": (other("table", data=np.zeros((20, 3))), "has shape"),
-    "no numbers": (other("table", data=np.full((20, 14), np.nan)), "something else than numbers"),
-    "negative pose": (other("table", data=np.full((20, 14), -1.0)), "something else than numbers"),
-    "half a pose": (other("table", data=np.full((20, 14), 0.5)), "something else than numbers"),
-    "endless": (other("table", data=np.full((20, 14), 1e9)), "something else than numbers"),
+    "no numbers": (other("table", data=np.full((20, len(COLUMNS)), np.nan)), "something else than numbers"),
+    "negative pose": (other("table", data=np.full((20, len(COLUMNS)), -1.0)), "something else than numbers"),
+    "half a pose": (other("table", data=np.full((20, len(COLUMNS)), 0.5)), "something else than numbers"),
+    "endless": (other("table", data=np.full((20, len(COLUMNS)), 1e9)), "something else than numbers"),
     "unwritten": (other("rgb", shape=(20, 16, 16, 3), dtype="u1", chunks=(1, 16, 16, 3)), "were written"),
 }
 
