@@ -35,6 +35,7 @@ ORDER = (
     {"world"},
     {"envs"},
     {"model"},
+    {"mapping"},
     {"agents"},
     {"learn"},
     {"evaluation"},

@@ -1,0 +1,71 @@
+"""The explorer: it tours a room to see all of it, and keeps what it has seen for a `MappingAgent`.
+
+Axis letters: B episodes, N pictures at most, F features, G cells along a side of the lattice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.encoded import Encoded
+from clearway.mapping.following import Follower, been_now
+from clearway.mapping.room_map import RoomMap
+from clearway.mapping.search import probabilities, search_steps
+from clearway.mapping.settings import MappingSettings
+from clearway.mapping.sight import Sight
+from clearway.perception.encoder import Encoder
+
+
+class Explorer:
+    """Goes to poses in which it has not been.
+
+    Args:
+        sight: compares features.
+        pictures: N, to be kept.
+        encoder: makes the features of what is seen; None: features themselves are seen.
+        settings: how it weighs things.
+    """
+
+    def __init__(
+        self,
+        sight: Sight,
+        pictures: int,
+        encoder: Encoder | None = None,
+        settings: MappingSettings | None = None,
+    ) -> None:
+        self._sight, self._settings, self._pictures = sight, settings or MappingSettings(), pictures
+        self._follower = Follower(sight, self._settings)
+        self._features = Encoded(encoder)
+        self.sees: tuple[str, ...] = (self._features.sees,)
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        """Begin B tours; targets are of no interest. See `Agent.reset`."""
+        count, kept = len(seed), self._pictures
+        return {
+            **self._follower.begin(count),
+            "count": np.zeros(count, np.int64),
+            "taken": np.zeros((count, kept, 3), np.int64),
+            "features": np.zeros((count, kept, self._sight.feature_count), np.float16),
+        }
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        """The next steps to where it has not been; see `Agent.act`."""
+        seen = self._features(observation)
+        poses, after = self._follower.follow(seen, state)
+        count, taken, features = (state[name].copy() for name in ("count", "taken", "features"))
+        for row, pose in enumerate(poses):
+            if count[row] < self._pictures and not state["been"][row][pose.index]:
+                taken[row, count[row]], features[row, count[row]] = pose.index, seen[row]
+                count[row] += 1
+        been = been_now(state["been"], poses)
+        likely = probabilities(np.zeros(been.shape, np.float32), after["room"])
+        action = search_steps(poses, np.where(been, 0, likely), been, after["room"], after["shut"], self._settings)
+        kept = {"count": count, "taken": taken, "features": features}
+        return Decisions(action), {**after, **kept, "been": been, "action": action}
+
+
+def map_of(state: State, row: int = 0) -> RoomMap:
+    """What an explorer's state tells of the room of one of its tours."""
+    count = int(state["count"][row])
+    return RoomMap(state["room"][row], state["shut"][row], state["taken"][row, :count], state["features"][row, :count])

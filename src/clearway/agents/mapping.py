@@ -1,0 +1,71 @@
+"""The mapping agent: it finds out where it is, where a body can stand and where the target is, and walks by that.
+
+It learns nothing but what its eyes were taught, so that it walks in any room. What it remembers of an episode is
+beliefs over a lattice of poses. With the map of a tour it begins with what the tour has found.
+
+Axis letters: B episodes, G cells along a side of the lattice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.encoded import Encoded
+from clearway.mapping.beliefs import NEVER, add_sighting
+from clearway.mapping.following import Follower, been_now
+from clearway.mapping.room_map import RoomMap
+from clearway.mapping.search import probabilities, search_steps
+from clearway.mapping.settings import MappingSettings
+from clearway.mapping.sight import Sight
+from clearway.perception.encoder import Encoder
+
+
+class MappingAgent:
+    """Walks by beliefs over a lattice of poses.
+
+    Args:
+        sight: compares features.
+        encoder: makes the features of what is seen; None: features themselves are seen.
+        known: what a tour of this room has found; None: the room is unknown.
+        settings: how it weighs things.
+    """
+
+    def __init__(
+        self,
+        sight: Sight,
+        encoder: Encoder | None = None,
+        known: RoomMap | None = None,
+        settings: MappingSettings | None = None,
+    ) -> None:
+        self._sight, self._settings, self._has_toured = sight, settings or MappingSettings(), known is not None
+        self._follower = Follower(sight, self._settings, known)
+        self._features = Encoded(encoder)
+        self.sees: tuple[str, ...] = (self._features.sees,)
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
+        features = self._features.of_target(target)
+        state = self._follower.begin(len(features))
+        goal = np.zeros(state["here"].shape, np.float32)
+        if self._has_toured:
+            self._follower.sight_in_map(goal, features, self._settings.target_weight)
+        return {"target": features, "goal": goal, **state}
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        """The next steps of ways to where the target is likely; see `Agent.act`."""
+        seen, goal = self._features(observation), state["goal"].copy()
+        poses, after = self._follower.follow(seen, state)
+        towards = self._sight.whereabouts(seen, state["target"])
+        for row, pose in enumerate(poses):
+            if not state["been"][row][pose.index]:
+                add_sighting(goal[row], pose, towards[row], self._settings.target_weight)
+        likely = probabilities(goal, after["room"])
+        there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
+        for row, pose in enumerate(poses):
+            goal[row][pose.index] = NEVER  # an episode that goes on has not arrived
+        been = been_now(state["been"], poses)
+        likely = probabilities(goal, after["room"])
+        action = search_steps(poses, likely, been, after["room"], after["shut"], self._settings)
+        decisions = Decisions(action, arrived=there > self._settings.arrived)
+        return decisions, {**after, "target": state["target"], "goal": goal, "been": been, "action": action}

@@ -1,0 +1,72 @@
+"""Beliefs over the poses of a lattice, as logarithms, and what changes them.
+
+Axes: 4 headings, G rows, G columns; W = 2 * FARTHEST + 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from clearway.mapping.lattice import AHEAD, HEADINGS, places_around, window_bins
+from clearway.perception.whereabouts import FARTHEST
+
+NEVER = -60.0
+_WINDOW, _AROUND = window_bins(), places_around()
+
+
+@dataclass(frozen=True)
+class LatticePose:
+    """A heading, a row and a column."""
+
+    heading: int
+    row: int
+    column: int
+
+    @property
+    def cell(self) -> tuple[int, int]:
+        """Row and column."""
+        return self.row, self.column
+
+    @property
+    def index(self) -> tuple[int, int, int]:
+        """Of the pose in a belief."""
+        return self.heading, self.row, self.column
+
+    def moved(self, steps: int) -> LatticePose:
+        """So many steps ahead, or back."""
+        rows, columns = AHEAD[self.heading] * steps
+        return LatticePose(self.heading, self.row + int(rows), self.column + int(columns))
+
+    def turned(self, quarters: int) -> LatticePose:
+        """So many quarter turns to the right."""
+        return LatticePose((self.heading + quarters) % HEADINGS, self.row, self.column)
+
+
+def likeliest(belief: np.ndarray) -> LatticePose:
+    """The pose with the greatest value (4, G, G), the first among equals."""
+    heading, row, column = np.unravel_index(int(belief.argmax()), belief.shape)
+    return LatticePose(int(heading), int(row), int(column))
+
+
+def add_sighting(belief: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float) -> None:
+    """Add evidence (ELSEWHERE,) of where something is, seen from a pose, to a belief (4, G, G) about it."""
+    side = belief.shape[-1]
+    rows, here_rows = _within(pose.row, side)
+    columns, here_columns = _within(pose.column, side)
+    belief[:, rows, columns] += weight * evidence[_WINDOW[pose.heading][:, here_rows, here_columns]]
+
+
+def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float) -> None:
+    """Add evidence (63,) of where a body could stand, seen from a pose, to log-odds (G, G)."""
+    side = len(room)
+    rows, columns = (_AROUND[pose.heading] + np.array(pose.cell)).T
+    inside = (rows >= 0) & (rows < side) & (columns >= 0) & (columns < side)
+    np.add.at(room, (rows[inside], columns[inside]), weight * evidence[inside])
+
+
+def _within(middle: int, side: int) -> tuple[slice, slice]:
+    """The part of a window around a place that lies in the lattice, in the lattice and in the window."""
+    first, last = max(0, middle - FARTHEST), min(side, middle + FARTHEST + 1)
+    return slice(first, last), slice(first - middle + FARTHEST, last - middle + FARTHEST)

@@ -1,0 +1,31 @@
+"""`MappingSettings`: how an agent with a map weighs what it is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MappingSettings:
+    """How an agent with a map weighs what it is told.
+
+    Attributes:
+        side: G, cells along a side of its lattice.
+        collision_cost: steps that a blocked move costs.
+        usual_room: log-odds that a body can stand in a cell of which nothing was seen.
+        standing_weight, target_weight, place_weight: of what eyes tell of cells, of the target, of the own pose. What
+            they tell in neighbouring poses is not independent, so that these are below 1.
+        nearby: steps that are added to every way, so that what is near is not everything.
+        compared: pictures of a tour that a picture is compared with.
+        arrived: probability of being at the target at which the agent says so.
+    """
+
+    side: int = 49
+    collision_cost: float = 4.0
+    usual_room: float = -1.0
+    standing_weight: float = 0.7
+    target_weight: float = 0.6
+    place_weight: float = 0.6
+    nearby: float = 2.0
+    compared: int = 8
+    arrived: float = 0.5
