@@ -11,7 +11,7 @@ from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.encoded import Encoded
 from clearway.mapping.following import Follower, been_now
 from clearway.mapping.room_map import RoomMap
-from clearway.mapping.search import probabilities, search_steps
+from clearway.mapping.search import search_steps
 from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
 from clearway.perception.encoder import Encoder
@@ -59,8 +59,8 @@ class Explorer:
                 taken[row, count[row]], features[row, count[row]] = pose.index, seen[row]
                 count[row] += 1
         been = been_now(state["been"], poses)
-        likely = probabilities(np.zeros(been.shape, np.float32), after["room"])
-        action = search_steps(poses, np.where(been, 0, likely), been, after["room"], after["shut"], self._settings)
+        alike = np.zeros(been.shape, np.float32)
+        action = search_steps(poses, alike, been, after["room"], after["shut"], self._settings)
         kept = {"count": count, "taken": taken, "features": features}
         return Decisions(action), {**after, **kept, "been": been, "action": action}
 

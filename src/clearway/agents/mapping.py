@@ -60,12 +60,10 @@ class MappingAgent:
         for row, pose in enumerate(poses):
             if not state["been"][row][pose.index]:
                 add_sighting(goal[row], pose, towards[row], self._settings.target_weight)
-        likely = probabilities(goal, after["room"])
+        np.clip(goal, self._settings.least_evidence, self._settings.most_evidence, out=goal)
+        likely = probabilities(np.where(state["been"], NEVER, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
-        for row, pose in enumerate(poses):
-            goal[row][pose.index] = NEVER  # an episode that goes on has not arrived
-        been = been_now(state["been"], poses)
-        likely = probabilities(goal, after["room"])
-        action = search_steps(poses, likely, been, after["room"], after["shut"], self._settings)
+        been = been_now(state["been"], poses)  # an episode that goes on has not arrived
+        action = search_steps(poses, goal, been, after["room"], after["shut"], self._settings)
         decisions = Decisions(action, arrived=there > self._settings.arrived)
         return decisions, {**after, "target": state["target"], "goal": goal, "been": been, "action": action}

@@ -13,6 +13,7 @@ from clearway.mapping.lattice import AHEAD, HEADINGS, places_around, window_bins
 from clearway.perception.whereabouts import FARTHEST
 
 NEVER = -60.0
+SEEN = 4.0  # log-odds at most of a cell that was seen, not tried
 _WINDOW, _AROUND = window_bins(), places_around()
 
 
@@ -59,11 +60,14 @@ def add_sighting(belief: np.ndarray, pose: LatticePose, evidence: np.ndarray, we
 
 
 def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float) -> None:
-    """Add evidence (63,) of where a body could stand, seen from a pose, to log-odds (G, G)."""
+    """Add evidence (63,) of where a body could stand, seen from a pose, to log-odds (G, G) of cells not tried yet."""
     side = len(room)
     rows, columns = (_AROUND[pose.heading] + np.array(pose.cell)).T
     inside = (rows >= 0) & (rows < side) & (columns >= 0) & (columns < side)
-    np.add.at(room, (rows[inside], columns[inside]), weight * evidence[inside])
+    cells = rows[inside], columns[inside]
+    before = room[cells]
+    seen = np.clip(before + weight * evidence[inside], -SEEN, SEEN)
+    room[cells] = np.where(np.abs(before) > SEEN, before, seen)
 
 
 def _within(middle: int, side: int) -> tuple[slice, slice]:

@@ -19,7 +19,10 @@ from clearway.perception.whereabouts import ELSEWHERE, bin_of
 from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
-SURE_OF_MOVES = 3.0  # log-odds of a move, at most, before its outcome is seen
+SURE_OF_MOVES = 1.5  # log-odds of a move, at most, before its outcome is seen
+SAME, IF_SAME, IF_NOT_SAME = 0.985, -7.0, 4.0
+"""Cosine of descriptions above which two pictures are the same; evidence for a move where they are, and are not: where
+pictures have no noise, those of one pose are the same."""
 STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}
 QUARTERS = {Action.TURN_RIGHT: 1, Action.TURN_LEFT: -1}
 
@@ -108,19 +111,24 @@ class Follower:
         """Move the beliefs of the own poses by the last actions; moves may have been blocked."""
         action = np.where(state["begun"], state["action"], -1)
         moving = np.flatnonzero(np.isin(action, list(STEPS)))
-        told = self._sight.whereabouts(state["seen"][moving], seen[moving])
-        for row, evidence in zip(moving.tolist(), told, strict=True):
-            self._moved(Action(int(action[row])), evidence, {name: values[row] for name, values in after.items()})
+        before = state["seen"][moving]
+        same = (self._sight.description(before) * self._sight.description(seen[moving])).sum(axis=1) > SAME
+        for row, evidence, stayed in zip(
+            moving.tolist(), self._sight.whereabouts(before, seen[moving]), same.tolist(), strict=True
+        ):
+            done = Action(int(action[row]))
+            moved = float(evidence[MOVED[done]] - evidence[STAYED]) + (IF_SAME if stayed else IF_NOT_SAME)
+            self._moved(done, moved, {name: values[row] for name, values in after.items()})
         for row in np.flatnonzero(np.isin(action, list(QUARTERS))).tolist():
             after["here"][row] = np.roll(after["here"][row], QUARTERS[Action(int(action[row]))], axis=0)
 
-    def _moved(self, action: Action, evidence: np.ndarray, belief: Mapping[str, np.ndarray]) -> None:
-        """Change the beliefs of an episode by a move, with evidence (ELSEWHERE,) of where it ended."""
+    def _moved(self, action: Action, moved: float, belief: Mapping[str, np.ndarray]) -> None:
+        """Change the beliefs of an episode by a move; `moved`: evidence that it was not blocked."""
         here, room, steps = belief["here"], belief["room"], STEPS[action]
         before = likeliest(here)
         beyond = before.moved(steps)
         usual = float(np.clip(room[beyond.cell], -SURE_OF_MOVES, SURE_OF_MOVES))
-        moved = float(evidence[MOVED[action]] - evidence[STAYED]) + usual
+        moved += usual
         gone = np.stack([shifted(here[h], AHEAD[h] * steps, NEVER) for h in range(HEADINGS)])
         here[:] = np.logaddexp(gone - np.logaddexp(0, -moved), here - np.logaddexp(0, moved))
         if moved < 0:

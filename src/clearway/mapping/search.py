@@ -9,12 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clearway.mapping.beliefs import LatticePose, likeliest
+from clearway.mapping.beliefs import NEVER, LatticePose, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS
 from clearway.mapping.routes import FAR, first_action, shifted, ways_from
 from clearway.mapping.settings import MappingSettings
 
-NO_WAY = 0.02  # probability that a body can stand in a cell, below which no way leads through it
+DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body can hardly stand
+NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
 
 
@@ -28,7 +29,7 @@ def probabilities(evidence: np.ndarray, room: np.ndarray) -> np.ndarray:
 
 def search_steps(
     poses: Sequence[LatticePose],
-    likely: np.ndarray,
+    evidence: np.ndarray,
     done: np.ndarray,
     room: np.ndarray,
     shut: np.ndarray,
@@ -38,17 +39,21 @@ def search_steps(
 
     Args:
         poses: B, where the agents stand.
-        likely: (B, 4, G, G), how likely what is searched for is in each pose.
-        done: (B, 4, G, G) bool, poses in which it is not.
+        evidence: (B, 4, G, G), that what is searched for is in each pose.
+        done: (B, 4, G, G) bool, poses in which it is not; where no other can be reached, the search begins anew.
         room, shut: see `Follower.begin`.
         settings: what ways cost.
     """
     price = _entering(room, shut, settings.collision_cost)
-    start = np.full(likely.shape, FAR, np.float32)
+    start = np.full(evidence.shape, FAR, np.float32)
     for row, pose in enumerate(poses):
         start[row][pose.index] = 0
     cost = ways_from(start, price)
-    worth = np.where(done | (cost >= FAR), 0, _spread(likely)) / (cost + settings.nearby)
+    within = cost < FAR
+    left = within & ~done
+    left = np.where(left.any(axis=(1, 2, 3), keepdims=True), left, within)
+    likely = probabilities(np.where(left, evidence, NEVER + evidence.min()), room)
+    worth = np.where(left, _spread(likely), 0) / (cost + settings.nearby)
     ends = [likeliest(values) for values in worth]
     found = [first_action(poses[row], end, cost[row], price[row]) for row, end in enumerate(ends)]
     return np.array(found, np.int64)
@@ -57,7 +62,8 @@ def search_steps(
 def _entering(room: np.ndarray, shut: np.ndarray, collision_cost: float) -> np.ndarray:
     """(B, 4, G, G) cost of entering each cell along each direction."""
     free = 1 / (1 + np.exp(-room))
-    price = np.where(free < NO_WAY, FAR, 1 + collision_cost * (1 - free))
+    price = 1 + collision_cost * (1 - free) + DOUBT_COST * (1 - free) ** DOUBT_POWER
+    price = np.where(room < NO_ROOM, FAR, price)
     closed = np.stack([shifted(shut[:, d], AHEAD[d], True) for d in range(HEADINGS)], axis=1)
     return np.where(closed, FAR, price[:, None]).astype(np.float32)
 
