@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from clearway.api.environments import make_env
     from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
     from clearway.api.generation import generate
+    from clearway.api.goals import evaluate_goals
     from clearway.api.pretraining import pretrain
     from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
     from clearway.api.training import TrainResult, train
@@ -57,6 +58,7 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "Decisions": "clearway.agents.agent",
     "evaluate": "clearway.api.evaluation",
     "EvaluateResult": "clearway.api.evaluation",
+    "evaluate_goals": "clearway.api.goals",
     "load_agent": "clearway.api.evaluation",
     "Navigator": "clearway.deploy.navigator",
     "ClearwayError": "clearway.errors",
@@ -84,6 +86,7 @@ __all__ = [
     "build_room",
     "encode_scenes",
     "evaluate",
+    "evaluate_goals",
     "generate",
     "load_agent",
     "load_scene",

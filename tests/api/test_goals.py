@@ -1,12 +1,22 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import clearway
+from clearway import evaluate_goals
+from clearway.agents.agent import FEATURES
 from clearway.agents.by_pose import RandomWalk
-from clearway.api.goals import evaluate_goals
-from clearway.errors import ArgumentError, ClearwayError
+from clearway.errors import ArgumentError, ClearwayError, EncoderError, SceneError
+from clearway.live import live_room
+from clearway.live.conditions import Perturbations
+from clearway.perception import encoder_from_record
+from clearway.scenes.sensors import RGB
 from clearway.scenes.thor_v1 import write_scene
+from clearway.views import grid
+from helpers.agents import Spy
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_eyes import seen_by_eyes
 
@@ -47,6 +57,76 @@ def test_others_walk_in_the_scenes_of_their_training_alone(tmp_path):
     assert told.average.episodes == 6
     with pytest.raises(ClearwayError, match="corridor"):
         evaluate_goals(trained.folder, [grid_scene(1)], goals=6)
+
+
+@pytest.fixture
+def taken(monkeypatch):
+    """Takes are the scenes' own pictures, but darker by the light asked for; each scene passes for a room."""
+    asked = []
+
+    def grid_takes(scenes, perturbations, *, takes, seed, done):
+        asked.append((perturbations, takes, seed))
+        for number, scene in enumerate(scenes, 1):
+            pictures = np.repeat(scene.observations[:][:, None], takes, axis=1)
+            yield (pictures * (1 - perturbations.light)).astype(np.uint8)
+            done(number)
+
+    monkeypatch.setattr(grid, "grid_takes", grid_takes)
+    monkeypatch.setattr(live_room, "check_is_room", lambda scene: None)
+    return asked
+
+
+def test_perturbed_takes_are_seen_by_the_agent_s_own_eyes(run, taken):
+    scenes, settings = [grid_scene(3), corridor_scene(5)], {"goals": 7, "step_limit": 60, "seed": 2}
+    plain = evaluate_goals(run / "run", scenes, **settings)
+    assert not taken and plain[0].perturbed is None
+    # takes that are the scenes' own pictures lead the same way
+    moved = Perturbations(distance_noise=0.1)
+    same = evaluate_goals(run / "run", scenes, perturb=moved, **settings)
+    assert same[0].scenes == plain[0].scenes
+    assert same[0].perturbed == {"label": "move ± 0.1 m", "perturbations": moved.to_json(), "takes": 4}
+    dark = evaluate_goals(run / "run", scenes, perturb="none light=0.9", takes=2, **settings)
+    assert dark[0].scenes != plain[0].scenes and dark[1].scenes == plain[1].scenes
+    assert taken == [(moved, 4, 2), (Perturbations(light=0.9), 2, 2)]
+    again = evaluate_goals(run / "run", scenes, perturb="none", **settings)
+    assert again[0].to_json() == plain[0].to_json() and len(taken) == 2
+
+
+def test_agents_of_one_s_own_see_takes_of_what_they_see(run, taken):
+    scene = seen_by_eyes(run / "eyes", grid_scene(3))[0]
+    settings = {"goals": 4, "step_limit": 20, "perturb": "light=0.5"}
+    spy = Spy(RGB, FEATURES)
+    evaluate_goals(spy, [scene], **settings)
+    eyes = encoder_from_record(scene.encoder)
+    seen = spy.seen[3]
+    assert seen[RGB].max() < 128 < spy.targets[0][RGB].max()
+    np.testing.assert_allclose(seen[FEATURES], eyes.encode(seen[RGB]), rtol=1e-4, atol=1e-4)
+    made = []
+    evaluate_goals(lambda world: made.append(Spy(RGB)) or made[-1], [scene], **settings)
+    assert made[-1].seen[0][RGB].max() < 128
+    evaluate_goals(RandomWalk(), [corridor_scene(5)], **settings)
+    assert len(taken) == 2, "nothing is taken for who sees no pictures"
+
+
+def test_perturbations_that_cannot_be_had_are_one_line(run, taken, tmp_path, monkeypatch):
+    with pytest.raises(ArgumentError, match="perturb='foggy': there is none of that name"):
+        evaluate_goals(run / "run", [corridor_scene(5)], goals=4, perturb="foggy")
+    with pytest.raises(ArgumentError, match="light=2, expected a number from 0 to 1"):
+        evaluate_goals(run / "run", [corridor_scene(5)], goals=4, perturb=Perturbations(light=2))
+    with pytest.raises(ArgumentError, match="takes=0"):
+        evaluate_goals(run / "run", [corridor_scene(5)], goals=4, perturb="all", takes=0)
+    with pytest.raises(ClearwayError, match="20 goals asked for"):
+        evaluate_goals(run / "run", [corridor_scene(5)], perturb="all")
+    with pytest.raises(EncoderError, match="corridor has no features by a known encoder"):
+        evaluate_goals(Spy(FEATURES), [replace(corridor_scene(5), encoder=None)], goals=4, perturb="all")
+    write_scene(corridor_scene(5, feature_count=12), tmp_path / "corridor.h5")
+    by_pose = clearway.train(tmp_path / "corridor.h5", [16, 8], out=tmp_path / "run", **SMALL)
+    with pytest.raises(ArgumentError, match="an agent of the algorithm ppo goes by poses on the grid"):
+        evaluate_goals(by_pose.folder, [tmp_path / "corridor.h5"], goals=4, perturb="all")
+    monkeypatch.undo()
+    with pytest.raises(SceneError, match="there is no room to walk in: the scene comes from test"):
+        evaluate_goals(run / "run", [corridor_scene(5)], goals=4, perturb="all")
+    assert not taken
 
 
 def test_bad_arguments_are_one_line(run):

@@ -36,6 +36,21 @@ def test_it_walks_in_scenes_that_it_was_not_trained_in(clearway, run):
     assert shown.code == 0 and "10 goals in 2 scenes" in shown.out and "shortest path" in shown.out
 
 
+def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_path):
+    words = ("--kind", "room", "--count", 1, "--split", "validation", "--size", 32, 48, "--encoder", "none")
+    made = clearway("scenes", "generate", *words, "--workers", 1, "--out", tmp_path)
+    assert made.code == 0, made
+    words = ("evaluate", run / "run", tmp_path, "--goals", 5, "--step-limit", 20, "--perturb", "all", "--takes", 2)
+    found = clearway(*words, "--json").json
+    assert found["perturbed"]["takes"] == 2 and found["perturbed"]["perturbations"]["pixel_noise"] == 10
+    assert clearway(*words, "--json").json == found
+    plain = clearway(*words[:-4], "--json").json
+    assert plain["perturbed"] is None and plain["scenes"] != found["scenes"]
+    assert [one["scenes"] for one in plain["others"]] == [one["scenes"] for one in found["others"]]
+    shown = clearway(*words)
+    assert shown.code == 0 and "5 goals in 1 scenes, pictures perturbed: move ± 0.05 m" in shown.out
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
@@ -43,6 +58,14 @@ def test_it_walks_in_scenes_that_it_was_not_trained_in(clearway, run):
         (("--goals", 500), ("500 goals asked for, the largest part has",)),
         (("--goals", 5, "--episodes", 3), ("--episodes", "Leave one of the two out")),
         (("--goals", 5, "--live"), ("--live", "Leave one of the two out")),
+        (("--goals", 5, "--light", 0.3), ("--light", "Leave one of the two out")),
+        (("--goals", 5, "--perturb", "all"), ("grid", "there is no room to walk in: the scene comes from test")),
+        (("--goals", 5, "--perturb", "fog"), ("--perturb", "fog", "Choose among none, geometry, all")),
+        (("--goals", 5, "--perturb", "all", "--takes", 0), ("--takes 0",)),
+        (("--goals", 5, "--takes", 3), ("--takes", "Add --perturb")),
+        (("--perturb", "all"), ("--perturb", "goes with --goals alone")),
+        (("--perturb", "all", "--live"), ("--perturb", "goes with --goals alone")),
+        (("--takes", 3), ("--takes", "goes with --goals alone")),
     ],
 )
 def test_bad_input_is_one_line(clearway, run, words, parts):

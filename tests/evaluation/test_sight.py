@@ -8,36 +8,19 @@ import torch
 
 from clearway.agents.agent import FEATURES, POSE, Decisions, Observation, State
 from clearway.agents.by_features import FeatureAgent
-from clearway.agents.by_pose import RandomWalk
 from clearway.errors import AgentError, SceneError
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.sight import Sight
 from clearway.scenes.actions import Action
 from clearway.scenes.sensors import DEPTH, RGB
 from clearway.world.world import World, make_world
+from helpers.agents import Spy
 from helpers.made import with_depth
 from helpers.small_runs import small_scenes, small_targets, trained_network
 
 SCENES = [with_depth(scene) for scene in small_scenes()]
 WORLD = make_world(SCENES, small_targets())
 COUNTS = ("target", "start", "steps", "collisions", "reached", "zone_steps", "looped")
-
-
-class Spy(RandomWalk):
-    """Walks at random and notes what it is given."""
-
-    def __init__(self, *sees: str) -> None:
-        self.sees = sees
-        self.targets: list[Observation] = []
-        self.seen: list[Observation] = []
-
-    def reset(self, target: Observation, seed: np.ndarray) -> State:
-        self.targets.append(target)
-        return super().reset(target, seed)
-
-    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
-        self.seen.append(observation)
-        return super().act(observation, state)
 
 
 def expected(name: str, pose: int) -> np.ndarray:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from clearway.agents.agent import POSE, Agent, Decisions, Observation, State, joined, rows
-from clearway.agents.by_pose import PoseAgent
+from clearway.agents.by_pose import PoseAgent, RandomWalk
 from clearway.scenes.actions import ACTION_COUNT, Action
 from clearway.world.world import World
 
@@ -202,3 +202,20 @@ def _actions(agent: Agent, seen: Sequence[Observation], target: Observation, see
         decisions, state = agent.act(observation, state)
         actions.append(decisions.action)
     return np.stack(actions)
+
+
+class Spy(RandomWalk):
+    """Walks at random and notes what it is given."""
+
+    def __init__(self, *sees: str) -> None:
+        self.sees = sees
+        self.targets: list[Observation] = []
+        self.seen: list[Observation] = []
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        self.targets.append(target)
+        return super().reset(target, seed)
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        self.seen.append(observation)
+        return super().act(observation, state)

@@ -21,18 +21,27 @@ class Made(list[str]):
     def workers_for(self, name_of: Callable[[Any], str], make: Callable[[Any, Any], object]) -> Callable[..., Any]:
         """Stands in for `spread.workers.workers_for`: `make(work, asked)` makes what is asked for, in this process."""
 
-        @contextmanager
-        def workers_for(work: Any, *, workers: int | None, ray: str | None) -> Iterator[Workers]:
-            def submit(asked: Any) -> Future:
-                name = name_of(asked)
-                if name in self.failing:
-                    raise SceneError(asked, "cannot be written (No space left on device)", "Make room")
-                make(work, asked)
-                self.append(name)
-                done: Future = Future()
-                done.set_result(name)
-                return done
+        def make_file(work: Any, asked: Any) -> str:
+            name = name_of(asked)
+            if name in self.failing:
+                raise SceneError(asked, "cannot be written (No space left on device)", "Make room")
+            make(work, asked)
+            self.append(name)
+            return name
 
-            yield Workers(submit, here=True)
+        return in_this_process(make_file)
 
-        return workers_for
+
+def in_this_process(make: Callable[[Any, Any], object]) -> Callable[..., Any]:
+    """Stands in for `spread.workers.workers_for`; what `make(work, asked)` gives here is a worker's result."""
+
+    @contextmanager
+    def workers_for(work: Any, *, workers: int | None, ray: str | None = None) -> Iterator[Workers]:
+        def submit(asked: Any) -> Future:
+            done: Future = Future()
+            done.set_result(make(work, asked))
+            return done
+
+        yield Workers(submit, here=True)
+
+    return workers_for

@@ -104,7 +104,9 @@ def test_scenes_are_never_written_over_nor_mixed_up(made, scenes, tmp_path) -> N
 
 
 def test_workers_load_no_torch() -> None:
-    assert "torch" not in imported_by("import clearway.views.files, clearway.api.views, clearway.views.stream")
+    assert "torch" not in imported_by(
+        "import clearway.views.files, clearway.views.grid, clearway.api.views, clearway.views.stream"
+    )
 
 
 def test_a_scene_that_is_no_room_is_told_by_its_worker(scenes, tmp_path) -> None:

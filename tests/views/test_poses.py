@@ -14,7 +14,7 @@ from clearway.live.words import GEOMETRY
 from clearway.perception.around import PLACES_M
 from clearway.rooms.camera import first_person_shot
 from clearway.scenes.held_out import held_out
-from clearway.views import poses
+from clearway.views import placing, poses
 from clearway.views.poses import REACH_M, Taken, draw_takes
 from clearway.views.settings import ViewSettings
 from clearway.zones import Zone
@@ -38,8 +38,8 @@ def nearest_states(live: LiveRoom, taken: Taken) -> np.ndarray:
 )
 def test_poses_are_free_and_keep_to_their_cells(live, settings, monkeypatch):
     layouts: list = []
-    found = poses._layouts
-    monkeypatch.setattr(poses, "_layouts", lambda *given: layouts.extend(found(*given)) or list(layouts))
+    found = placing.layouts
+    monkeypatch.setattr(placing, "layouts", lambda *given: layouts.extend(found(*given)) or list(layouts))
     taken = drawn(live, settings)
     assert (held_out(live.scene)[nearest_states(live, taken)] == settings.held_out).all()
     bodies = [live.body(layout) for layout in layouts]

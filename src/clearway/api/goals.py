@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeGuard
 
+from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
+from clearway.api.takes import Perturbed, perturbations_asked, takes_seen
+from clearway.errors import ArgumentError
+from clearway.live.conditions import Perturbations
+from clearway.scenes.sensors import RGB
 
 if TYPE_CHECKING:
     from clearway.agents.agent import Agent
     from clearway.agents.named import AgentMaker
     from clearway.evaluation.goals import GoalEvaluation
+    from clearway.evaluation.takes import Takes
     from clearway.learn.load import TrainedAgent
+    from clearway.perception.encoder import Encoder
+    from clearway.scenes.scene import Scene
 
-GOALS, STEP_LIMIT = 20, 500
+GOALS, STEP_LIMIT, TAKES = 20, 500, 4
 
 
 def evaluate_goals(
@@ -24,6 +33,9 @@ def evaluate_goals(
     goals: int = GOALS,
     step_limit: int = STEP_LIMIT,
     seed: int = 0,
+    perturb: Perturbed = "none",
+    takes: int = TAKES,
+    show_progress: bool = False,
 ) -> list[GoalEvaluation]:
     """Walk to goals drawn in some scenes: the agent, then a random walk and shortest paths, one episode a goal.
 
@@ -35,15 +47,22 @@ def evaluate_goals(
         goals: of each scene, distinct poses of its largest part.
         step_limit: steps after which an episode has failed.
         seed: of goals, starts and chances.
+        perturb: how what is seen on the way differs from the scenes' own pictures; the goals' stay as they are. "all",
+            "geometry", names such as "light", or "light=0.2", as of `take_views`; or `Perturbations`. Each step shows
+            one of several takes of its pose, which are kept in the user's cache folder once they are rendered.
+        takes: of each pose, each perturbed in its own way.
+        show_progress: draw a progress bar while rendering, if standard error is a terminal.
 
     Raises:
         ArgumentError: an argument is of the wrong kind or out of range.
-        ClearwayError: the run cannot be read, a scene is not one that the agent can walk in, or has too few poses.
+        ClearwayError: the run cannot be read, a scene is not one that the agent can walk in, or has too few poses; or,
+            perturbed, no room that can be built again.
     """
     from clearway.evaluation import goals as walked
     from clearway.learn import load
     from clearway.learn.load import TrainedAgent
     from clearway.learn.recurrent import TrainedRecurrent
+    from clearway.live.live_room import check_is_room
     from clearway.torch_threads import torch_threads
 
     settings = {
@@ -51,26 +70,63 @@ def evaluate_goals(
         "step_limit": as_whole("step_limit", step_limit, 1),
         "seed": as_seed("seed", seed),
     }
+    perturbations, takes = perturbations_asked(perturb), as_whole("takes", takes, 1)
     found = load_scenes(scenes)
     if isinstance(agent, str | os.PathLike):
         agent = load.load_agent(as_path("agent", agent))
+    if perturbed := perturbations != Perturbations():
+        _check_sees(agent)
+        for scene in found:  # before what takes long
+            check_is_room(scene)
+            walked.drawn_goals(scene, settings["goals"], settings["seed"])
     if isinstance(agent, TrainedRecurrent):
         found = agent.seen(found)
     elif isinstance(agent, TrainedAgent):
         found = load.run_scenes(agent.record, found)
     name, make = _named(agent)
     with torch_threads(1):
-        return walked.evaluate_goals({name: make}, found, **settings)
+        seen = _takes(agent, found, perturbations, takes, settings["seed"], show_progress) if perturbed else None
+        return walked.evaluate_goals({name: make}, found, takes=seen, **settings)
+
+
+def _check_sees(agent: object) -> None:
+    """Raise ArgumentError where an agent knows the poses that it is in, whatever it is shown."""
+    from clearway.learn.load import TrainedAgent
+    from clearway.learn.recurrent import TrainedRecurrent
+
+    if isinstance(agent, TrainedAgent) and not isinstance(agent, TrainedRecurrent):
+        problem = f"an agent of the algorithm {agent.record.learner.algorithm} goes by poses on the grid"
+        raise ArgumentError(f"perturb: {problem}, and would see nothing of it. Walk off the grid: evaluate --live")
+
+
+def _takes(
+    agent: object, scenes: Sequence[Scene], perturbations: Perturbations, takes: int, seed: int, show_progress: bool
+) -> Takes:
+    """The perturbed takes of what an agent sees; of one that is yet to be made, of all it may see."""
+    from clearway.learn.recurrent import TrainedRecurrent
+
+    encoder: Encoder | None = None
+    sees: tuple[str, ...] = (RGB,) if scenes[0].features is None else (RGB, FEATURES)
+    if isinstance(agent, TrainedRecurrent):
+        encoder, sees = agent.encoder, (FEATURES,)
+    elif _is_made(agent):
+        sees = agent.sees
+    return takes_seen(scenes, perturbations, sees, encoder, takes=takes, seed=seed, show_progress=show_progress)
 
 
 def _named(agent: object) -> tuple[str, AgentMaker]:
     """What an agent is called, and what makes it for a world."""
-    from clearway.agents.agent import Agent
     from clearway.agents.named import named_maker
     from clearway.learn.load import TrainedAgent
 
     if isinstance(agent, TrainedAgent):
         return agent.record.learner.algorithm, agent.on_poses
     name = getattr(agent, "__name__", type(agent).__name__)
-    made = isinstance(agent, Agent) and not isinstance(agent, type)
-    return name, named_maker("agent", (lambda world: agent) if made else agent)
+    return name, named_maker("agent", (lambda world: agent) if _is_made(agent) else agent)
+
+
+def _is_made(agent: object) -> TypeGuard[Agent]:
+    """Whether it is an agent, rather than what makes one for a world."""
+    from clearway.agents.agent import Agent
+
+    return isinstance(agent, Agent) and not isinstance(agent, type)

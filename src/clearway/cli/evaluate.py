@@ -50,6 +50,12 @@ class Evaluate:
     goals: int | None = None
     """Walk to so many goals a scene, drawn by the seed among all its poses, one episode of 500 steps each; an agent of
     the algorithm recurrent does in any scenes with pictures."""
+    perturb: tuple[str, ...] = ()
+    """With --goals: what is seen on the way is perturbed, the goals' pictures are not. all; geometry: all but light and
+    pixel-noise; none; names of the perturbations below, at full strength; or NAME=STRENGTH. A later word changes an
+    earlier one."""
+    takes: int | None = None
+    """With --perturb: pictures of each pose, each perturbed in its own way, one of which a step shows; by default 4."""
     held_out: bool = False
     """Evaluate at five targets a scene that trainings in generated rooms and flats leave out, and leave held-out.json
     and held-out.md, live held-out-live.json and held-out-live.md, in the run folder."""
@@ -62,6 +68,9 @@ class Evaluate:
         if self.goals is not None:
             self._at_goals(self.goals)
             return
+        if self.perturb or self.takes is not None:
+            option = "--perturb" if self.perturb else "--takes"
+            raise ClearwayError(f"{option}: goes with --goals alone. Add it; --live has a flag for each perturbation")
         self.room.check()
         self._check_file()
         if self.held_out and self.pictures is not None and not self.room.live:
@@ -87,11 +96,12 @@ class Evaluate:
         )
 
     def _at_goals(self, goals: int) -> None:
-        from clearway.api.goals import STEP_LIMIT
+        from clearway.api.goals import STEP_LIMIT, TAKES
         from clearway.cli.goals import evaluate_at_goals
 
         given = {
             "--live": self.room.live,
+            "--light and the other flags of --live": self.room != Live(),
             "--beside": self.beside,
             "--targets": self.targets,
             "--pictures": self.pictures,
@@ -102,6 +112,8 @@ class Evaluate:
             raise ClearwayError(
                 f"{asked[0]}: not with --goals, which walks once to each goal. Leave one of the two out"
             )
+        if self.takes is not None and not self.perturb:
+            raise ClearwayError("--takes: without --perturb a pose has one picture. Add --perturb")
         evaluate_at_goals(
             self.folder,
             self.checkpoint,
@@ -109,6 +121,8 @@ class Evaluate:
             goals=goals,
             step_limit=_or(self.step_limit, STEP_LIMIT),
             seed=self.seed,
+            perturb=self.perturb,
+            takes=_or(self.takes, TAKES),
             json=self.json,
         )
 

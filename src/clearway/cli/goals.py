@@ -16,7 +16,16 @@ if TYPE_CHECKING:
 
 
 def evaluate_at_goals(
-    agent: Path, checkpoint: Path | None, files: Sequence[Path], *, goals: int, step_limit: int, seed: int, json: bool
+    agent: Path,
+    checkpoint: Path | None,
+    files: Sequence[Path],
+    *,
+    goals: int,
+    step_limit: int,
+    seed: int,
+    perturb: Sequence[str],
+    takes: int,
+    json: bool,
 ) -> None:
     """Walk to goals drawn in some scene files, and print what came of it."""
     from clearway.api.evaluation import load_agent
@@ -25,7 +34,16 @@ def evaluate_at_goals(
     if not files:
         raise ClearwayError("--goals: no scenes. Name scene files behind the run")
     trained = load_agent(agent, checkpoint)
-    found = evaluate_goals(trained, scene_files(files), goals=goals, step_limit=step_limit, seed=seed)
+    found = evaluate_goals(
+        trained,
+        scene_files(files),
+        goals=goals,
+        step_limit=step_limit,
+        seed=seed,
+        perturb=perturb,
+        takes=takes,
+        show_progress=True,
+    )
     if json:
         own, *others = (one.to_json() for one in found)
         print_json({**own, "others": others})
@@ -40,7 +58,10 @@ def _table(found: Sequence[GoalEvaluation]) -> object:
     from clearway.evaluation.goals import GoalFigures
 
     episodes = found[0].average.episodes
-    table = Table(title=f"{episodes} goals in {len(found[0].scenes)} scenes", title_justify="left")
+    title = f"{episodes} goals in {len(found[0].scenes)} scenes"
+    if (perturbed := found[0].perturbed) is not None:
+        title += f", pictures perturbed: {perturbed['label']}"
+    table = Table(title=title, title_justify="left")
     table.add_column("agent")
     names = [field.name for field in fields(GoalFigures) if field.name != "episodes"]
     for name in names:

@@ -19,6 +19,7 @@ from clearway.agents.selection import ActionSelection, selecting
 from clearway.errors import AgentError
 from clearway.evaluation.loops import LoopSkipper, Tally
 from clearway.evaluation.sight import Sight
+from clearway.evaluation.takes import Takes
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
@@ -76,6 +77,7 @@ def run_episodes(
     agent: Agent,
     *,
     scenes: Sequence[Scene] = (),
+    takes: Takes | None = None,
     selection: ActionSelection = "sampled",
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_limit: int = STEP_LIMIT,
@@ -94,6 +96,7 @@ def run_episodes(
         agent: who walks. A walk in a circle of actions that it is certain of is completed by arithmetic instead of
             walked to the limit; the counts are the same.
         scenes: the world's, in its order, for an agent that sees pictures.
+        takes: what it sees on the way instead, one a step, drawn by the episode's seed.
         selection: how actions are chosen by the agent's probabilities.
         episodes_per_target: how many.
         step_limit: steps after which an episode has failed.
@@ -108,7 +111,7 @@ def run_episodes(
     target = torch.arange(world.target_count, device=world.device).repeat_interleave(episodes_per_target)
     seeds = episode_seeds(world, episodes_per_target, seed)
     agent = selecting(agent, selection, world)
-    sight = Sight(world, agent, scenes)
+    sight = Sight(world, agent, scenes, takes)
     parts = []
     with torch.no_grad():
         for chosen in torch.arange(len(target), device=world.device).split(episodes_at_once):
@@ -141,6 +144,7 @@ class _Walk:
     ) -> None:
         count = len(seeds)
         self.world, self.agent, self.sight, self.step_limit = world, agent, sight, step_limit
+        self.seeds = seeds
         # No number here rests on the reward; the environment wants one.
         self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
         self.env.reset(target=target)
@@ -158,7 +162,8 @@ class _Walk:
     def to_the_end(self) -> EpisodeTable:
         """Walk until every episode has ended."""
         while len(self.walking):
-            decisions, self.memory = self.agent.act(self.sight(self.env.state), self.memory)
+            seen = self.sight.on_the_way(self.env.state, self.seeds, self.tally.steps)
+            decisions, self.memory = self.agent.act(seen, self.memory)
             _check_decisions(decisions, len(self.walking))
             _check_state(self.memory, len(self.walking))
             action = torch.from_numpy(decisions.action.astype(np.int64)).to(self.world.device)
@@ -171,8 +176,11 @@ class _Walk:
         return self._table()
 
     def _close_circles(self, certain: np.ndarray | None) -> None:
-        """Note who walks in a circle for ever, and add its rounds up to the limit, unless every step is recorded."""
-        if certain is None:
+        """Note who walks in a circle for ever, and add its rounds up to the limit, unless every step is recorded.
+
+        Where what is seen varies, nobody does: the same pose and memory may lead elsewhere.
+        """
+        if certain is None or self.sight.varies:
             return
         known = {name: values for name, values in self.memory.items() if name != CHANCE}
         where = {**known, "standing in": self.env.state.cpu().numpy()}
@@ -190,7 +198,7 @@ class _Walk:
         self.reached[episode] = happened.reached[ended]
         self.final.write(episode, self.tally.at(ended))
         still = ~ended
-        self.walking, self.tally = self.walking[still], self.tally.at(still)
+        self.walking, self.tally, self.seeds = self.walking[still], self.tally.at(still), self.seeds[still]
         # There is no reset from here on, so the environment's start and target streams may keep their length.
         self.env.load_tensors({name: value[still] for name, value in self.env.tensors().items()})
         kept = still.cpu().numpy()

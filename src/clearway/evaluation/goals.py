@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from clearway.errors import AgentError, SceneError
 from clearway.evaluation import metrics
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH
+from clearway.evaluation.takes import Takes
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
 
@@ -52,11 +53,13 @@ class GoalEvaluation:
     Attributes:
         agent: its name.
         scenes: figures by scene name.
+        perturbed: how what it saw differed from the scenes' own pictures (`Takes.made`); None: not at all.
         average: the plain mean over scenes; episodes are the sum.
     """
 
     agent: str
     scenes: Mapping[str, GoalFigures]
+    perturbed: Mapping[str, object] | None = None
 
     @property
     def average(self) -> GoalFigures:
@@ -66,9 +69,10 @@ class GoalEvaluation:
         return GoalFigures(**{**means, "episodes": sum(row["episodes"] for row in rows)})
 
     def to_json(self) -> dict[str, object]:
-        """As JSON values: `scenes` a list, `average`."""
+        """As JSON values: `scenes` a list, `average`, `perturbed`."""
         scenes = [{"scene": name, **asdict(figures)} for name, figures in self.scenes.items()]
-        return {"agent": self.agent, "scenes": scenes, "average": asdict(self.average)}
+        perturbed = None if self.perturbed is None else dict(self.perturbed)
+        return {"agent": self.agent, "scenes": scenes, "average": asdict(self.average), "perturbed": perturbed}
 
 
 def evaluate_goals(
@@ -78,6 +82,7 @@ def evaluate_goals(
     goals: int = GOALS,
     step_limit: int = GOAL_STEPS,
     seed: int = 0,
+    takes: Takes | None = None,
 ) -> list[GoalEvaluation]:
     """Walk to goals drawn in some scenes; every agent, then a random walk and shortest paths.
 
@@ -87,6 +92,7 @@ def evaluate_goals(
         goals: of each scene.
         step_limit: steps after which an episode has failed.
         seed: of goals, starts and chances.
+        takes: what is seen on the way instead of the scenes' own pictures; goals are seen as they are.
 
     Raises:
         SceneError: a scene has fewer poses than goals.
@@ -98,11 +104,11 @@ def evaluate_goals(
     for name, make in makers.items():
         try:
             table = run_episodes(
-                world, make(world), scenes=scenes, episodes_per_target=1, step_limit=step_limit, seed=seed
+                world, make(world), scenes=scenes, takes=takes, episodes_per_target=1, step_limit=step_limit, seed=seed
             )
         except AgentError as fault:
             raise AgentError(f"{name}: {fault}") from fault
-        found.append(_summary(world, table, name))
+        found.append(replace(_summary(world, table, name), perturbed=None if takes is None else takes.made))
     return found
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from torch import Tensor
 
 from clearway.agents.agent import FEATURES, POSE, Agent, Observation
 from clearway.errors import AgentError
+from clearway.evaluation.takes import Takes, take_at
 from clearway.scenes.scene import Observations, Scene
 from clearway.world.world import World
 
@@ -20,21 +22,37 @@ class Sight:
         world: the poses.
         agent: says what it needs.
         scenes: the world's, in its order, for agents that see pictures.
+        takes: seen on the way instead of the scenes' own pictures and features; targets are seen as they are.
 
     Raises:
-        AgentError, SceneError: the world or a scene has nothing of the kind.
+        AgentError, SceneError: the world, a scene or the takes have nothing of the kind.
     """
 
-    def __init__(self, world: World, agent: Agent, scenes: Sequence[Scene] = ()) -> None:
+    def __init__(self, world: World, agent: Agent, scenes: Sequence[Scene] = (), takes: Takes | None = None) -> None:
         self._world, self._names = world, agent.sees
         self._pictures = {name: _pictures(name, scenes) for name in agent.sees if name not in (POSE, FEATURES)}
         if FEATURES in agent.sees and world.features is None:
             raise AgentError("the agent sees features, and the scenes have none. Encode them: clearway scenes encode")
         self._first = world.scene_offset.cpu().numpy()
+        self._takes = None if takes is None else _those_seen(takes, agent)
+
+    @property
+    def varies(self) -> bool:
+        """Whether what is seen in a pose differs from step to step."""
+        return self._takes is not None
 
     def __call__(self, state: Tensor) -> Observation:
-        """The observation in states (B,) int64 of the world's numbering."""
+        """What the scenes show in states (B,) int64 of the world's numbering."""
         return {name: self._seen(name, state) for name in self._names}
+
+    def on_the_way(self, state: Tensor, seed: Tensor, step: Tensor) -> Observation:
+        """What is seen in states (B,) at steps (B,) of the episodes with these seeds (B,), int64 all."""
+        if (takes := self._takes) is None:
+            return self(state)
+        pose = state.cpu().numpy()
+        take = take_at(seed.cpu().numpy(), step.cpu().numpy(), takes.count)
+        seen = {name: self._gathered(takes.seen[name], pose, takes.count, take) for name in takes.seen}
+        return {name: pose if name == POSE else seen[name] for name in self._names}
 
     def _seen(self, name: str, state: Tensor) -> np.ndarray:
         pose = state.cpu().numpy()
@@ -43,13 +61,33 @@ class Sight:
         if name == FEATURES:
             assert self._world.features is not None
             return self._world.features[state].float().cpu().numpy()
+        return self._gathered(self._pictures[name], pose)
+
+    def _gathered(
+        self, kept: Sequence[Observations], pose: np.ndarray, often: int = 1, take: np.ndarray | int = 0
+    ) -> np.ndarray:
+        """Rows (B, ...) of each scene's array, in which every pose has as many rows as there are takes of it."""
         scene = np.searchsorted(self._first, pose, side="right") - 1
-        kept = self._pictures[name]
+        row = (pose - self._first[scene]) * often + take
         seen = np.empty((len(pose), *kept[0].shape[1:]), kept[0][0].dtype)
         for own in np.unique(scene):
             here = scene == own
-            seen[here] = kept[own][pose[here] - self._first[own]]
+            seen[here] = kept[own][row[here]]
         return seen
+
+
+def _those_seen(takes: Takes, agent: Agent) -> Takes | None:
+    """The takes of what an agent sees, each scene's as (S * K, ...); None where it sees no pictures.
+
+    Raises:
+        AgentError: it sees what there are no takes of.
+    """
+    seen = [name for name in agent.sees if name != POSE]
+    if missing := [name for name in seen if name not in takes.seen]:
+        problem = f"the agent sees {missing[0]}, and there are perturbed takes of {', '.join(takes.seen)} alone"
+        raise AgentError(f"{problem}. Leave the perturbation out")
+    flat = {name: [taken.reshape(-1, *taken.shape[2:]) for taken in takes.seen[name]] for name in seen}
+    return replace(takes, seen=flat) if seen else None
 
 
 def _pictures(name: str, scenes: Sequence[Scene]) -> list[Observations]:

@@ -124,7 +124,11 @@ class TrainedRecurrent:
         """Its agent on the grid: it goes by features, in any world of the same eyes."""
         return RecurrentAgent(self.network, self.pairs)
 
+    @property
+    def encoder(self) -> EyesEncoder:
+        """Its own eyes."""
+        return EyesEncoder(EncoderRecord(eyes.NAME, "of the run", {}), self.pairs.eyes)
+
     def seen(self, scenes: Sequence[Scene]) -> list[Scene]:
         """Any scenes with pictures as its own eyes see them. Raises EncoderError where one has no pictures."""
-        encoder = EyesEncoder(EncoderRecord(eyes.NAME, "of the run", {}), self.pairs.eyes)
-        return [encoded(scene, encoder) for scene in scenes]
+        return [encoded(scene, self.encoder) for scene in scenes]

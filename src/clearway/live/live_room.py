@@ -119,6 +119,7 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
     Raises:
         SceneError: the scene is none of these, this version builds it differently, or its model is missing or changed.
     """
+    check_is_room(scene)
     made = scene.made_by
     if made.source == MODEL_SOURCE:
         from clearway.live.model_room import live_model_scene
@@ -128,12 +129,7 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
         raise SceneError(scene.name, problem, "Its looks may differ: generate it again, or use that clearway")
     if made.source in floor_plans.SOURCES and made.seed is not None:
         return _live_plan(scene, floor_plans.plan_of(scene), made.seed, small, loose)
-    if made.source != "room" or made.room is None or made.seed is None:
-        raise SceneError(
-            scene.name,
-            f"there is no room to walk in: the scene comes from {made.source}",
-            "Walk live in a scene that clearway scenes build, generate, import floor-plan or import mjcf made",
-        )
+    assert made.room is not None and made.seed is not None, "as check_is_room found"
     grid = room_scene(made.room, made.seed)
     if not np.array_equal(grid.graph, scene.graph) or not np.allclose(grid.locations_m, scene.locations_m):
         raise SceneError(
@@ -143,6 +139,19 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
             "graph",
         )
     return _live_named(scene, made.room, made.seed, small, loose)
+
+
+def check_is_room(scene: Scene) -> None:
+    """Check by a scene's record, at once, that its room can be built again. Raises SceneError."""
+    made = scene.made_by
+    is_plan = made.source in floor_plans.SOURCES and made.seed is not None
+    is_named = made.source == "room" and made.room is not None and made.seed is not None
+    if not (is_plan or is_named or made.source == MODEL_SOURCE):
+        raise SceneError(
+            scene.name,
+            f"there is no room to walk in: the scene comes from {made.source}",
+            "Walk live in a scene that clearway scenes build, generate, import floor-plan or import mjcf made",
+        )
 
 
 def live_room_named(name: str, seed: int = 0, *, small: bool = False, loose: bool = True) -> LiveRoom:

@@ -171,8 +171,12 @@ def encoded(scene: Scene, encoder: Encoder) -> Scene:
         EncoderError: the scene has nothing of the encoder's sensor.
     """
     pictures = pictures_of(scene, sensor_of(encoder.record))
-    parts = [_encode(encoder, batch) for batch in _batches(pictures, BATCH_PICTURES)]
-    return scene.with_features(np.concatenate(parts), encoder.record)
+    return scene.with_features(features_of(pictures, encoder), encoder.record)
+
+
+def features_of(pictures: Observations, encoder: Encoder) -> np.ndarray:
+    """Features (N, F) float32 of N pictures, as `encoded` makes them."""
+    return np.concatenate([_encode(encoder, batch) for batch in _batches(pictures, BATCH_PICTURES)])
 
 
 def _open(load: Callable[[EncoderRecord], Encoder], record: EncoderRecord, threads: int | None) -> Encoder:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Protocol
 
 from clearway import files, rooms
@@ -111,7 +112,7 @@ def plan_path(
 
 def _path_of(title: str, shaped_by: Mapping[str, object]) -> Path:
     """A file whose name holds a hash of all that shapes the pictures: what was asked for, and what makes it."""
-    all_of_it = {**shaped_by, "versions": shaping_versions(), "sources": _sources_hash()}
+    all_of_it = {**shaped_by, "versions": shaping_versions(), "sources": sources_hash()}
     key = hashlib.sha256(json.dumps(all_of_it, sort_keys=True).encode()).hexdigest()[:KEY_LENGTH]
     readable = re.sub(r"[^\w-]", "_", title)
     return files.cache_dir() / "scenes" / f"{readable}-{key}.h5"
@@ -130,11 +131,18 @@ def _cached(path: Path, title: str, make: Callable[[], Scene]) -> Scene:
     return read_scene(path, name=title)
 
 
-def _sources_hash() -> str:
-    """Hash of the source files that build rooms, their graphs and views, so that a change of them makes a new scene."""
-    folder = Path(rooms.__file__).parent
-    sources = {source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
+def sources_hash(*further: ModuleType) -> str:
+    """Hash of the source files that build rooms, their graphs and views, so that a change of them makes a new scene.
+
+    Args:
+        further: packages whose source files count too.
+    """
     digest = hashlib.sha256()
+    sources: dict[str, Path] = {}
+    for package in (rooms, *further):
+        folder = Path(str(package.__file__)).parent
+        own = "" if package is rooms else f"{package.__name__}/"
+        sources |= {own + source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
     others = {module.__name__: Path(str(module.__file__)) for module in (building, floor_plans, grid, sensing)}
     for name, source in {**sources, **others}.items():
         content = source.read_bytes()

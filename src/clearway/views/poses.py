@@ -7,30 +7,25 @@ A take moves and turns the camera a little, and stands in one of some layouts of
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.live.arrangement import Arrangement
 from clearway.live.body import Body
-from clearway.live.conditions import REARRANGING, Perturbations
 from clearway.live.draws import Draws
-from clearway.live.live_room import LiveRoom, layout_of_episode
+from clearway.live.live_room import LiveRoom
 from clearway.live.walker import Pose, Walker
 from clearway.live_envs.arguments import CLEARANCE_REACH_M
 from clearway.perception.around import PLACES_M
-from clearway.rooms.camera import Shot, first_person_shot
+from clearway.rooms.camera import Shot
+from clearway.views.placing import POSES, TakePlaces, is_free, stream, take_seeds
 from clearway.views.settings import ViewSettings
 from clearway.views.table import COLUMNS, TURNS_DEG, ViewTable, table_of
 
 REACH_M = CLEARANCE_REACH_M
-LEAST_LAYOUTS = 4  # of a room in which furniture is moved: each takes some tenths of a second to find
-POSES, LAYOUTS = 0, 1  # streams of random numbers
 MOST_TRIES = 1000  # at a place for a pose
-TAKE_TRIES = 20  # at a free place for a take
 WAY_STEPS = (
     (0.5, 10),
     (0.05, 9),
@@ -53,11 +48,6 @@ class Taken:
     table: ViewTable
 
 
-def rearranges(perturbations: Perturbations) -> bool:
-    """Whether takes see the room's furniture elsewhere than it was built."""
-    return any(getattr(perturbations, name) for name in REARRANGING)
-
-
 def draw_takes(live: LiveRoom, held_out: np.ndarray, settings: ViewSettings) -> Taken:
     """Poses of a room and their takes, pose after pose.
 
@@ -69,27 +59,19 @@ def draw_takes(live: LiveRoom, held_out: np.ndarray, settings: ViewSettings) -> 
     Raises:
         SceneError: the room has no cell to take them in, or nothing that could be moved.
     """
-    live.check_can_be_rearranged(settings.perturbations)
     places = _Places(live, held_out == settings.held_out, settings)
-    layouts = _layouts(live, settings)
-    bodies = [live.body(layout) for layout in layouts]
+    takes = TakePlaces(live, places.cells_m, settings)
     rows, shots, chances = [], [], []
     for number in range(settings.poses):
-        rng = _stream(live, settings, POSES, number)
-        pose = places.drawn(bodies[0], rng)
-        for take, seed in enumerate(rng.integers(2**63, size=settings.takes).tolist()):
-            draws = Draws(seed, settings.perturbations)
-            wanted = 0 if len(layouts) == 1 else 1 + (number * settings.takes + take) % (len(layouts) - 1)
-            here = places.near(bodies[wanted], pose, draws)
-            layout = wanted if here is not None else 0  # where furniture was moved to the pose, it is as it was built
-            here = here or pose
-            height_m, pitch_deg = live.camera_m + draws.height_error_m(), draws.pitch_error_deg()
-            moved_m = live.bodies_m(layouts[layout]) if len(layouts) > 1 else ()
-            shots.append(first_person_shot(*here, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m))
-            x_m, z_m = np.add(here[:2], live.origin_m).tolist()
-            placed = (number, take, layout, x_m, z_m, here[2], height_m, pitch_deg)
-            rows.append((*placed, *_felt(bodies[layout], here, draws, live)))
-            chances.append(draws)
+        rng = stream(live, settings, POSES, number)
+        pose = places.drawn(takes.bodies[0], rng)
+        for take, seed in enumerate(take_seeds(rng, settings)):
+            one = takes.placed(pose, number, take, seed)
+            x_m, z_m = np.add(one.pose[:2], live.origin_m).tolist()
+            placed = (number, take, one.layout, x_m, z_m, one.pose[2], one.height_m, one.pitch_deg)
+            rows.append((*placed, *_felt(takes.bodies[one.layout], one.pose, one.draws, live)))
+            shots.append(one.shot)
+            chances.append(one.draws)
     assert len(rows[0]) == len(COLUMNS)
     return Taken(tuple(shots), tuple(chances), table_of(np.array(rows, np.float64)))
 
@@ -101,13 +83,16 @@ class _Places:
         live: the room.
         wanted: (S,) bool, the states next to which they may be.
         settings: how headings are drawn.
+
+    Attributes:
+        cells_m: (C, 2), the middles of those cells.
     """
 
     def __init__(self, live: LiveRoom, wanted: np.ndarray, settings: ViewSettings) -> None:
         scene = live.scene
         self._half_m = scene.cell_size_m / 2
-        self._cells_m = np.unique(scene.locations_m[wanted & (scene.components == 0)], axis=0)
-        if not len(self._cells_m):
+        self.cells_m = np.unique(scene.locations_m[wanted & (scene.components == 0)], axis=0)
+        if not len(self.cells_m):
             what = "no held-out cell" if settings.held_out else "no cell that is not held out"
             raise SceneError(scene.name, f"has {what} in its largest part", "Leave the scene out")
         self._headings_deg = np.unique(scene.headings_deg) if settings.scene_headings else None
@@ -117,43 +102,11 @@ class _Places:
         headings_deg = self._headings_deg
         heading_deg = rng.uniform(0, 360) if headings_deg is None else rng.choice(headings_deg)
         for _ in range(MOST_TRIES):
-            cell_m = self._cells_m[rng.integers(len(self._cells_m))]
+            cell_m = self.cells_m[rng.integers(len(self.cells_m))]
             place_m = cell_m + rng.uniform(-self._half_m, self._half_m, 2)
-            if _is_free(body, place_m):
+            if is_free(body, place_m):
                 return float(place_m[0]), float(place_m[1]), float(heading_deg)
         return float(cell_m[0]), float(cell_m[1]), float(heading_deg)
-
-    def near(self, body: Body, pose: Pose, draws: Draws) -> Pose | None:
-        """The pose with errors of distance along x and z and of angle, where the body is free; None where it is not."""
-        heading_deg = (pose[2] + draws.angle_error_deg()) % 360
-        for _ in range(TAKE_TRIES):
-            place_m = np.add(pose[:2], (draws.distance_error_m(), draws.distance_error_m()))
-            if self._may_be(place_m) and _is_free(body, place_m):
-                return float(place_m[0]), float(place_m[1]), heading_deg
-        return None
-
-    def _may_be(self, place_m: np.ndarray) -> bool:
-        """Whether a place lies in the square of a cell."""
-        return bool((np.abs(self._cells_m - place_m).max(axis=1) <= self._half_m).any())
-
-
-def _is_free(body: Body, place_m: np.ndarray) -> bool:
-    body.stand_at(place_m)
-    return not body.touches
-
-
-def _layouts(live: LiveRoom, settings: ViewSettings) -> list[Arrangement]:
-    """The room as it was built, then its other layouts; no two takes of a pose are in the same of these."""
-    wanted = settings.perturbations
-    found = [live.as_built()]
-    if not rearranges(wanted):
-        return found
-    states = np.flatnonzero(live.scene.components == 0)
-    for number in range(max(LEAST_LAYOUTS, settings.takes)):
-        rng = _stream(live, settings, LAYOUTS, number)
-        start, target = rng.choice(states, 2, replace=False).tolist()
-        found.append(layout_of_episode(live, start, target, Draws(int(rng.integers(2**63)), wanted)))
-    return found
 
 
 def _felt(body: Body, pose: Pose, draws: Draws, live: LiveRoom) -> Sequence[float]:
@@ -172,7 +125,7 @@ def _stands(body: Body, heading_deg: float, live: LiveRoom) -> list[float]:
     places_m = start_m + np.array(PLACES_M) @ ahead
     cells_m = np.unique(live.scene.locations_m, axis=0)
     inside = np.abs(places_m[:, None] - cells_m).max(axis=2).min(axis=1) <= live.scene.cell_size_m
-    found = [float(near and _is_free(body, place_m)) for near, place_m in zip(inside.tolist(), places_m, strict=True)]
+    found = [float(near and is_free(body, place_m)) for near, place_m in zip(inside.tolist(), places_m, strict=True)]
     body.stand_at(start_m)
     return found
 
@@ -187,9 +140,3 @@ def _free_way_m(body: Body, heading_deg: float) -> float:
             break
     body.stand_at(start_m)
     return round(way_m, 2)
-
-
-def _stream(live: LiveRoom, settings: ViewSettings, kind: int, number: int) -> np.random.Generator:
-    """Random numbers of one pose, or of one layout."""
-    key = zlib.crc32(f"clearway views: {live.scene.name}".encode())
-    return np.random.default_rng([key, settings.seed, kind, number])

@@ -12,7 +12,8 @@ from clearway.rooms.sense import sense
 from clearway.scenes.held_out import held_out
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import Readings
-from clearway.views.poses import draw_takes, rearranges
+from clearway.views.placing import rearranges
+from clearway.views.poses import draw_takes
 from clearway.views.settings import ViewSettings
 from clearway.views.table import ViewTable
 
