@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeGuard
 
 from clearway.agents.agent import FEATURES
@@ -16,6 +17,7 @@ from clearway.scenes.sensors import RGB
 
 if TYPE_CHECKING:
     from clearway.agents.agent import Agent
+    from clearway.agents.generalist import Generalist
     from clearway.agents.named import AgentMaker
     from clearway.evaluation.goals import GoalEvaluation
     from clearway.evaluation.takes import Takes
@@ -27,7 +29,7 @@ GOALS, STEP_LIMIT, TAKES = 20, 500, 4
 
 
 def evaluate_goals(
-    agent: str | os.PathLike[str] | TrainedAgent | Agent | AgentMaker,
+    agent: str | os.PathLike[str] | TrainedAgent | Generalist | Agent | AgentMaker,
     scenes: Scenes,
     *,
     goals: int = GOALS,
@@ -35,14 +37,15 @@ def evaluate_goals(
     seed: int = 0,
     perturb: Perturbed = "none",
     takes: int = TAKES,
+    tour: int = 0,
     show_progress: bool = False,
 ) -> list[GoalEvaluation]:
     """Walk to goals drawn in some scenes: the agent, then a random walk and shortest paths, one episode a goal.
 
     Args:
-        agent: a run folder or what `load_agent` gave, or an agent of your own, as of `evaluate`. One of the algorithm
-            "recurrent" sees any scenes with pictures by its own eyes; others walk, to any goals, in the scenes of their
-            training alone.
+        agent: "generalist", which comes with clearway; a run folder or what `load_agent` gave; or an agent of your own,
+            as of `evaluate`. The generalist and agents of the algorithm "recurrent" see any scenes with pictures by
+            their own eyes; others walk, to any goals, in the scenes of their training alone.
         scenes: files, folders of them, or scenes.
         goals: of each scene, distinct poses of its largest part.
         step_limit: steps after which an episode has failed.
@@ -51,6 +54,7 @@ def evaluate_goals(
             "geometry", names such as "light", or "light=0.2", as of `take_views`; or `Perturbations`. Each step shows
             one of several takes of its pose, which are kept in the user's cache folder once they are rendered.
         takes: of each pose, each perturbed in its own way.
+        tour: steps in which an agent that keeps a map may look around in each scene before the episodes.
         show_progress: draw a progress bar while rendering, if standard error is a terminal.
 
     Raises:
@@ -58,7 +62,9 @@ def evaluate_goals(
         ClearwayError: the run cannot be read, a scene is not one that the agent can walk in, or has too few poses; or,
             perturbed, no room that can be built again.
     """
+    from clearway.agents.generalist import GENERALIST, Generalist
     from clearway.evaluation import goals as walked
+    from clearway.evaluation.tours import Touring
     from clearway.learn import load
     from clearway.learn.load import TrainedAgent
     from clearway.learn.recurrent import TrainedRecurrent
@@ -71,22 +77,37 @@ def evaluate_goals(
         "seed": as_seed("seed", seed),
     }
     perturbations, takes = perturbations_asked(perturb), as_whole("takes", takes, 1)
+    tour_steps = as_whole("tour", tour, 0)
     found = load_scenes(scenes)
     if isinstance(agent, str | os.PathLike):
-        agent = load.load_agent(as_path("agent", agent))
+        path = as_path("agent", agent)
+        agent = Generalist.shipped() if is_generalist(path) else load.load_agent(path)
+    if tour_steps and not isinstance(agent, Generalist):
+        problem = f"tour={tour_steps}: {_named(agent)[0]} keeps no map, and would have nothing of a tour"
+        raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
     if perturbed := perturbations != Perturbations():
         _check_sees(agent)
         for scene in found:  # before what takes long
             check_is_room(scene)
             walked.drawn_goals(scene, settings["goals"], settings["seed"])
-    if isinstance(agent, TrainedRecurrent):
+    if isinstance(agent, TrainedRecurrent | Generalist):
         found = agent.seen(found)
     elif isinstance(agent, TrainedAgent):
         found = load.run_scenes(agent.record, found)
+    make: AgentMaker | Touring
     name, make = _named(agent)
+    if tour_steps and isinstance(agent, Generalist):
+        make = Touring(agent.explorer, agent.after, tour_steps)
     with torch_threads(1):
         seen = _takes(agent, found, perturbations, takes, settings["seed"], show_progress) if perturbed else None
         return walked.evaluate_goals({name: make}, found, takes=seen, **settings)
+
+
+def is_generalist(path: Path) -> bool:
+    """Whether the agent that comes with clearway is meant, not a folder of this name."""
+    from clearway.agents.generalist import GENERALIST
+
+    return str(path) == GENERALIST and not path.exists()
 
 
 def _check_sees(agent: object) -> None:
@@ -103,11 +124,12 @@ def _takes(
     agent: object, scenes: Sequence[Scene], perturbations: Perturbations, takes: int, seed: int, show_progress: bool
 ) -> Takes:
     """The perturbed takes of what an agent sees; of one that is yet to be made, of all it may see."""
+    from clearway.agents.generalist import Generalist
     from clearway.learn.recurrent import TrainedRecurrent
 
     encoder: Encoder | None = None
     sees: tuple[str, ...] = (RGB,) if scenes[0].features is None else (RGB, FEATURES)
-    if isinstance(agent, TrainedRecurrent):
+    if isinstance(agent, TrainedRecurrent | Generalist):
         encoder, sees = agent.encoder, (FEATURES,)
     elif _is_made(agent):
         sees = agent.sees
@@ -116,11 +138,14 @@ def _takes(
 
 def _named(agent: object) -> tuple[str, AgentMaker]:
     """What an agent is called, and what makes it for a world."""
+    from clearway.agents.generalist import GENERALIST, Generalist
     from clearway.agents.named import named_maker
     from clearway.learn.load import TrainedAgent
 
     if isinstance(agent, TrainedAgent):
         return agent.record.learner.algorithm, agent.on_poses
+    if isinstance(agent, Generalist):
+        return GENERALIST, agent.on_poses
     name = getattr(agent, "__name__", type(agent).__name__)
     return name, named_maker("agent", (lambda world: agent) if _is_made(agent) else agent)
 

@@ -28,7 +28,7 @@ class Evaluate:
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """The run folder; or the .onnx file of an exported agent."""
+    """The run folder; the .onnx file of an exported agent; or, with --goals, generalist, which comes with clearway."""
     files: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Scene files or folders, as --scenes; with --goals any scenes."""
     episodes: int | None = None
@@ -48,14 +48,16 @@ class Evaluate:
     pictures: Path | None = None
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
     goals: int | None = None
-    """Walk to so many goals a scene, drawn by the seed among all its poses, one episode of 500 steps each; an agent of
-    the algorithm recurrent does in any scenes with pictures."""
+    """Walk to so many goals a scene, drawn by the seed among all its poses, one episode of 500 steps each; the
+    generalist and agents of the algorithm recurrent do in any scenes with pictures."""
     perturb: tuple[str, ...] = ()
     """With --goals: what is seen on the way is perturbed, the goals' pictures are not. all; geometry: all but light and
     pixel-noise; none; names of the perturbations below, at full strength; or NAME=STRENGTH. A later word changes an
     earlier one."""
     takes: int | None = None
     """With --perturb: pictures of each pose, each perturbed in its own way, one of which a step shows; by default 4."""
+    tour: int = 0
+    """With --goals: steps in which an agent with a map may look around in each scene first."""
     held_out: bool = False
     """Evaluate at five targets a scene that trainings in generated rooms and flats leave out, and leave held-out.json
     and held-out.md, live held-out-live.json and held-out-live.md, in the run folder."""
@@ -71,6 +73,8 @@ class Evaluate:
         if self.perturb or self.takes is not None:
             option = "--perturb" if self.perturb else "--takes"
             raise ClearwayError(f"{option}: goes with --goals alone. Add it; --live has a flag for each perturbation")
+        if self.tour:
+            raise ClearwayError("--tour: goes with --goals alone. Add it")
         self.room.check()
         self._check_file()
         if self.held_out and self.pictures is not None and not self.room.live:
@@ -123,6 +127,7 @@ class Evaluate:
             seed=self.seed,
             perturb=self.perturb,
             takes=_or(self.takes, TAKES),
+            tour=self.tour,
             json=self.json,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,8 @@ from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
     from clearway.evaluation.goals import GoalEvaluation
+
+NUMBERS = ("collisions", "steps")  # figures that are no shares
 
 
 def evaluate_at_goals(
@@ -25,23 +27,24 @@ def evaluate_at_goals(
     seed: int,
     perturb: Sequence[str],
     takes: int,
+    tour: int,
     json: bool,
 ) -> None:
     """Walk to goals drawn in some scene files, and print what came of it."""
     from clearway.api.evaluation import load_agent
-    from clearway.api.goals import evaluate_goals
+    from clearway.api.goals import evaluate_goals, is_generalist
 
     if not files:
         raise ClearwayError("--goals: no scenes. Name scene files behind the run")
-    trained = load_agent(agent, checkpoint)
     found = evaluate_goals(
-        trained,
+        agent if is_generalist(agent) else load_agent(agent, checkpoint),
         scene_files(files),
         goals=goals,
         step_limit=step_limit,
         seed=seed,
         perturb=perturb,
         takes=takes,
+        tour=tour,
         show_progress=True,
     )
     if json:
@@ -55,20 +58,25 @@ def _table(found: Sequence[GoalEvaluation]) -> object:
     """A row an agent: means over scenes."""
     from rich.table import Table
 
-    from clearway.evaluation.goals import GoalFigures
+    from clearway.evaluation.goals import FIGURES
 
     episodes = found[0].average.episodes
     title = f"{episodes} goals in {len(found[0].scenes)} scenes"
     if (perturbed := found[0].perturbed) is not None:
         title += f", pictures perturbed: {perturbed['label']}"
+    if (tour := found[0].tour) is not None:
+        title += f", after tours of {tour['steps']} steps ({tour['collisions']:.3g} collisions each)"
     table = Table(title=title, title_justify="left")
     table.add_column("agent")
-    names = [field.name for field in fields(GoalFigures) if field.name != "episodes"]
+    names = [field.name for field in FIGURES if field.name != "episodes"]
     for name in names:
         table.add_column(name.replace("_", " "), justify="right")
     for one in found:
-        figures = asdict(one.average)
-        shares = ("success", "success_4x", "spl")
-        cells = [f"{100 * figures[name]:.1f} %" if name in shares else f"{figures[name]:.3g}" for name in names]
-        table.add_row(one.agent, *cells)
+        table.add_row(one.agent, *(_cell(name, value) for name, value in asdict(one.average).items() if name in names))
     return table
+
+
+def _cell(name: str, value: float | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.3g}" if name in NUMBERS else f"{100 * value:.1f} %"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,11 @@ from clearway.files import read_json, written_whole
 
 FORMAT_VERSION = 1
 _FLAGS = ("reached", "looped")
-_COLUMNS = tuple(field.name for field in fields(EpisodeTable) if field.name != "trajectories")
+_COLUMNS = tuple(field.name for field in fields(EpisodeTable) if field.default is MISSING)
 
 
 def write_episodes(path: Path, table: EpisodeTable, about: Mapping[str, object]) -> None:
-    """Write a table without its trajectories, and what it is about (JSON values)."""
+    """Write a table without its trajectories and arrivals, and what it is about (JSON values)."""
     columns = {name: getattr(table, name).astype(np.int64).tolist() for name in _COLUMNS}
     content = {"format_version": FORMAT_VERSION, "about": dict(about), "episodes": columns}
     with written_whole(path) as part:

@@ -55,6 +55,9 @@ class EpisodeTable:
         zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
         looped: (N,) bool, found before the limit to be in a circle of actions without choice, so never to arrive.
         trajectories: the walks, one an episode; None unless asked for.
+        false_arrivals: (N,) int64, steps at which the agent held wrongly that it was at the target; None where it says
+            nothing of it.
+        told_arrival: (N,) bool, it held so where it was; None likewise.
     """
 
     target: np.ndarray
@@ -66,6 +69,8 @@ class EpisodeTable:
     zone_steps: np.ndarray
     looped: np.ndarray
     trajectories: tuple[Trajectory, ...] | None = None
+    false_arrivals: np.ndarray | None = None
+    told_arrival: np.ndarray | None = None
 
     def __len__(self) -> int:
         """N."""
@@ -158,6 +163,8 @@ class _Walk:
         self.looped = torch.zeros_like(self.reached)
         self.loops = LoopSkipper(count, self.tally)
         self.diary: list[tuple[Tensor, Tensor, Tensor]] | None = [] if record else None
+        self.false_arrivals, self.told_arrival = np.zeros(count, np.int64), np.zeros(count, bool)
+        self.tells_arrivals = False
 
     def to_the_end(self) -> EpisodeTable:
         """Walk until every episode has ended."""
@@ -170,6 +177,8 @@ class _Walk:
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
             self._close_circles(decisions.certain)
+            if decisions.arrived is not None:
+                self._note_arrivals(decisions.arrived, happened.reached.cpu().numpy())
             if self.diary is not None:
                 self.diary.append((self.walking, happened.state, action))
             self._drop_ended(happened)
@@ -189,6 +198,18 @@ class _Walk:
         self.looped[self.walking[closed]] = True
         if self.diary is None:
             self.tally = tally
+
+    def _note_arrivals(self, held: np.ndarray, reached: np.ndarray) -> None:
+        """Count what an agent held (B,) bool before the step, nobody being at the target, and ask who is there now."""
+        episode = self.walking.cpu().numpy()
+        self.tells_arrivals = True
+        self.false_arrivals[episode] += held
+        if reached.any():
+            here = torch.from_numpy(np.flatnonzero(reached)).to(self.world.device)
+            seen = self.sight.on_the_way(self.env.state[here], self.seeds[here], self.tally.steps[here])
+            decisions, _ = self.agent.act(seen, rows(self.memory, reached))
+            assert decisions.arrived is not None, "it told so before"
+            self.told_arrival[episode[reached]] = decisions.arrived
 
     def _drop_ended(self, happened: Transition) -> None:
         ended = happened.reached | (self.tally.steps >= self.step_limit)
@@ -217,6 +238,8 @@ class _Walk:
             zone_steps=_array(self.final.zone_steps),
             looped=_array(self.looped),
             trajectories=None if self.diary is None else _trajectories(self.start, self.final.steps, self.diary),
+            false_arrivals=self.false_arrivals if self.tells_arrivals else None,
+            told_arrival=self.told_arrival if self.tells_arrivals else None,
         )
 
 
@@ -282,6 +305,7 @@ def _joined(parts: list[EpisodeTable]) -> EpisodeTable:
         return np.concatenate([getattr(part, name) for part in parts])
 
     walks = [part.trajectories for part in parts if part.trajectories is not None]
+    tells = all(part.told_arrival is not None for part in parts)
     return EpisodeTable(
         target=column("target"),
         start=column("start"),
@@ -292,4 +316,6 @@ def _joined(parts: list[EpisodeTable]) -> EpisodeTable:
         zone_steps=column("zone_steps"),
         looped=column("looped"),
         trajectories=tuple(walk for part in walks for walk in part) if walks else None,
+        false_arrivals=column("false_arrivals") if tells else None,
+        told_arrival=column("told_arrival") if tells else None,
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from clearway.evaluation import metrics
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH
 from clearway.evaluation.takes import Takes
+from clearway.evaluation.tours import Touring, walk_tour
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
 
@@ -36,6 +37,9 @@ class GoalFigures:
         collisions: blocked moves.
         steps: failed episodes count with the limit.
         episodes: number of them.
+        false_arrivals: share in which the agent held elsewhere that it was at the goal; None where it says nothing.
+        missed_arrivals: share of those that reached the goal in which it did not hold so there; None likewise, and
+            where none reached it.
     """
 
     success: float
@@ -44,6 +48,11 @@ class GoalFigures:
     collisions: float
     steps: float
     episodes: int
+    false_arrivals: float | None = None
+    missed_arrivals: float | None = None
+
+
+FIGURES = fields(GoalFigures)
 
 
 @dataclass(frozen=True)
@@ -54,29 +63,34 @@ class GoalEvaluation:
         agent: its name.
         scenes: figures by scene name.
         perturbed: how what it saw differed from the scenes' own pictures (`Takes.made`); None: not at all.
+        tour: of the tours of the scenes before the episodes their `steps`, and means of their `collisions` and of the
+            share of `poses` come to; None where there were none.
         average: the plain mean over scenes; episodes are the sum.
     """
 
     agent: str
     scenes: Mapping[str, GoalFigures]
     perturbed: Mapping[str, object] | None = None
+    tour: Mapping[str, float] | None = None
 
     @property
     def average(self) -> GoalFigures:
-        """Means over scenes."""
+        """Means over scenes; of missed arrivals over those in which a goal was reached."""
         rows = [asdict(figures) for figures in self.scenes.values()]
-        means = {field.name: float(np.mean([row[field.name] for row in rows])) for field in fields(GoalFigures)}
+        found = {field.name: [row[field.name] for row in rows if row[field.name] is not None] for field in FIGURES}
+        means = {name: float(np.mean(values)) if values else None for name, values in found.items()}
         return GoalFigures(**{**means, "episodes": sum(row["episodes"] for row in rows)})
 
     def to_json(self) -> dict[str, object]:
-        """As JSON values: `scenes` a list, `average`, `perturbed`."""
+        """As JSON values: `scenes` a list, `average`, `perturbed`, `tour`."""
         scenes = [{"scene": name, **asdict(figures)} for name, figures in self.scenes.items()]
-        perturbed = None if self.perturbed is None else dict(self.perturbed)
-        return {"agent": self.agent, "scenes": scenes, "average": asdict(self.average), "perturbed": perturbed}
+        perturbed, tour = (None if part is None else dict(part) for part in (self.perturbed, self.tour))
+        average = asdict(self.average)
+        return {"agent": self.agent, "scenes": scenes, "average": average, "perturbed": perturbed, "tour": tour}
 
 
 def evaluate_goals(
-    agents: Mapping[str, Callable[[World], Agent]],
+    agents: Mapping[str, Callable[[World], Agent] | Touring],
     scenes: Sequence[Scene],
     *,
     goals: int = GOALS,
@@ -87,7 +101,7 @@ def evaluate_goals(
     """Walk to goals drawn in some scenes; every agent, then a random walk and shortest paths.
 
     Args:
-        agents: what makes an agent for a world, by name.
+        agents: what makes an agent for a world, by name; or for every scene one of its own, by a tour of it.
         scenes: distinct names; with what the agents see.
         goals: of each scene.
         step_limit: steps after which an episode has failed.
@@ -98,18 +112,52 @@ def evaluate_goals(
         SceneError: a scene has fewer poses than goals.
         AgentError: an agent cannot walk here; it is named.
     """
-    world = make_world(scenes, {scene.name: drawn_goals(scene, goals, seed) for scene in scenes})
+    wanted = {scene.name: drawn_goals(scene, goals, seed) for scene in scenes}
+    world = make_world(scenes, wanted)
     makers = {**agents, RANDOM: lambda _: RandomWalk(), SHORTEST_PATH: shortest_paths}
+    perturbed = None if takes is None else takes.made
     found = []
     for name, make in makers.items():
         try:
-            table = run_episodes(
-                world, make(world), scenes=scenes, takes=takes, episodes_per_target=1, step_limit=step_limit, seed=seed
-            )
+            if isinstance(make, Touring):
+                figures, tour = _after_tours(make, scenes, wanted, takes, step_limit, seed)
+            else:
+                table = _walked(world, make(world), scenes, takes, step_limit, seed)
+                figures, tour = _figures(world, table), None
         except AgentError as fault:
             raise AgentError(f"{name}: {fault}") from fault
-        found.append(replace(_summary(world, table, name), perturbed=None if takes is None else takes.made))
+        found.append(GoalEvaluation(name, figures, perturbed, tour))
     return found
+
+
+def _after_tours(
+    touring: Touring,
+    scenes: Sequence[Scene],
+    wanted: Mapping[str, list[int]],
+    takes: Takes | None,
+    step_limit: int,
+    seed: int,
+) -> tuple[dict[str, GoalFigures], dict[str, float]]:
+    """Figures by scene of agents that toured it, and what the tours came to."""
+    figures: dict[str, GoalFigures] = {}
+    tours = []
+    for number, scene in enumerate(scenes):
+        world = make_world([scene], {scene.name: wanted[scene.name]})
+        here = None if takes is None else takes.of_scene(number)
+        tours.append(walk_tour(world, touring, scene, seed, here))
+        agent = touring.after(tours[-1].state)
+        figures |= _figures(world, _walked(world, agent, [scene], here, step_limit, seed))
+    collisions, poses = (float(np.mean([getattr(tour, name) for tour in tours])) for name in ("collisions", "poses"))
+    return figures, {"steps": touring.steps, "collisions": collisions, "poses": poses}
+
+
+def _walked(
+    world: World, agent: Agent, scenes: Sequence[Scene], takes: Takes | None, step_limit: int, seed: int
+) -> EpisodeTable:
+    """An episode to each goal."""
+    return run_episodes(
+        world, agent, scenes=scenes, takes=takes, episodes_per_target=1, step_limit=step_limit, seed=seed
+    )
 
 
 def drawn_goals(scene: Scene, count: int, seed: int) -> list[int]:
@@ -126,7 +174,8 @@ def drawn_goals(scene: Scene, count: int, seed: int) -> list[int]:
     return sorted(rng.choice(states, count, replace=False).tolist())
 
 
-def _summary(world: World, table: EpisodeTable, agent: str) -> GoalEvaluation:
+def _figures(world: World, table: EpisodeTable) -> dict[str, GoalFigures]:
+    """By scene name."""
     scene = world.target_scene.cpu().numpy()[table.target]
     columns = {
         "success": metrics.success(table),
@@ -139,5 +188,15 @@ def _summary(world: World, table: EpisodeTable, agent: str) -> GoalEvaluation:
     for number, name in enumerate(world.scene_names):
         here = scene == number
         means = {key: float(column[here].mean()) for key, column in columns.items()}
-        figures[name] = GoalFigures(**means, episodes=int(here.sum()))
-    return GoalEvaluation(agent, figures)
+        false, missed = _arrivals(table, here)
+        figures[name] = GoalFigures(**means, episodes=int(here.sum()), false_arrivals=false, missed_arrivals=missed)
+    return figures
+
+
+def _arrivals(table: EpisodeTable, here: np.ndarray) -> tuple[float | None, float | None]:
+    """Shares of false and missed arrivals in some of the episodes (N,) bool."""
+    if table.false_arrivals is None or table.told_arrival is None:
+        return None, None
+    told = table.told_arrival[here & table.reached]
+    missed = float(1 - told.mean()) if len(told) else None
+    return float((table.false_arrivals[here] > 0).mean()), missed

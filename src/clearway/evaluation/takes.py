@@ -6,7 +6,7 @@ Axis letters: S states of a scene, K takes, B episodes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,10 @@ class Takes:
     count: int
     seen: Mapping[str, Sequence[np.ndarray]]
     made: Mapping[str, object] = field(default_factory=dict)
+
+    def of_scene(self, number: int) -> Takes:
+        """Those of one scene."""
+        return replace(self, seen={name: parts[number : number + 1] for name, parts in self.seen.items()})
 
 
 def take_at(seed: np.ndarray, step: np.ndarray, count: int) -> np.ndarray:
