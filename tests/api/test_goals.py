@@ -12,13 +12,14 @@ from clearway.agents.by_pose import RandomWalk
 from clearway.errors import ArgumentError, ClearwayError, EncoderError, SceneError
 from clearway.live import live_room
 from clearway.live.conditions import Perturbations
-from clearway.perception import encoder_from_record
+from clearway.perception import encoder_from_record, eyes
+from clearway.perception.eyes import write_eyes
 from clearway.scenes.sensors import RGB
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views import grid
 from helpers.agents import Spy
 from helpers.made import corridor_scene, grid_scene
-from helpers.small_eyes import seen_by_eyes
+from helpers.small_eyes import seen_by_eyes, small_eyes
 
 SMALL = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
 
@@ -136,3 +137,43 @@ def test_bad_arguments_are_one_line(run):
         evaluate_goals(run / "run", [corridor_scene(5)])
     with pytest.raises(ClearwayError, match="no run here"):
         evaluate_goals(run, [corridor_scene(5)])
+
+
+@pytest.fixture
+def shipped(monkeypatch, tmp_path):
+    """Small eyes instead of those that come with clearway."""
+    write_eyes(tmp_path / "shipped", small_eyes().eval(), {})
+    monkeypatch.setattr(eyes, "SHIPPED", tmp_path / "shipped")
+    return tmp_path / "shipped"
+
+
+def test_the_generalist_walks_anywhere_and_says_where_it_has_arrived(shipped):
+    told, random, _ = evaluate_goals("generalist", [grid_scene(3)], goals=5, step_limit=30, seed=2)
+    assert told.agent == "generalist" and told.average.episodes == 5 and told.tour is None
+    assert 0 <= told.average.false_arrivals <= 1 and random.average.false_arrivals is None
+    assert evaluate_goals("generalist", [grid_scene(3)], goals=5, step_limit=30, seed=2)[0] == told
+
+
+def test_it_looks_around_first_where_it_may(shipped):
+    scenes = [grid_scene(3), corridor_scene(5)]
+    toured, random, _ = evaluate_goals("generalist", scenes, goals=5, step_limit=30, tour=40)
+    assert toured.tour["steps"] == 40 and 0 < toured.tour["poses"] <= 1 and random.tour is None
+    assert list(toured.scenes) == ["grid", "corridor"] and toured.average.episodes == 10
+    alone, *_ = evaluate_goals("generalist", scenes[1:], goals=5, step_limit=30, tour=40)
+    assert alone.scenes["corridor"] == toured.scenes["corridor"]
+
+
+def test_a_tour_is_nothing_for_an_agent_without_a_map(run):
+    with pytest.raises(
+        ArgumentError, match=r"tour=40: recurrent keeps no map, .* Leave it out, or evaluate generalist"
+    ):
+        evaluate_goals(run / "run", [corridor_scene(5)], goals=4, tour=40)
+
+
+def test_altered_eyes_are_refused(shipped):
+    weights = shipped / "eyes.safetensors"
+    content = bytearray(weights.read_bytes())
+    content[-1] ^= 1
+    weights.write_bytes(content)
+    with pytest.raises(EncoderError, match="altered, its SHA-256"):
+        evaluate_goals("generalist", [corridor_scene(5)], goals=4)

@@ -82,11 +82,15 @@ class GoalEvaluation:
         return GoalFigures(**{**means, "episodes": sum(row["episodes"] for row in rows)})
 
     def to_json(self) -> dict[str, object]:
-        """As JSON values: `scenes` a list, `average`, `perturbed`, `tour`."""
-        scenes = [{"scene": name, **asdict(figures)} for name, figures in self.scenes.items()]
+        """As JSON values: `scenes` a list, `average`, `perturbed`, `tour`. Not what an agent does not tell."""
+        scenes = [{"scene": name, **_told(figures)} for name, figures in self.scenes.items()]
         perturbed, tour = (None if part is None else dict(part) for part in (self.perturbed, self.tour))
-        average = asdict(self.average)
+        average = _told(self.average)
         return {"agent": self.agent, "scenes": scenes, "average": average, "perturbed": perturbed, "tour": tour}
+
+
+def _told(figures: GoalFigures) -> dict[str, float]:
+    return {name: value for name, value in asdict(figures).items() if value is not None}
 
 
 def evaluate_goals(

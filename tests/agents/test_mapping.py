@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clearway.agents.agent import FEATURES
+from clearway.agents.exploring import Explorer, map_of
+from clearway.agents.mapping import MappingAgent
+from clearway.evaluation import metrics
+from clearway.evaluation.episodes import run_episodes
+from clearway.evaluation.tours import Touring, walk_tour
+from clearway.mapping.settings import MappingSettings
+from clearway.mapping.sight import Sight
+from clearway.world.world import make_world
+from helpers.agents import check_agent
+from helpers.made import grid_scene
+from helpers.perfect_sight import PerfectSight, seen_perfectly
+from helpers.small_eyes import seen_by_eyes, small_eyes
+
+SETTINGS = MappingSettings(side=31)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return seen_perfectly(grid_scene(1, width=8, depth=7, obstacle_share=0.25))
+
+
+@pytest.fixture(scope="module")
+def world(scene):
+    targets = np.random.default_rng(0).choice(np.flatnonzero(scene.components == 0), 12, replace=False)
+    return make_world([scene], {scene.name: sorted(targets.tolist())})
+
+
+def walked(world, agent):
+    return run_episodes(world, agent, episodes_per_target=4, step_limit=300)
+
+
+def test_with_good_eyes_it_finds_every_target_with_hardly_a_collision(scene, world):
+    table = walked(world, MappingAgent(PerfectSight(scene), settings=SETTINGS))
+    assert metrics.success(table).mean() == 1
+    assert metrics.spl(table).mean() > 0.55 and table.collisions.mean() < 0.5
+    assert table.false_arrivals is not None and (table.false_arrivals > 0).mean() < 0.1
+
+
+def test_who_sees_no_obstacles_bumps_into_them(scene, world):
+    blind = PerfectSight(scene)
+    blind.stands = lambda features: np.zeros((len(features), 63), np.float32)
+    bumps, clears = (
+        walked(world, MappingAgent(sight, settings=SETTINGS)).collisions.mean()
+        for sight in (blind, PerfectSight(scene))
+    )
+    assert bumps > 1 > clears
+
+
+def test_after_a_tour_it_walks_almost_the_shortest_paths(scene, world):
+    sight = PerfectSight(scene)
+    touring = Touring(
+        lambda steps: Explorer(sight, steps, settings=SETTINGS),
+        lambda state: MappingAgent(sight, known=map_of(state), settings=SETTINGS),
+        300,
+    )
+    tour = walk_tour(world, touring, scene, seed=0)
+    assert tour.poses == 1
+    table = walked(world, touring.after(tour.state))
+    assert metrics.success(table).mean() == 1 and metrics.spl(table).mean() > 0.9
+    assert table.collisions.mean() <= 0.05
+    assert table.told_arrival is not None and table.told_arrival.mean() > 0.9
+
+
+def test_a_tour_follows_from_its_seed(scene, world):
+    sight = PerfectSight(scene)
+    touring = Touring(lambda steps: Explorer(sight, steps, settings=SETTINGS), lambda state: None, 30)
+    one, again, other = (walk_tour(world, touring, scene, seed) for seed in (0, 0, 1))
+    known = [map_of(tour.state) for tour in (one, again, other)]
+    assert np.array_equal(known[0].features, known[1].features) and np.array_equal(known[0].room, known[1].room)
+    assert known[0].taken.shape != known[2].taken.shape or not np.array_equal(known[0].features, known[2].features)
+
+
+@pytest.mark.parametrize("kind", ["plain", "toured", "explorer"])
+def test_it_keeps_the_protocol(tmp_path, kind):
+    seen = seen_by_eyes(tmp_path / "eyes", grid_scene(2))[0]
+    features = seen.features.astype(np.float32)
+    sight = Sight(small_eyes().eval())
+    settings = MappingSettings(side=15)
+    explorer = Explorer(sight, 4, settings=settings)
+    agent = {"explorer": explorer, "plain": MappingAgent(sight, settings=settings)}.get(kind)
+    if agent is None:
+        state = explorer.reset({}, np.arange(1))
+        for row in range(4):
+            _, state = explorer.act({FEATURES: features[row : row + 1]}, state)
+        agent = MappingAgent(sight, known=map_of(state), settings=settings)
+    rng = np.random.default_rng(0)
+    observations = [{FEATURES: features[rng.integers(len(features), size=3)]} for _ in range(4)]
+    check_agent(agent, observations, {FEATURES: features[:3]}, draws=False)

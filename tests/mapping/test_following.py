@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clearway.mapping.following import SURE, Follower
+from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
+from clearway.mapping.settings import MappingSettings
+from clearway.scenes.actions import BLOCKED
+from helpers.made import grid_scene
+from helpers.perfect_sight import PerfectSight, seen_perfectly
+
+SETTINGS = MappingSettings(side=31)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_knows_where_it_is_and_which_moves_were_blocked(seed):
+    scene = seen_perfectly(grid_scene(seed, width=7, depth=6, obstacle_share=0.3))
+    follower = Follower(PerfectSight(scene), SETTINGS)
+    rng = np.random.default_rng(seed)
+    state = {**follower.begin(2)}
+    here = rng.integers(scene.state_count, size=2)
+    start, blocked = here.copy(), set()
+    for _ in range(60):
+        poses, after = follower.follow(scene.features[here], state)
+        for row, pose in enumerate(poses):
+            assert pose.index == lattice_index(scene, start[row], here[row]), "it lost itself"
+        action = rng.integers(4, size=2)
+        following = scene.graph[here, action]
+        if following[0] == BLOCKED:
+            away = action[0] if action[0] == 0 else 2
+            blocked.add(((poses[0].heading + away) % HEADINGS, *poses[0].cell))
+        here = np.where(following == BLOCKED, here, following)
+        state = {**state, **after, "action": action}
+    _, after = follower.follow(scene.features[here], state)
+    assert blocked and {tuple(edge) for edge in np.argwhere(after["shut"][0]).tolist()} == blocked
+    assert (after["room"][0] == SURE).sum() == len(visited(after["room"][0]))
+
+
+def visited(room: np.ndarray) -> np.ndarray:
+    return np.argwhere(room >= SURE)
+
+
+def lattice_index(scene, start: int, here: int) -> tuple[int, int, int]:
+    """The pose on the lattice of a state, of a walk that began in another."""
+    turns = (np.array([scene.headings_deg[start], scene.headings_deg[here]]) // 90).astype(int)
+    cells = np.rint((scene.locations_m[here] - scene.locations_m[start]) / 0.5).astype(int)
+    steps = np.array([[0, 1], [1, 0], [0, -1], [-1, 0]])  # x and z of a step ahead, by heading
+    ahead, right = cells @ steps[turns[0]], cells @ steps[(turns[0] + 1) % 4]
+    row, column = np.array([15, 15]) + ahead * AHEAD[0] + right * RIGHT[0]
+    return (turns[1] - turns[0]) % 4, row, column

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clearway.mapping.beliefs import SEEN, LatticePose, add_sighting, add_standing, likeliest
+from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
+from clearway.perception.around import PLACES_M
+from clearway.perception.whereabouts import ELSEWHERE, WHEREABOUTS, bin_of
+
+SIDE = 21
+
+
+def told(ahead_m: float, right_m: float, turn_deg: float) -> np.ndarray:
+    """Evidence for one bin."""
+    evidence = np.zeros(ELSEWHERE, np.float32)
+    evidence[bin_of(np.array([ahead_m]), np.array([right_m]), np.array([turn_deg]))[0]] = 1
+    return evidence
+
+
+def test_every_bin_is_told_apart_and_what_is_far_is_elsewhere():
+    steps = np.arange(-8, 9) * 0.5
+    ahead, right, turn = np.meshgrid(steps, steps, np.arange(8) * 45.0, indexing="ij")
+    found = bin_of(ahead, right, turn)
+    assert sorted(found.ravel().tolist()) == list(range(ELSEWHERE)) and WHEREABOUTS == ELSEWHERE + 1
+    assert bin_of(np.array([0.2, 4.4]), np.zeros(2), np.array([-10.0, 0.0])).tolist() == [
+        bin_of(np.zeros(1), np.zeros(1), np.zeros(1))[0],
+        ELSEWHERE,
+    ]
+
+
+def test_a_turn_to_the_right_makes_right_ahead():
+    for heading in range(HEADINGS):
+        assert RIGHT[heading].tolist() == AHEAD[(heading + 1) % HEADINGS].tolist()
+        pose = LatticePose(heading, 5, 5)
+        assert pose.moved(2).turned(2).moved(2).turned(2) == pose and pose.moved(-1) == pose.turned(2).moved(1).turned(
+            2
+        )
+
+
+@pytest.mark.parametrize("heading", range(HEADINGS))
+def test_what_is_seen_is_where_the_pose_and_the_bin_say(heading):
+    pose = LatticePose(heading, 10, 9)
+    belief = np.zeros((HEADINGS, SIDE, SIDE), np.float32)
+    add_sighting(belief, pose, told(1.5, -1.0, 90.0), 2.0)
+    place = np.array(pose.cell) + 3 * AHEAD[heading] - 2 * RIGHT[heading]
+    assert likeliest(belief) == LatticePose((heading + 1) % HEADINGS, *place.tolist())
+    assert belief.max() == belief.sum() == 2.0
+
+
+def test_what_lies_beyond_the_edge_is_left_out():
+    belief = np.zeros((HEADINGS, SIDE, SIDE), np.float32)
+    add_sighting(belief, LatticePose(2, 0, 20), told(1.0, 0.0, 0.0), 1.0)
+    assert not belief.any()
+    add_sighting(belief, LatticePose(0, 0, 20), told(1.0, 0.0, 0.0), 1.0)
+    assert likeliest(belief) == LatticePose(0, 2, 20) and belief.sum() == 1
+    room = np.zeros((SIDE, SIDE), np.float32)
+    add_standing(room, LatticePose(3, 3, 0), np.ones(len(PLACES_M), np.float32), 1.0)
+    assert room.sum() == 8
+
+
+def test_eyes_are_never_as_sure_of_a_cell_as_who_tried_it():
+    room = np.zeros((SIDE, SIDE), np.float32)
+    room[11, 10] = -10.0
+    evidence = np.zeros(len(PLACES_M), np.float32)
+    for place in ((0.5, 0.0), (1.0, 0.5)):
+        evidence[PLACES_M.index(place)] = 3.0
+    for _ in range(5):
+        add_standing(room, LatticePose(0, 10, 10), evidence, 1.0)
+    assert room[11, 10] == -10.0 and room[12, 11] == SEEN and room.sum() == SEEN - 10

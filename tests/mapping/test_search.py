@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.mapping.beliefs import LatticePose
+from clearway.mapping.following import SURE
+from clearway.mapping.search import probabilities, search_steps
+from clearway.mapping.settings import MappingSettings
+from clearway.scenes.actions import Action
+
+SIDE = 9
+START, END = LatticePose(0, 3, 4), LatticePose(0, 5, 4)
+
+
+def steps(room: np.ndarray, *, shut: tuple[int, int, int] | None = None, cost: float = 4.0) -> Action:
+    """The first action to the end, which was seen, in a room of log-odds (SIDE, SIDE)."""
+    evidence = np.zeros((1, 4, SIDE, SIDE), np.float32)
+    evidence[0][END.index] = 30.0
+    closed = np.zeros(evidence.shape, bool)
+    if shut is not None:
+        closed[0][shut] = True
+    done = np.zeros(evidence.shape, bool)
+    done[0][START.index] = True
+    return Action(
+        int(search_steps([START], evidence, done, room[None], closed, MappingSettings(collision_cost=cost))[0])
+    )
+
+
+def doubtful_ahead() -> np.ndarray:
+    """Free, but for the cell ahead, which is free or not."""
+    room = np.full((SIDE, SIDE), SURE, np.float32)
+    room[4, 4] = 0.0
+    return room
+
+
+def test_it_goes_round_what_may_block_where_collisions_cost_much():
+    assert steps(doubtful_ahead(), cost=1.0) == Action.MOVE_FORWARD
+    assert steps(doubtful_ahead(), cost=20.0) in (Action.TURN_LEFT, Action.TURN_RIGHT)
+
+
+def test_no_way_leads_where_a_move_was_blocked_or_a_body_cannot_stand():
+    free = np.full((SIDE, SIDE), SURE, np.float32)
+    assert steps(free) == Action.MOVE_FORWARD
+    assert steps(free, shut=(0, 3, 4)) in (Action.TURN_LEFT, Action.TURN_RIGHT)
+    tried = free.copy()
+    tried[4, 4] = -SURE
+    assert steps(tried) in (Action.TURN_LEFT, Action.TURN_RIGHT)
+
+
+def test_where_nothing_is_left_to_search_it_begins_anew():
+    room = np.full((SIDE, SIDE), -SURE, np.float32)
+    room[3:6, 4] = SURE
+    evidence, shut = np.zeros((1, 4, SIDE, SIDE), np.float32), np.zeros((1, 4, SIDE, SIDE), bool)
+    done = np.ones(evidence.shape, bool)
+    evidence[0][END.index] = 5.0
+    action = search_steps([START], evidence, done, room[None], shut, MappingSettings())
+    assert action.tolist() == [Action.MOVE_FORWARD]
+
+
+def test_what_is_known_of_cells_counts_with_what_was_seen():
+    room = np.full((1, 2, 2), -3.0)
+    room[0, 1, 1] = 3.0
+    evidence = np.zeros((1, 4, 2, 2))
+    evidence[0, 2] = 1.0
+    found = probabilities(evidence, room)
+    assert np.isclose(found.sum(), 1) and np.unravel_index(found.argmax(), found.shape) == (0, 2, 1, 1)
+    np.testing.assert_allclose(found[0, 2, 1, 1] / found[0, 2, 0, 0], np.exp(3.0), rtol=1e-6)
