@@ -20,7 +20,7 @@ from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
 SURE_OF_MOVES = 1.5  # log-odds of a move, at most, before its outcome is seen
-SAME, IF_SAME, IF_NOT_SAME = 0.985, -7.0, 4.0
+SAME, IF_SAME, IF_NOT_SAME = 0.985, -7.0, 2.0
 """Cosine of descriptions above which two pictures are the same; evidence for a move where they are, and are not: where
 pictures have no noise, those of one pose are the same."""
 STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}

@@ -23,10 +23,10 @@ class MappingSettings:
     """
 
     side: int = 49
-    collision_cost: float = 4.0
+    collision_cost: float = 16.0
     usual_room: float = -1.0
     standing_weight: float = 0.4
-    target_weight: float = 0.6
+    target_weight: float = 0.4
     place_weight: float = 0.6
     least_evidence: float = -3.0
     most_evidence: float = 100.0
