@@ -164,9 +164,7 @@ def test_it_looks_around_first_where_it_may(shipped):
 
 
 def test_a_tour_is_nothing_for_an_agent_without_a_map(run):
-    with pytest.raises(
-        ArgumentError, match="tour=40: recurrent keeps no map, and"
-    ):
+    with pytest.raises(ArgumentError, match="tour=40: recurrent keeps no map, and"):
         evaluate_goals(run / "run", [corridor_scene(5)], goals=4, tour=40)
 
 

@@ -129,7 +129,7 @@ def test_other_eyes_in_the_folder_are_told(folder: Path):
 
 def test_without_shipped_eyes_the_name_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     monkeypatch.setattr(eyes, "SHIPPED", tmp_path)
-    with pytest.raises(EncoderError, match=r"no trained eyes come with this version\. Train some by clearway pretrain"):
+    with pytest.raises(EncoderError, match=r"eyes that come with clearway are missing from .* Install clearway again"):
         find_record("clearway", [])
     eyes.write_eyes(tmp_path, random_eyes(), {})
     assert find_record("clearway", []).name == "clearway"

@@ -2,7 +2,7 @@
 
 Eyes are a folder of two files: `eyes.json` says how large the network is, how it was trained, and the SHA-256 of
 `eyes.safetensors`, its parameters. The shipped ones lie in the package; `clearway pretrain` makes others, which are
-used by the name of their folder. This version ships none yet.
+used by the name of their folder.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ def find_record(name: str = NAME) -> EncoderRecord:
         EncoderError: there are none, or they are damaged.
     """
     if name == NAME and not is_eyes(SHIPPED):
-        problem = f"encoder {NAME}: no trained eyes come with this version"
-        raise EncoderError(f"{problem}. Train some by clearway pretrain, and give their folder")
+        problem = f"encoder {NAME}: the eyes that come with clearway are missing from {SHIPPED}"
+        raise EncoderError(f"{problem}. Install clearway again")
     card = read_card(_folder(name))
     settings = {"kind": KIND, "eyes": name, "shape": card.shape.to_json(), "sha256": card.sha256}
     return EncoderRecord(NAME if name == NAME else Path(name).name, card.sha256[:IDENTITY_LETTERS], settings)
