@@ -59,6 +59,18 @@ def test_what_lies_beyond_the_edge_is_left_out():
     assert room.sum() == 8
 
 
+def test_what_is_not_seen_counts_less_where_a_wall_may_be_between():
+    pose, side = LatticePose(0, 10, 10), SIDE
+    room = np.full((side, side), -1.0, np.float32)
+    room[12, 10] = 4.0
+    belief = np.zeros((HEADINGS, side, side), np.float32)
+    add_sighting(belief, pose, np.full(ELSEWHERE, -4.0, np.float32), 1.0, room)
+    assert -2.3 < belief[0, 12, 10] < -1.5 and -0.1 < belief[0, 13, 10] < 0
+    belief[:] = 0
+    add_sighting(belief, pose, np.full(ELSEWHERE, 4.0, np.float32), 1.0, room)
+    assert belief[0, 12, 10] == belief[0, 13, 10] == 4.0
+
+
 def test_eyes_are_never_as_sure_of_a_cell_as_who_tried_it():
     room = np.zeros((SIDE, SIDE), np.float32)
     room[11, 10] = -10.0

@@ -11,10 +11,13 @@ from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.encoded import Encoded
 from clearway.mapping.following import Follower, been_now
 from clearway.mapping.room_map import RoomMap
+from clearway.mapping.routes import shifted
 from clearway.mapping.search import search_steps
 from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
 from clearway.perception.encoder import Encoder
+
+LITTLE_NEWS = -2.0  # evidence that a pose shows something new, next to one with the same heading that was come to
 
 
 class Explorer:
@@ -59,10 +62,18 @@ class Explorer:
                 taken[row, count[row]], features[row, count[row]] = pose.index, seen[row]
                 count[row] += 1
         been = been_now(state["been"], poses)
-        alike = np.zeros(been.shape, np.float32)
-        action = search_steps(poses, alike, been, after["room"], after["shut"], self._settings)
+        action = search_steps(poses, _unlike(been), been, after["room"], after["shut"], self._settings)
         kept = {"count": count, "taken": taken, "features": features}
         return Decisions(action), {**after, **kept, "been": been, "action": action}
+
+
+def _unlike(been: np.ndarray) -> np.ndarray:
+    """(B, 4, G, G) float32, evidence that a pose shows something new: beside a pose that was come to, little."""
+    around = been.copy()
+    for rows in (-1, 0, 1):
+        for columns in (-1, 0, 1):
+            around |= shifted(been, np.array((rows, columns)), False)
+    return np.where(around, LITTLE_NEWS, 0.0).astype(np.float32)
 
 
 def map_of(state: State, row: int = 0) -> RoomMap:

@@ -14,6 +14,8 @@ from clearway.perception.whereabouts import FARTHEST
 
 NEVER = -60.0
 SEEN = 4.0  # log-odds at most of a cell that was seen, not tried
+VISIBLE = 0.9  # probability that something would be seen in a cell that is surely free: others may be behind a wall
+HALF_SURE = 2.0  # log-odds of a cell at which that is half as much
 _WINDOW, _AROUND = window_bins(), places_around()
 
 
@@ -51,12 +53,22 @@ def likeliest(belief: np.ndarray) -> LatticePose:
     return LatticePose(int(heading), int(row), int(column))
 
 
-def add_sighting(belief: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float) -> None:
-    """Add evidence (ELSEWHERE,) of where something is, seen from a pose, to a belief (4, G, G) about it."""
+def add_sighting(
+    belief: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float, room: np.ndarray | None = None
+) -> None:
+    """Add evidence (ELSEWHERE,) of where something is, seen from a pose, to a belief (4, G, G) about it.
+
+    What is behind a wall is not seen, so that evidence against a pose is weak there: given log-odds (G, G) that a body
+    can stand in the cells, it is log(v exp(evidence) + 1 - v), where v is the probability that the pose would be seen.
+    """
     side = belief.shape[-1]
     rows, here_rows = _within(pose.row, side)
     columns, here_columns = _within(pose.column, side)
-    belief[:, rows, columns] += weight * evidence[_WINDOW[pose.heading][:, here_rows, here_columns]]
+    seen = evidence[_WINDOW[pose.heading][:, here_rows, here_columns]]
+    if room is not None:
+        visible = VISIBLE / (1 + np.exp(-2 * (room[rows, columns] - HALF_SURE)))
+        seen = np.where(seen > 0, seen, np.log(visible * np.exp(seen) + 1 - visible))
+    belief[:, rows, columns] += weight * seen
 
 
 def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float) -> None:

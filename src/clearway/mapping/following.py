@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from clearway.mapping.again import Repeats, marks_of
 from clearway.mapping.beliefs import NEVER, LatticePose, add_sighting, add_standing, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS, STEP_M
 from clearway.mapping.room_map import RoomMap
@@ -20,9 +21,12 @@ from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
 SURE_OF_MOVES = 1.5  # log-odds of a move, at most, before its outcome is seen
-SAME, IF_SAME, IF_NOT_SAME = 0.985, -7.0, 2.0
-"""Cosine of descriptions above which two pictures are the same; evidence for a move where they are, and are not: where
-pictures have no noise, those of one pose are the same."""
+SAME, IF_SAME = 0.985, -7.0
+"""Cosine of descriptions above which two pictures are the same, and evidence for a move where they are."""
+IF_NOT_SAME = {Repeats.UNKNOWN: 3.0, Repeats.NEVER: 2.0, Repeats.ALWAYS: 16.0}
+"""Evidence for a move where they are not: where pictures repeat, a blocked move shows the same one again."""
+RECOGNISED = 20.0
+"""Evidence for a pose whose picture was seen before, to the bit."""
 STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}
 QUARTERS = {Action.TURN_RIGHT: 1, Action.TURN_LEFT: -1}
 
@@ -48,28 +52,34 @@ class Follower:
         self._sight, self._settings, self._known = sight, settings, known
         if known is not None:
             self._described = sight.description(known.features.astype(np.float32))
+            self._marks = marks_of(known.features)
 
     def begin(self, count: int) -> dict[str, np.ndarray]:
         """The beliefs of B episodes before anything was seen.
 
         `here` (B, 4, G, G) log of the probability of the own pose, but for a constant; `room` (B, G, G) log-odds that a
         body can stand in a cell; `shut` (B, 4, G, G) bool, a move out of a cell along a direction was blocked; `been`
-        (B, 4, G, G) bool; and of the last step `begun` (B,) bool, `seen` (B, F), `action` (B,) int64.
+        (B, 4, G, G) bool; `mark` (B, 4, G, G) uint32 of the picture seen in each pose, and `repeats` (B,) int8, see
+        `again`; and of the last step `begun` (B,) bool, `seen` (B, F), `action` (B,) int64.
         """
         known, side = self._known, self._settings.side if self._known is None else len(self._known.room)
         here = np.full((count, HEADINGS, side, side), NEVER, np.float32)
         shut, been = np.zeros(here.shape, bool), np.zeros(here.shape, bool)
         room = np.full((count, side, side), self._settings.usual_room, np.float32)
+        mark = np.zeros(here.shape, np.uint32)
         if known is None:
             here[:, 0, side // 2, side // 2] = 0
         else:
             room[:], shut[:] = known.room, known.shut
             here[np.broadcast_to(room[:, None] > 0, here.shape)] = 0
+            mark[:, *known.taken.T] = self._marks
         return {
             "here": here,
             "room": room,
             "shut": shut,
             "been": been,
+            "mark": mark,
+            "repeats": np.full(count, Repeats.UNKNOWN, np.int8),
             "begun": np.zeros(count, bool),
             "seen": np.zeros((count, self._sight.feature_count), np.float32),
             "action": np.zeros(count, np.int64),
@@ -79,9 +89,13 @@ class Follower:
         self, seen: np.ndarray, state: Mapping[str, np.ndarray]
     ) -> tuple[list[LatticePose], dict[str, np.ndarray]]:
         """Where B agents most likely stand, by features (B, F), and the beliefs now; `been` is as it was."""
-        after = {name: state[name].copy() for name in ("here", "room", "shut", "been")}
-        here, room = after["here"], after["room"]
+        after = {name: state[name].copy() for name in ("here", "room", "shut", "been", "mark", "repeats")}
+        here, room, mark, repeats = after["here"], after["room"], after["mark"], after["repeats"]
+        marks = marks_of(seen)
+        again = mark == marks[:, None, None, None]
+        repeats[again.any(axis=(1, 2, 3))] = Repeats.ALWAYS
         self._walked(seen, state, after)
+        here[again] += RECOGNISED
         if self._known is not None:
             self.sight_in_map(here, seen, self._settings.place_weight)
         here -= here.max(axis=(1, 2, 3), keepdims=True)
@@ -91,6 +105,9 @@ class Follower:
             if not after["been"][row][pose.index]:
                 add_standing(room[row], pose, stands, self._settings.standing_weight)
             room[row][pose.cell] = SURE
+            if mark[row][pose.index] not in (0, marks[row]) and repeats[row] == Repeats.UNKNOWN:
+                repeats[row] = Repeats.NEVER
+            mark[row][pose.index] = marks[row]
         np.clip(room, -SURE, SURE, out=room)
         return poses, {**after, "begun": np.ones_like(state["begun"]), "seen": seen}
 
@@ -116,8 +133,8 @@ class Follower:
         for row, evidence, stayed in zip(
             moving.tolist(), self._sight.whereabouts(before, seen[moving]), same.tolist(), strict=True
         ):
-            done = Action(int(action[row]))
-            moved = float(evidence[MOVED[done]] - evidence[STAYED]) + (IF_SAME if stayed else IF_NOT_SAME)
+            done, otherwise = Action(int(action[row])), IF_NOT_SAME[Repeats(int(after["repeats"][row]))]
+            moved = float(evidence[MOVED[done]] - evidence[STAYED]) + (IF_SAME if stayed else otherwise)
             self._moved(done, moved, {name: values[row] for name, values in after.items()})
         for row in np.flatnonzero(np.isin(action, list(QUARTERS))).tolist():
             after["here"][row] = np.roll(after["here"][row], QUARTERS[Action(int(action[row]))], axis=0)

@@ -5,7 +5,12 @@ Axes: B lattices, 4 headings, G rows, G columns.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from clearway.mapping.beliefs import LatticePose
 from clearway.mapping.lattice import AHEAD, HEADINGS
@@ -29,26 +34,43 @@ def _overlap(by: int, side: int) -> tuple[slice, slice]:
     return slice(max(0, by), side + min(0, by)), slice(max(0, -by), side - max(0, by))
 
 
-def ways_from(start: np.ndarray, entering: np.ndarray, most: int = 400) -> np.ndarray:
-    """(B, 4, G, G) float32, costs of the cheapest ways from poses.
+def ways_from(poses: Sequence[LatticePose], entering: np.ndarray) -> np.ndarray:
+    """(B, 4, G, G) float32, costs of the cheapest ways from a pose of each lattice; `FAR` where there is none.
 
     Args:
-        start: (B, 4, G, G) costs to begin with: 0 in the start, `FAR` elsewhere.
-        entering: (B, 4, G, G) float32, cost of entering each cell by a move along each of the four directions.
-        most: sweeps.
+        poses: B, where the ways begin.
+        entering: (B, 4, G, G) float32, cost of entering each cell by a move along each of the four directions; `FAR`
+            where that is impossible.
     """
-    cost = start.astype(np.float32)
-    for _ in range(most):
-        better = np.minimum(cost, np.minimum(cost[:, [3, 0, 1, 2]], cost[:, [1, 2, 3, 0]]) + 1)
-        for heading in range(HEADINGS):
-            back = (heading + 2) % HEADINGS
-            ahead = shifted(cost[:, heading], AHEAD[heading], FAR) + entering[:, heading]
-            behind = shifted(cost[:, heading], AHEAD[back], FAR) + entering[:, back]
-            better[:, heading] = np.minimum(better[:, heading], np.minimum(ahead, behind))
-        if (better >= cost - 1e-4).all():
-            return better
-        cost = better
-    return cost
+    first, after, price = _steps(entering.shape[-1])
+    cost = np.empty((len(poses), entering[0].size), np.float32)
+    for row, pose in enumerate(poses):
+        prices = np.append(entering[row].ravel(), np.float32(1))[price]
+        steps = csr_array((prices, after, first), shape=(cost.shape[1], cost.shape[1]))
+        start = np.ravel_multi_index(pose.index, entering[row].shape)
+        cost[row] = np.minimum(dijkstra(steps, indices=start, limit=FAR), FAR)
+    return cost.reshape(entering.shape)
+
+
+@cache
+def _steps(side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The steps of a lattice as a sparse matrix: row starts, the poses after, and where their prices stand.
+
+    Prices are those of entering cells, (4, G, G), in one row; behind them the price of a turn.
+    """
+    shape = (HEADINGS, side, side)
+    poses = np.arange(HEADINGS * side * side).reshape(shape)
+    turn = np.full(shape, poses.size)
+    beyond = [(np.roll(poses, -quarters, axis=0), turn) for quarters in (1, -1)]
+    for away in (0, 2):  # ahead, and backwards with the same heading
+        directions = [(heading + away) % HEADINGS for heading in range(HEADINGS)]
+        after = np.stack([shifted(poses[h], -AHEAD[d], -1) for h, d in enumerate(directions)])
+        entered = np.stack([shifted(poses[d], -AHEAD[d], -1) for d in directions])
+        beyond.append((after, entered))
+    after, price = (np.stack([step[part] for step in beyond], axis=-1).reshape(-1, len(beyond)) for part in (0, 1))
+    inside = after >= 0
+    first = np.concatenate([[0], inside.sum(axis=1).cumsum()])
+    return first.astype(np.int32), after[inside].astype(np.int32), price[inside]
 
 
 def first_action(start: LatticePose, end: LatticePose, cost: np.ndarray, entering: np.ndarray) -> int:

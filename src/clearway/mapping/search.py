@@ -45,10 +45,7 @@ def search_steps(
         settings: what ways cost.
     """
     price = _entering(room, shut, settings.collision_cost)
-    start = np.full(evidence.shape, FAR, np.float32)
-    for row, pose in enumerate(poses):
-        start[row][pose.index] = 0
-    cost = ways_from(start, price)
+    cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
     left = np.where(left.any(axis=(1, 2, 3), keepdims=True), left, within)

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import numpy as np
+
+from clearway.mapping.again import Repeats, marks_of
+from clearway.mapping.following import STAYED, Follower
+from clearway.mapping.settings import MappingSettings
+from clearway.scenes.actions import Action
+from helpers.made import corridor_scene
+from helpers.perfect_sight import PerfectSight, seen_perfectly
+
+SETTINGS = MappingSettings(side=31)
+
+
+class Undecided(PerfectSight):
+    """Eyes that hold every move for blocked, and no two pictures for the same."""
+
+    def whereabouts(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        found = super().whereabouts(first, second)
+        found[:, STAYED] = found.max(axis=1, initial=0) + 5
+        return found
+
+
+def walked(actions: list[Action], *, noise: bool) -> list[tuple[np.ndarray, int]]:
+    """What a follower holds of itself after each step in a corridor: its cell, and whether pictures repeat."""
+    scene = seen_perfectly(corridor_scene(6))
+    follower = Follower(Undecided(scene), SETTINGS)
+    state, here, found = follower.begin(1), 0, []
+    for step, action in enumerate([*actions, Action.TURN_RIGHT]):
+        seen = scene.features[[here]] + (0.001 * step if noise else 0.0)
+        poses, after = follower.follow(seen.astype(np.float32), state)
+        found.append((np.array(poses[0].cell), int(after["repeats"][0])))
+        state = {**state, **after, "action": np.array([int(action)])}
+        here = here if scene.graph[here, action] < 0 else int(scene.graph[here, action])
+    return found
+
+
+def test_marks_tell_pictures_apart_and_know_them_again():
+    features = np.random.default_rng(0).normal(size=(50, 8)).astype(np.float32)
+    marks = marks_of(features)
+    assert marks.dtype == np.uint32 and marks.all() and len(set(marks.tolist())) == 50
+    assert marks_of(features.astype(np.float16)).tolist() == marks.tolist()
+
+
+def test_a_picture_seen_again_says_that_they_repeat_and_then_another_one_is_a_move():
+    round_about = [Action.TURN_RIGHT] * 4
+    found = walked([*round_about, Action.MOVE_FORWARD, Action.MOVE_FORWARD], noise=False)
+    assert [repeats for _, repeats in found] == [Repeats.UNKNOWN] * 4 + [Repeats.ALWAYS] * 3
+    assert np.abs(found[-1][0] - found[0][0]).sum() == 2
+
+
+def test_where_a_pose_shows_another_picture_they_never_repeat_and_eyes_decide():
+    found = walked([Action.TURN_RIGHT] * 4 + [Action.MOVE_FORWARD] * 2, noise=True)
+    assert [repeats for _, repeats in found] == [Repeats.UNKNOWN] * 4 + [Repeats.NEVER] * 3
+    assert np.abs(found[-1][0] - found[0][0]).sum() == 0, "these eyes hold every move for blocked"
