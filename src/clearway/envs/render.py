@@ -23,7 +23,7 @@ PANEL_HEIGHT_PX = 360
 MAP_WIDTH_PX = 480
 MARGIN_PX = 16
 CAPTION_HEIGHT_PX, LEGEND_HEIGHT_PX, TEXT_SIZE_PX = 34, 42, 16
-SMOOTH_FROM_PX = 100  # pictures lower than this are made-up ones: enlarge them pixel by pixel
+SMOOTH_FROM_PX = 90  # pictures lower than this are made-up ones: enlarge them pixel by pixel
 ARROWS = "↑↗→↘↓↙←↖"  # headings 0, 45, 90, ...
 ANSI_MARKS = {Zone.FREE: "·", Zone.PRECOLLISION: "-", Zone.COLLISION: "!"}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -12,18 +12,21 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from clearway import colours
-from clearway.agents.agent import Agent
+from clearway.agents.agent import Agent, State
 from clearway.envs.record import EpisodeSoFar
-from clearway.envs.render import Renderer
+from clearway.envs.render import CAPTION_HEIGHT_PX, PANEL_HEIGHT_PX, Renderer
 from clearway.errors import ClearwayError
 from clearway.evaluation.episodes import Trajectory
 from clearway.evaluation.sight import Sight
 from clearway.files import written_whole
+from clearway.mapping.held import Held
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
+from clearway.viz.held import MEANING, held_picture
 from clearway.world.world import World
 
 STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
+HELD_WIDTH_PX = 620
 FRAMES_PER_S = 3
 LAST_FRAME_TIMES = 6  # the last frame stays for so many
 SUFFIXES = (".mp4", ".gif")
@@ -40,23 +43,33 @@ class Walked:
         target: index of the world's target.
         trajectory: states and actions.
         probabilities: (T + 1, A) of the actions, before each step and after the last; None where no agent told them.
+        held: what an agent with a map held in each of the T + 1 poses; None of others.
     """
 
     world: World
     target: int
     trajectory: Trajectory
     probabilities: np.ndarray | None
+    held: Sequence[Held] | None = None
 
 
-def walked(world: World, agent: Agent, target: int, trajectory: Trajectory) -> Walked:
-    """The episode with what the agent holds of its actions at each pose; it sees poses or features."""
+def walked(
+    world: World, agent: Agent, target: int, trajectory: Trajectory, holds: Callable[[State], Held] | None = None
+) -> Walked:
+    """The episode with what the agent holds of its actions at each pose; it sees poses or features.
+
+    holds: tells, by its state, what an agent with a map holds besides.
+    """
     sight, thoughts = Sight(world, agent), []
+    held: list[Held] = []
     memory = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
     for pose in torch.from_numpy(trajectory.states):
         decisions, memory = agent.act(sight(pose[None]), memory)
         thoughts.append(decisions.probabilities)
+        held += [] if holds is None else [holds(memory)]
     told = [thought for thought in thoughts if thought is not None]
-    return Walked(world, target, trajectory, np.concatenate(told) if len(told) == len(thoughts) else None)
+    probabilities = np.concatenate(told) if len(told) == len(thoughts) else None
+    return Walked(world, target, trajectory, probabilities, held or None)
 
 
 def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
@@ -64,12 +77,34 @@ def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
     renderer = Renderer(scenes, shown.world)
     states, actions = shown.trajectory.states, shown.trajectory.actions
     blocked = shown.world.blocked.numpy()[states[:-1], actions]
+    scene, first = _where(scenes, shown)
     for step in range(len(states)):
         bumps = np.stack([states[:step], actions[:step]], axis=1)[blocked[:step]]
         picture = Image.fromarray(renderer.rgb(EpisodeSoFar(states[: step + 1], bumps), shown.target))
         chosen = int(actions[step]) if step < len(actions) else None
         thought = None if shown.probabilities is None else shown.probabilities[step]
+        if shown.held is not None:
+            goal = int(shown.world.target_state[shown.target]) - first
+            picture = _with_held(picture, scene, shown.held[step], states[: step + 1] - first, goal)
         yield np.asarray(_with_strip(picture, thought, chosen))
+
+
+def _where(scenes: Sequence[Scene], shown: Walked) -> tuple[Scene, int]:
+    """The scene that was walked in, and its first state in the world's numbering."""
+    index = int(shown.world.target_scene[shown.target])
+    return scenes[index], int(shown.world.scene_offset[index])
+
+
+def _with_held(picture: Image.Image, scene: Scene, held: Held, states: np.ndarray, target: int) -> Image.Image:
+    """The picture with what is held beside it."""
+    font = ImageFont.load_default(TEXT_PX)
+    panel = held_picture(scene, held, states, target, (HELD_WIDTH_PX, PANEL_HEIGHT_PX))
+    wide = Image.new("RGB", (picture.width + HELD_WIDTH_PX + MARGIN_PX, picture.height), colours.PAPER)
+    wide.paste(picture, (0, 0))
+    wide.paste(panel, (picture.width, CAPTION_HEIGHT_PX + (PANEL_HEIGHT_PX - panel.height) // 2))
+    place = picture.width, CAPTION_HEIGHT_PX // 2
+    ImageDraw.Draw(wide).text(place, MEANING, colours.INK, font, anchor="lm")
+    return wide
 
 
 def _with_strip(picture: Image.Image, probabilities: np.ndarray | None, chosen: int | None) -> Image.Image:
