@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
+import numpy as np
 import torch
 
-from clearway.agents.agent import Agent
+from clearway.agents.agent import Agent, Decisions, State
 from clearway.agents.selection import ActionSelection
 from clearway.errors import RunError
 from clearway.evaluation.episodes import Trajectory, episode_starts, run_episodes
 from clearway.evaluation.goals import GOALS, drawn_goals
+from clearway.evaluation.sight import Sight
 from clearway.learn.load import TrainedAgent, run_tables
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
@@ -73,6 +75,18 @@ def episode_in(
         target = drawn.scene_state(int(ways.argmax()))
     world = make_world([scene], {scene.name: [target]})
     return world, walked_once(world, make(world), selection="sampled", step_limit=step_limit, seed=seed)
+
+
+def memories(world: World, agent: Agent, walk: Trajectory, target: int = 0) -> Iterator[tuple[Decisions, State]]:
+    """What an agent decides in each pose of an episode, and its state then; it sees poses or features.
+
+    target: index of the world's.
+    """
+    sight = Sight(world, agent)
+    state = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
+    for pose in torch.from_numpy(walk.states):
+        decisions, state = agent.act(sight(pose[None]), state)
+        yield decisions, state
 
 
 def walked_once(world: World, agent: Agent, *, selection: ActionSelection, step_limit: int, seed: int) -> Trajectory:

@@ -14,12 +14,12 @@ from clearway.scenes.scene import Scene
 from clearway.viz.maps import map_extent
 
 SHADE, SHADE_SHARE = (29, 35, 41), 0.62  # over the room
-STANDS = (255, 255, 255)
+STANDS = "white"
 STANDS_SHARE = 0.72
 LEAST_MARK, MOST_MARK, LEAST_SCALE = 0.15, 0.75, 0.05  # strength of the target's marks; a probability that is little
 PATH_SHARE, EDGE_SHARE, REACH = 0.09, 0.17, 0.47  # of a cell
 HOLLOW = "#d81b60"
-MEANING = "what it holds  ·  light: can stand here  ·  green: target may be here  ·  red: itself"
+MEANING = "what it holds: light, free; green, the target; red, itself"
 
 
 def held_picture(scene: Scene, held: Held, states: np.ndarray, target: int, size: tuple[int, int]) -> Image.Image:
@@ -34,12 +34,14 @@ def held_picture(scene: Scene, held: Held, states: np.ndarray, target: int, size
     """
     sheet = _Sheet(scene, size)
     base = sheet.base()
-    for x_m, z_m, stands in held.cells.tolist():
-        sheet.blend(base, sheet.square(x_m, z_m), STANDS, STANDS_SHARE * stands)
-    green = tuple(bytes.fromhex(colours.TARGET[1:]))
+    cells = [(sheet.square(x_m, z_m), STANDS_SHARE * stands) for x_m, z_m, stands in held.cells.tolist()]
+    _blend(base, cells, STANDS)
     most = max([*held.target[:, 3].tolist(), LEAST_SCALE])
-    for x_m, z_m, heading_deg, share in held.target.tolist():
-        sheet.blend(base, sheet.triangle(x_m, z_m, heading_deg), green, LEAST_MARK + MOST_MARK * share / most)
+    poses = [
+        (sheet.triangle(x_m, z_m, heading_deg), LEAST_MARK + MOST_MARK * share / most)
+        for x_m, z_m, heading_deg, share in held.target.tolist()
+    ]
+    _blend(base, poses, colours.TARGET)
     pen, cell = ImageDraw.Draw(base), sheet.cell_px
     draw_target(pen, sheet.of(scene, target), 0.62 * cell)
     points = [sheet.of(scene, state) for state in states.tolist()]
@@ -53,6 +55,15 @@ def held_picture(scene: Scene, held: Held, states: np.ndarray, target: int, size
         _draw_hollow(pen, sheet.pixel(x_m, z_m), 0.34 * cell, heading_deg)
     draw_agent(pen, points[-1], 0.5 * cell, float(scene.headings_deg[states[-1]]))
     return base.resize(sheet.size, Image.Resampling.LANCZOS)
+
+
+def _blend(image: Image.Image, shapes: Iterable[tuple[list[Point], float]], colour: str) -> None:
+    """Paint polygons that do not overlap, each of a strength of its own."""
+    mask = Image.new("L", image.size)
+    pen = ImageDraw.Draw(mask)
+    for corners, share in shapes:
+        pen.polygon(corners, fill=round(255 * share))
+    image.paste(colour, mask=mask, box=(0, 0, *image.size))
 
 
 def _draw_hollow(pen: ImageDraw.ImageDraw, middle: Point, size: float, heading_deg: float) -> None:
@@ -104,10 +115,3 @@ class _Sheet:
         far = middle + REACH * self.cell_px * ahead
         aside = REACH * self.cell_px * right
         return [tuple(corner.tolist()) for corner in (middle, far + aside, far - aside)]
-
-    def blend(self, image: Image.Image, corners: Iterable[Point], colour: tuple[int, ...], share: float) -> None:
-        """Paint a polygon of some strength."""
-        corners = list(corners)
-        mask = Image.new("L", image.size)
-        ImageDraw.Draw(mask).polygon(corners, fill=round(255 * share))
-        image.paste(colour, mask=mask)

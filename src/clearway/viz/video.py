@@ -8,7 +8,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from clearway import colours
@@ -17,7 +16,7 @@ from clearway.envs.record import EpisodeSoFar
 from clearway.envs.render import CAPTION_HEIGHT_PX, PANEL_HEIGHT_PX, Renderer
 from clearway.errors import ClearwayError
 from clearway.evaluation.episodes import Trajectory
-from clearway.evaluation.sight import Sight
+from clearway.evaluation.single import memories
 from clearway.files import written_whole
 from clearway.mapping.held import Held
 from clearway.scenes.actions import Action
@@ -26,7 +25,6 @@ from clearway.viz.held import MEANING, held_picture
 from clearway.world.world import World
 
 STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
-HELD_WIDTH_PX = 620
 FRAMES_PER_S = 3
 LAST_FRAME_TIMES = 6  # the last frame stays for so many
 SUFFIXES = (".mp4", ".gif")
@@ -60,13 +58,10 @@ def walked(
 
     holds: tells, by its state, what an agent with a map holds besides.
     """
-    sight, thoughts = Sight(world, agent), []
-    held: list[Held] = []
-    memory = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
-    for pose in torch.from_numpy(trajectory.states):
-        decisions, memory = agent.act(sight(pose[None]), memory)
+    thoughts, held = [], []
+    for decisions, state in memories(world, agent, trajectory, target):
         thoughts.append(decisions.probabilities)
-        held += [] if holds is None else [holds(memory)]
+        held += [] if holds is None else [holds(state)]
     told = [thought for thought in thoughts if thought is not None]
     probabilities = np.concatenate(told) if len(told) == len(thoughts) else None
     return Walked(world, target, trajectory, probabilities, held or None)
@@ -98,12 +93,13 @@ def _where(scenes: Sequence[Scene], shown: Walked) -> tuple[Scene, int]:
 def _with_held(picture: Image.Image, scene: Scene, held: Held, states: np.ndarray, target: int) -> Image.Image:
     """The picture with what is held beside it."""
     font = ImageFont.load_default(TEXT_PX)
-    panel = held_picture(scene, held, states, target, (HELD_WIDTH_PX, PANEL_HEIGHT_PX))
-    wide = Image.new("RGB", (picture.width + HELD_WIDTH_PX + MARGIN_PX, picture.height), colours.PAPER)
+    column_px = int(font.getlength(MEANING)) + 1
+    panel = held_picture(scene, held, states, target, (column_px, PANEL_HEIGHT_PX))
+    wide = Image.new("RGB", (picture.width + column_px + 2 * MARGIN_PX, picture.height), colours.PAPER)
     wide.paste(picture, (0, 0))
-    wide.paste(panel, (picture.width, CAPTION_HEIGHT_PX + (PANEL_HEIGHT_PX - panel.height) // 2))
-    place = picture.width, CAPTION_HEIGHT_PX // 2
-    ImageDraw.Draw(wide).text(place, MEANING, colours.INK, font, anchor="lm")
+    left = picture.width + MARGIN_PX
+    wide.paste(panel, (left, CAPTION_HEIGHT_PX + (PANEL_HEIGHT_PX - panel.height) // 2))
+    ImageDraw.Draw(wide).text((left, CAPTION_HEIGHT_PX // 2), MEANING, colours.INK, font, anchor="lm")
     return wide
 
 
