@@ -118,9 +118,7 @@ def _unseen(result: DemoResult) -> list[Picture]:
     picture.save(result.out / belief)
     sheet = {"states": states, "actions": actions, "zones": zones, "target": first.target}
     draw_contact_sheet(first.scene, result.out / seen, **sheet, title=GENERALIST)
-    held = (
-        "What it held at the end: light where a body can stand, green where the target may be, red where it is itself."
-    )
+    held = "What it held at the end: light where a body can stand; green where the target may be; red, itself."
     return [
         Picture(way, "The room as it is, and its way.", "The room from above with zones and the way of the generalist"),
         Picture(belief, held),
