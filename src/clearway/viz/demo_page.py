@@ -116,8 +116,15 @@ def _unseen(result: DemoResult) -> list[Picture]:
     draw_map(first.scene, result.out / way, zones=zones, target=first.target, walks=[Walk(GENERALIST, states)])
     picture = held_picture(first.scene, first.held, states, first.target, BELIEF_PX)
     picture.save(result.out / belief)
-    sheet = {"states": states, "actions": actions, "zones": zones, "target": first.target}
-    draw_contact_sheet(first.scene, result.out / seen, **sheet, title=GENERALIST)
+    draw_contact_sheet(
+        first.scene,
+        result.out / seen,
+        states=states,
+        actions=actions,
+        zones=zones,
+        target=first.target,
+        title=GENERALIST,
+    )
     held = "What it held at the end: light where a body can stand; green where the target may be; red, itself."
     return [
         Picture(way, "The room as it is, and its way.", "The room from above with zones and the way of the generalist"),
