@@ -74,3 +74,48 @@ def test_bad_input_is_one_line(clearway, run, words, parts):
 
 def test_goals_need_scenes(clearway, run):
     assert clearway("evaluate", run / "run", "--goals", 5).refusal("no scenes", "Name scene files")
+
+
+@pytest.fixture
+def asked(monkeypatch, tmp_path) -> list:
+    """Which generated rooms were asked for; a made-up one stands in for them."""
+    calls = []
+
+    def generate(kind, count, **rest):
+        calls.append((kind, count, rest["split"], rest["encoder"]))
+        write_scene(grid_scene(2), tmp_path / "grid.h5")
+        return [tmp_path / "grid.h5"]
+
+    monkeypatch.setattr("clearway.api.generation.generate", generate)
+    return calls
+
+
+def test_generated_rooms_of_a_split_are_walked_in(clearway, run, asked):
+    found = clearway("evaluate", run / "run", "--rooms", "validation", "--step-limit", 5, "--json").json
+    assert found["average"]["episodes"] == 20  # goals where nothing else is said
+    words = ("--rooms", "train", "--kind", "flat", "--count", 3, "--goals", 2, "--step-limit", 5, "--json")
+    assert clearway("evaluate", run / "run", *words).json["average"]["episodes"] == 2
+    assert asked == [("room", 10, "validation", "none"), ("flat", 3, "train", "none")]
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("--rooms", "dev"), ("--rooms", "train", "validation", "test")),
+        (("--rooms", "validation", "--kind", "house"), ("--kind", "room", "flat")),
+        (("--rooms", "validation", "--count", 0), ("--count 0", "from 1 to 1000000")),
+        (("--rooms", "validation", "--count", 1_000_001), ("--count 1000001",)),
+        (("--rooms", "validation", "--goals", 0), ("--goals 0",)),
+        (("--rooms", "validation", "--episodes", 3), ("--episodes: not with --rooms", "Leave one of the two out")),
+        (("--kind", "flat"), ("--kind: goes with --rooms alone",)),
+        (("--count", 2), ("--count: goes with --rooms alone",)),
+    ],
+)
+def test_rooms_that_cannot_be_made_are_one_line(clearway, run, monkeypatch, words, parts):
+    monkeypatch.setattr("clearway.generation.cached.generate_scenes", lambda *_, **__: pytest.fail("rendered"))
+    assert clearway("evaluate", run / "run", *words).refusal(*parts)
+
+
+def test_rooms_and_scene_files_are_not_mixed(clearway, run):
+    words = ("evaluate", run / "run", run / "grid.h5", "--rooms", "validation")
+    assert clearway(*words).refusal("--rooms", "grid.h5 is given too")

@@ -4,9 +4,13 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import av
 import pytest
 
+from clearway.agents.generalist import GENERALIST
+from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.web.local import listening, port_of
+from helpers.made import grid_scene
 
 
 @pytest.fixture
@@ -92,3 +96,66 @@ def test_a_missing_package_names_the_extra(clearway, trained, monkeypatch, packa
     monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setitem(sys.modules, package, None)
     assert clearway("scenes", "view", trained.scene).refusal("pip install 'clearway[view]'")
+
+
+@pytest.fixture
+def pictured(tmp_path):
+    """A scene with pictures, which no agent was trained on."""
+    write_scene(grid_scene(2), tmp_path / "grid.h5")
+    return tmp_path / "grid.h5"
+
+
+def test_the_generalist_walks_in_any_scene(clearway, served, pictured, monkeypatch):
+    chosen = []
+    monkeypatch.setattr(
+        "clearway.generation.cached.room_of_seed", lambda seed, done: chosen.append(seed) or read_scene(pictured)
+    )
+    for words in ((GENERALIST, pictured), ("--agent", GENERALIST, "--room", 7), (GENERALIST, "--room", 8, "--tour", 3)):
+        answer = clearway("view", *words)
+        assert answer.code == 0 and answer.out.startswith("http://127.0.0.1:"), answer
+    assert len(served) == 3 and chosen == [7, 8]
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ((GENERALIST,), ("walks in a scene", "--room SEED")),
+        (("--agent", GENERALIST), ("walks in a scene", "--room SEED")),
+        ((GENERALIST, "a.h5", "--room", 3), ("walks in a scene",)),
+        ((GENERALIST, "none.h5"), ("none.h5", "no such file")),
+        ((GENERALIST, "--room", -1), ("--room -1", "from 0 to")),
+        ((GENERALIST, "--room", "x"), ("--room", "x")),
+        ((GENERALIST, "--room", 1, "--tour", -5), ("--tour is -5",)),
+        (("run", "--tour", 5), ("--tour", "keep no map")),
+        (("run", "--room", 5), ("--room", "goes with the generalist")),
+        (("--agent", "wizard", "--room", 5), ("--agent", "generalist")),
+    ],
+)
+def test_a_generalist_that_cannot_be_shown(clearway, served, words, parts):
+    assert clearway("view", *words).refusal(*parts)
+    assert served == []
+
+
+def test_the_generalist_is_filmed_with_what_it_holds(clearway, pictured, tmp_path):
+    answer = clearway("video", GENERALIST, "--scene", pictured, "--most-steps", 4, "--out", tmp_path / "film.mp4")
+    assert answer.code == 0, answer
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    assert frames[0].shape[1] > 1600  # a column more than other agents'
+    assert (frames[0][:, 1500:] != frames[1][:, 1500:]).mean() > 0.01  # the belief, which changes
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ((GENERALIST,), ("walks in a scene", "--room SEED")),
+        ((GENERALIST, "--scene", "none.h5"), ("none.h5", "no such file")),
+        ((GENERALIST, "--scene", "a.h5", "--room", 3), ("walks in a scene",)),
+        ((GENERALIST, "--room", 3, "--selection", "argmax"), ("--selection",)),
+        ((GENERALIST, "--room", -3), ("--room -3",)),
+        (("run", "--room", 3), ("--room", "goes with the generalist")),
+    ],
+)
+def test_a_film_that_cannot_be_made(clearway, tmp_path, words, parts):
+    assert clearway("video", *words, "--out", tmp_path / "film.mp4").refusal(*parts)
+    assert not (tmp_path / "film.mp4").exists()

@@ -33,6 +33,11 @@ def shrink_demo(patch: pytest.MonkeyPatch) -> None:
 
     patch.setattr("clearway.experiments.demo.cached_room_scene", room)
     patch.setattr("clearway.experiments.demo.encode_scenes", encode)
+
+    def chosen(seed: int) -> Scene:
+        return grid_scene(seed, width=4, depth=3, obstacle_share=0.1, name=f"room-{seed}")
+
+    patch.setattr("clearway.experiments.demo_generalist.room_of_seed", chosen)
     patch.setattr("clearway.experiments.demo.DEFAULT", small_learner())
     brief = partial(evaluate_runs, episodes_per_target=5, step_limit=60)
     patch.setattr("clearway.experiments.demo.evaluate_runs", brief)

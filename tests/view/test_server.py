@@ -94,7 +94,8 @@ def test_nothing_else_is_there(address: str, path: str) -> None:
 
 def test_the_stage_and_its_maps(address: str, stage: Stage) -> None:
     whole = json.loads(get(address, "stage.json")[1])
-    assert whole == {"agents": [{"name": "aware"}, {"name": "plain"}], "scenes": ["corridor", "grid", "bare"]}
+    agents = [{"name": name, "values": True, "map": False} for name in ("aware", "plain")]
+    assert whole == {"agents": agents, "scenes": ["corridor", "grid", "bare"]}
     corridor = json.loads(get(address, "scenes/0/map.json")[1])
     assert corridor["extent_m"] == [-0.25, 0.25, -0.25, 2.25]
     assert corridor["zones"][:4] == [2, 2, 2, 2] and corridor["zones"][8] == 0

@@ -7,6 +7,7 @@ import torch
 from clearway.agents.agent import POSE, Agent
 from clearway.agents.by_pose import PoseAgent, RandomWalk
 from clearway.agents.selection import ActionSelection, selecting
+from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds, run_episodes
 from clearway.reward import COLLISION_AWARE
 from clearway.view.episode import MOST_STEPS
@@ -174,7 +175,7 @@ def test_an_agent_that_sees_more_than_poses_is_not_for_the_viewer() -> None:
     class Seeing(RandomWalk):
         sees = (POSE, "rgb")
 
-    with pytest.raises(AssertionError, match="knows its pose"):
+    with pytest.raises(AgentError, match="sees rgb"):
         walker(0, Seeing())
 
 

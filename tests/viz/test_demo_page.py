@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -40,7 +41,9 @@ class Shown(HTMLParser):
 def result(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DemoResult]:
     with pytest.MonkeyPatch.context() as patch:
         shrink_demo(patch)
-        yield run_demo(DemoRequest(tmp_path_factory.mktemp("demo") / "demo", seed=2, frames=800, encoder="auto"))
+        yield run_demo(
+            DemoRequest(tmp_path_factory.mktemp("demo") / "demo", seed=2, frames=800, encoder="auto", room_seed=3)
+        )
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +63,19 @@ def test_every_link_leads_to_a_picture_beside_the_page(result, shown):
 def test_all_pictures_are_shown(shown):
     views = [f"pictures/view-{number}.png" for number in range(VIEWS)]
     episodes = [f"pictures/episode-{agent}.png" for agent in ("collision-aware", "shortest")]
-    assert set(shown.pictures) == {"pictures/map.png", "pictures/curves.png", *views, *episodes}
+    unseen = [f"pictures/unseen-{what}.png" for what in ("map", "belief", "episode")]
+    assert set(shown.pictures) == {"pictures/map.png", "pictures/curves.png", *views, *episodes, *unseen}
+
+
+def test_the_generalist_is_shown_in_a_room_of_the_seed_first(result, shown):
+    first = result.first
+    assert (first.seed, first.scene.name) == (3, "room-3")
+    assert first.collisions == sum(a == b for a, b in pairwise(first.walk.states.tolist()))
+    assert first.reached == (first.walk.states[-1] == first.target)
+    steps = len(first.walk.actions)
+    assert f"{steps} step" in shown.text and f"the shortest path has {first.shortest_path_steps}." in shown.text
+    assert "made from seed 3" in shown.text
+    assert shown.text.index("Before anything is trained") < shown.text.index("The figures")
 
 
 def test_key_figures_are_those_of_the_table(result, shown):
@@ -87,12 +102,13 @@ def test_both_agents_are_drawn_on_one_map_from_one_start(result, monkeypatch):
     monkeypatch.setattr(demo_page, "draw_map", lambda scene, path, **drawn: maps.append(drawn))
     monkeypatch.setattr(demo_page, "draw_contact_sheet", lambda scene, path, **drawn: sheets.append(drawn))
     make_demo_page(result, COMMAND)
-    (drawn,) = maps
+    unseen, drawn = maps
+    assert [walk.label for walk in unseen["walks"]] == ["generalist"] and unseen["target"] == result.first.target
     assert [walk.label for walk in drawn["walks"]] == ["collision-aware", "shortest"]
     assert len({int(walk.states[0]) for walk in drawn["walks"]}) == 1
     assert drawn["target"] == result.showcase.target
     assert np.array_equal(drawn["zones"], scene_zones(result.scene))
-    for walk, sheet in zip(drawn["walks"], sheets, strict=True):
+    for walk, sheet in zip(drawn["walks"], sheets[1:], strict=True):
         assert np.array_equal(walk.states, sheet["states"])
         assert sheet["title"] == f"{walk.label} agent"
 

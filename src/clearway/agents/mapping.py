@@ -14,6 +14,7 @@ from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.encoded import Encoded
 from clearway.mapping.beliefs import NEVER, add_sighting
 from clearway.mapping.following import Follower, been_now
+from clearway.mapping.held import Held, Laid, held_by
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.search import probabilities, search_steps
 from clearway.mapping.settings import MappingSettings
@@ -67,3 +68,7 @@ class MappingAgent:
         action = search_steps(poses, goal, been, after["room"], after["shut"], self._settings)
         decisions = Decisions(action, arrived=there > self._settings.arrived)
         return decisions, {**after, "target": state["target"], "goal": goal, "been": been, "action": action}
+
+    def holds(self, state: State, laid: Laid, row: int = 0) -> Held:
+        """What it holds in one of the episodes of a state, after a step, on a map in which its lattice is laid."""
+        return held_by(state, laid, self._settings.usual_room, row)

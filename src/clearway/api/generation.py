@@ -20,7 +20,7 @@ def generate(
     *,
     split: SplitName = "train",
     seed: int = 0,
-    out: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
     sensors: Sequence[str] = (RGB,),
     size: Sequence[int] = SIZE_PX,
     encoder: str = "auto",
@@ -38,7 +38,7 @@ def generate(
         count: number of files: the first so many of this kind, split and seed.
         split: "train", "validation" or "test", which never share a plan.
         seed: another one gives other rooms.
-        out: folder for the scene files.
+        out: folder for the scene files; None: one in the user's cache folder, which is kept from call to call.
         sensors: what takes the pictures: ("rgb",), or ("rgb", "depth") for depth in metres beside them.
         size: height and width of the pictures.
         encoder: as of `encode_scenes`, or "none" for scenes without features, which are trained on once they are
@@ -56,6 +56,7 @@ def generate(
     Warns:
         EncoderWarning: "auto" fell back to random weights.
     """
+    from clearway.generation.cached import cached_requests
     from clearway.generation.files import NO_ENCODER, Seen, generate_scenes, scene_path
     from clearway.perception.encode import check_sees
     from clearway.progress import picture_progress
@@ -65,8 +66,8 @@ def generate(
     chosen_split = cast(SplitName, as_choice("split", split, SPLITS))
     wanted = as_whole("count", count, 1, MAX_NUMBER + 1)
     chosen_seed = as_whole("seed", seed, 0, MAX_SEED)
-    folder = as_path("out", out)
-    if folder.exists() and not folder.is_dir():
+    folder = None if out is None else as_path("out", out)
+    if folder is not None and folder.exists() and not folder.is_dir():
         raise ArgumentError(f"out={str(folder)!r}: a file. Give a folder")
     check_names(sensors)
     seen = Seen(tuple(sensors), as_size("size", size))
@@ -81,5 +82,9 @@ def generate(
         kept_connected(ray, crew),
         picture_progress(f"making {kind}s", wanted, show_progress, unit=f"{kind}s") as show_done,
     ):
+        if folder is None:
+            return cached_requests(
+                requests, seen, name, encoder_seed=encoder_seed, workers=crew, ray=ray, done=show_done
+            )
         generate_scenes(requests, folder, seen, name, encoder_seed=encoder_seed, workers=crew, ray=ray, done=show_done)
     return [scene_path(request, folder) for request in requests]

@@ -23,6 +23,8 @@ class Demo:
     """Of the agents; the room is the default bathroom."""
     frames: int = 600_000
     """Training frames of each agent."""
+    room_seed: int = 0
+    """Of a room in which the generalist, which comes with clearway, walks before anything is trained."""
     encoder: str = "auto"
     """As for clearway scenes build."""
     json: bool = False
@@ -33,8 +35,8 @@ class Demo:
         from clearway.experiments.demo import DemoRequest, run_demo
         from clearway.viz.demo_page import make_demo_page
 
-        check_seeds(seed=self.seed)
-        request = DemoRequest(self.out, self.seed, self.frames, self.encoder)
+        check_seeds(seed=self.seed, room_seed=self.room_seed)
+        request = DemoRequest(self.out, self.seed, self.frames, self.encoder, self.room_seed)
         result = run_demo(request, show_progress=True)
         page = make_demo_page(result, self._command())
         if self.json:
@@ -47,4 +49,6 @@ class Demo:
 
     def _command(self) -> str:
         words = ["clearway", "demo", "--out", str(self.out), "--seed", str(self.seed)]
-        return shlex.join([*words, "--frames", str(self.frames), "--encoder", self.encoder])
+        return shlex.join(
+            [*words, "--frames", str(self.frames), "--encoder", self.encoder, "--room-seed", str(self.room_seed)]
+        )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import HELD_OUT
+from clearway.choices import HELD_OUT, PlanKind, SplitName
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, say, say_held_out, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
@@ -18,6 +18,8 @@ from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
     from clearway.api.evaluation import EvaluateResult
+
+ROOMS = 10  # of --rooms where no --count is given
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,13 @@ class Evaluate:
     earlier one."""
     takes: int | None = None
     """With --perturb: pictures of each pose, each perturbed in its own way, one of which a step shows; by default 4."""
+    rooms: SplitName | None = None
+    """Walk in the first generated rooms of this split, made once and kept in the user's cache folder, instead of scene
+    files; 20 goals a room unless --goals says otherwise. What is published is measured in those of test."""
+    kind: PlanKind | None = None
+    """With --rooms: room, the default, or flat."""
+    count: int | None = None
+    """With --rooms: so many of them; by default 10."""
     tour: int = 0
     """With --goals: steps in which an agent with a map may look around in each scene first."""
     held_out: bool = False
@@ -67,9 +76,12 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
-        if self.goals is not None:
-            self._at_goals(self.goals)
+        if self.goals is not None or self.rooms is not None:
+            self._at_goals()
             return
+        if self.kind is not None or self.count is not None:
+            option = "--kind" if self.kind is not None else "--count"
+            raise ClearwayError(f"{option}: goes with --rooms alone. Add --rooms validation, or another split")
         if self.perturb or self.takes is not None:
             option = "--perturb" if self.perturb else "--takes"
             raise ClearwayError(f"{option}: goes with --goals alone. Add it; --live has a flag for each perturbation")
@@ -99,9 +111,10 @@ class Evaluate:
             json=self.json,
         )
 
-    def _at_goals(self, goals: int) -> None:
-        from clearway.api.goals import STEP_LIMIT, TAKES
-        from clearway.cli.goals import evaluate_at_goals
+    def _at_goals(self) -> None:
+        from clearway.api.arguments import as_whole
+        from clearway.api.goals import GOALS, STEP_LIMIT, TAKES
+        from clearway.cli.goals import evaluate_at_goals, generated
 
         given = {
             "--live": self.room.live,
@@ -113,15 +126,21 @@ class Evaluate:
             "--episodes": self.episodes,
         }
         if asked := [option for option, value in given.items() if value]:
+            option = "--rooms" if self.goals is None else "--goals"
             raise ClearwayError(
-                f"{asked[0]}: not with --goals, which walks once to each goal. Leave one of the two out"
+                f"{asked[0]}: not with {option}, which walks once to each goal. Leave one of the two out"
             )
         if self.takes is not None and not self.perturb:
             raise ClearwayError("--takes: without --perturb a pose has one picture. Add --perturb")
+        goals, files = as_whole("goals", _or(self.goals, GOALS), 1), self.files + self.scenes
+        if self.rooms is not None:
+            if files:
+                raise ClearwayError(f"--rooms: makes rooms of its own, and {files[0]} is given too. Leave one out")
+            files = tuple(generated(self.rooms, self.kind or "room", _or(self.count, ROOMS)))
         evaluate_at_goals(
             self.folder,
             self.checkpoint,
-            self.files + self.scenes,
+            files,
             goals=goals,
             step_limit=_or(self.step_limit, STEP_LIMIT),
             seed=self.seed,

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clearway.choices import PlanKind, SensorName, SplitName
 from clearway.cli.console import say_made
+
+if TYPE_CHECKING:
+    from clearway.scenes.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -62,3 +66,15 @@ class Generate:
             show_progress=True,
         )
         say_made(self.out, paths, there)
+
+
+def chosen_room(seed: int) -> Scene:
+    """The room of a seed that a user chose; built the first time, with a progress bar."""
+    from clearway.api.arguments import as_whole
+    from clearway.generation.cached import room_of_seed
+    from clearway.generation.request import MAX_SEED
+    from clearway.progress import picture_progress
+
+    as_whole("room", seed, 0, MAX_SEED)
+    with picture_progress("making the room", 1, True, unit="rooms") as done:
+        return room_of_seed(seed, done)

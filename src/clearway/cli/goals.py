@@ -12,6 +12,7 @@ from clearway.cli.console import print_json, stdout_console
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
+    from clearway.choices import PlanKind, SplitName
     from clearway.evaluation.goals import GoalEvaluation
 
 NUMBERS = ("collisions", "steps")  # figures that are no shares
@@ -35,7 +36,7 @@ def evaluate_at_goals(
     from clearway.api.goals import evaluate_goals, is_generalist
 
     if not files:
-        raise ClearwayError("--goals: no scenes. Name scene files behind the run")
+        raise ClearwayError("--goals: no scenes. Name scene files behind the run, or give --rooms validation")
     found = evaluate_goals(
         agent if is_generalist(agent) else load_agent(agent, checkpoint),
         scene_files(files),
@@ -52,6 +53,13 @@ def evaluate_at_goals(
         print_json({**own, "others": others})
         return
     stdout_console().print(_table(found))
+
+
+def generated(split: SplitName, kind: PlanKind, count: int) -> list[Path]:
+    """The files of the first so many rooms or flats of a split, made and kept in the user's cache folder."""
+    from clearway.api.generation import generate
+
+    return generate(kind, count, split=split, encoder="none", show_progress=True)
 
 
 def _table(found: Sequence[GoalEvaluation]) -> object:

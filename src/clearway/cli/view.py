@@ -5,12 +5,13 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from clearway.cli.arguments import scene_files
+from clearway.cli.arguments import check_at_least, scene_files
 from clearway.cli.console import stderr_console
+from clearway.cli.generate import chosen_room
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
@@ -26,8 +27,15 @@ class ViewRuns:
     Example: clearway view runs/collision-aware runs/shortest
     """
 
-    folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """One run folder, or two."""
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """One run folder, or two; or generalist, which comes with clearway, and scene files or folders that it has never
+    seen."""
+    agent: Literal["generalist"] | None = None
+    """The same as the word generalist in front."""
+    room: int | None = None
+    """Seed of a room for the generalist, made at once: kitchen, living room, bedroom and bathroom in turn."""
+    tour: int = 0
+    """Steps in which the generalist looks around in a scene before its episodes there."""
     scenes: tuple[Path, ...] = ()
     """Scene files or folders, where they are no longer where they were at training."""
     episode: str = ""
@@ -39,12 +47,34 @@ class ViewRuns:
 
     def run(self) -> None:
         """Serve the page until interrupted."""
+        _show(self._stage(), self.port, self.episode, self.open)
+
+    def _stage(self) -> Stage:
+        from clearway.api.goals import is_generalist
+
+        first = self.folders[:1]
+        if self.agent or any(map(is_generalist, first)):
+            return self._generalist(self.folders if self.agent else self.folders[1:])
         from clearway.view.stage import run_stage
 
+        if self.room is not None:
+            raise ClearwayError("--room: goes with the generalist, the only one that knows any room. Put it in front")
+        if self.tour:
+            raise ClearwayError("--tour: agents of runs keep no map. Leave it out, or view generalist")
         if not 1 <= len(self.folders) <= MOST_RUNS:
             raise ClearwayError(f"{len(self.folders)} run folders, one or two can be shown. Name one or two")
-        stage = run_stage(self.folders, scene_files(self.scenes) if self.scenes else None)
-        _show(stage, self.port, self.episode, self.open)
+        return run_stage(self.folders, scene_files(self.scenes) if self.scenes else None)
+
+    def _generalist(self, files: tuple[Path, ...]) -> Stage:
+        from clearway.api.scenes import load_scenes
+        from clearway.view.generalist import generalist_stage
+
+        check_at_least(0, tour=self.tour)
+        files += self.scenes
+        if (self.room is None) == (not files):
+            raise ClearwayError("the generalist walks in a scene. Name scene files behind it, or give --room SEED")
+        scenes = load_scenes(scene_files(files)) if self.room is None else [chosen_room(self.room)]
+        return generalist_stage(scenes, self.tour)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ PANEL_HEIGHT_PX = 360
 MAP_WIDTH_PX = 480
 MARGIN_PX = 16
 CAPTION_HEIGHT_PX, LEGEND_HEIGHT_PX, TEXT_SIZE_PX = 34, 42, 16
-SMOOTH_FROM_PX = 100  # pictures lower than this are made-up ones: enlarge them pixel by pixel
+SMOOTH_FROM_PX = 90  # pictures lower than this are made-up ones: enlarge them pixel by pixel
+LONGEST_NAME = 24  # letters, with which there is room for more
 ARROWS = "↑↗→↘↓↙←↖"  # headings 0, 45, 90, ...
 ANSI_MARKS = {Zone.FREE: "·", Zone.PRECOLLISION: "-", Zone.COLLISION: "!"}
 
@@ -54,7 +55,8 @@ class Renderer:
         scene = self._scenes[index]
         room_map = self._map(index).draw(states, bumps, goal)
         panels = [_picture(scene, int(states[-1])), _picture(scene, goal), room_map]
-        captions = ("view", "target", f"{scene.name} from above, a triangle for each heading")
+        detail = ", a triangle for each heading" if len(scene.name) <= LONGEST_NAME else ""
+        captions = ("view", "target", f"{scene.name} from above{detail}")
         return np.asarray(_side_by_side(panels, captions, self._status(episode, target)))
 
     def ansi(self, episode: EpisodeSoFar, target: int) -> str:

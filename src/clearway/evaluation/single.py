@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
+import numpy as np
+import torch
+
+from clearway.agents.agent import Agent, Decisions, State
 from clearway.agents.selection import ActionSelection
 from clearway.errors import RunError
-from clearway.evaluation.episodes import Trajectory, run_episodes
+from clearway.evaluation.episodes import Trajectory, episode_starts, run_episodes
+from clearway.evaluation.goals import GOALS, drawn_goals
+from clearway.evaluation.sight import Sight
 from clearway.learn.load import TrainedAgent, run_tables
 from clearway.scenes.scene import Scene
-from clearway.world.world import World
+from clearway.world.world import World, make_world
 
 
 def single_episode(
@@ -43,14 +49,50 @@ def single_episode(
         raise RunError(f"scene {wanted}: not of this run, which has {', '.join(trained)}. Give one of these")
     goal = trained[wanted][0] if target is None else target
     world = run_tables(agent.record, scenes).with_targets({wanted: (goal,)})
+    return world, walked_once(world, agent.on_poses(world), selection=selection, step_limit=step_limit, seed=seed)
+
+
+def episode_in(
+    scene: Scene, make: Callable[[World], Agent], target: int | None, *, step_limit: int, seed: int
+) -> tuple[World, Trajectory]:
+    """An episode in one scene, with the world it was walked in, which has its target alone.
+
+    Args:
+        scene: with what the agent sees.
+        make: makes the agent, which is bound to no targets.
+        target: state; None: of some goals and starts drawn by the seed, the pair that is farthest apart.
+        step_limit: the episode ends after so many steps.
+        seed: of goals, start and actions.
+
+    Raises:
+        SceneError: the scene has no such state, or it cannot be reached.
+    """
+    if target is None:
+        count = min(GOALS, int((scene.components == 0).sum()) - 1)
+        drawn = make_world([scene], {scene.name: drawn_goals(scene, count, seed)})
+        starts = torch.from_numpy(episode_starts(drawn, 1, seed)[:, 0])
+        ways = drawn.distance_table()[torch.arange(drawn.target_count), starts]
+        target = drawn.scene_state(int(ways.argmax()))
+    world = make_world([scene], {scene.name: [target]})
+    return world, walked_once(world, make(world), selection="sampled", step_limit=step_limit, seed=seed)
+
+
+def memories(world: World, agent: Agent, walk: Trajectory, target: int = 0) -> Iterator[tuple[Decisions, State]]:
+    """What an agent decides in each pose of an episode, and its state then; it sees poses or features.
+
+    target: index of the world's.
+    """
+    sight = Sight(world, agent)
+    state = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
+    for pose in torch.from_numpy(walk.states):
+        decisions, state = agent.act(sight(pose[None]), state)
+        yield decisions, state
+
+
+def walked_once(world: World, agent: Agent, *, selection: ActionSelection, step_limit: int, seed: int) -> Trajectory:
+    """One episode to a world's only target."""
     table = run_episodes(
-        world,
-        agent.on_poses(world),
-        selection=selection,
-        episodes_per_target=1,
-        step_limit=step_limit,
-        seed=seed,
-        record=True,
+        world, agent, selection=selection, episodes_per_target=1, step_limit=step_limit, seed=seed, record=True
     )
     assert table.trajectories is not None
-    return world, table.trajectories[0]
+    return table.trajectories[0]

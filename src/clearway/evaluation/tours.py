@@ -41,11 +41,13 @@ class Tour:
 
     Attributes:
         state: the explorer's at the end.
+        start: state of the scene in which it began, and around which the map lies.
         collisions: blocked moves.
         poses: share of the poses of the scene's largest part that it came to.
     """
 
     state: State
+    start: int
     collisions: int
     poses: float
 
@@ -78,4 +80,4 @@ def walk_tour(world: World, touring: Touring, scene: Scene, seed: int, takes: Ta
         decisions, state = explorer.act(seen, state)
         happened = env.step(torch.from_numpy(decisions.action.astype(np.int64)))
         collisions += int(happened.blocked)
-    return Tour(state, collisions, len(been) / len(largest))
+    return Tour(state, start, collisions, len(been) / len(largest))

@@ -12,6 +12,7 @@ from clearway.evaluation.files import write_evaluations
 from clearway.evaluation.runs import evaluate_runs
 from clearway.evaluation.showcase import Showcase, showcases
 from clearway.evaluation.summary import Evaluation
+from clearway.experiments.demo_generalist import FirstWalk, first_walk
 from clearway.learn.load import TrainedAgent, load_agent, run_world
 from clearway.learn.presets import DEFAULT
 from clearway.learn.run_folder import RunFolder
@@ -37,12 +38,14 @@ class DemoRequest:
         seed: of the agents.
         frames: training frames of each agent.
         encoder: name of the encoder.
+        room_seed: of the room in which the generalist walks before anything is trained.
     """
 
     out: Path
     seed: int
     frames: int
     encoder: str
+    room_seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class DemoResult:
         runs: run folder of each agent by the name of its reward.
         evaluations: of both agents (by each way of choosing actions), the random and the shortest-path agent.
         showcase: one episode that both agents walked.
+        first: the generalist's episode in a room that it has never entered.
         seconds: of building (with encoding), training, evaluating.
     """
 
@@ -63,6 +67,7 @@ class DemoResult:
     runs: dict[str, RunFolder]
     evaluations: list[Evaluation]
     showcase: Showcase
+    first: FirstWalk
     seconds: dict[str, float]
 
 
@@ -75,6 +80,8 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     learner = replace(DEFAULT, frames=request.frames)
     _claim(request.out)
     clock = _Clock()
+    first = first_walk(request.room_seed, request.seed)
+    clock.lap("generalist, in a room of its own")
     room = cached_room_scene(ROOM, progress=show_progress)
     (encoded,) = encode_scenes([room], request.encoder, progress=show_progress)
     _empty(request.out)
@@ -102,9 +109,8 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
     evaluations = evaluate_runs(agents, [scene], seed=request.seed)
     write_evaluations(request.out, [evaluation.to_json() for evaluation in evaluations], evaluations)
     clock.lap("evaluation")
-    return DemoResult(
-        request.out, scene, runs, evaluations, _showcase(agents, scene, request.seed), dict(clock.seconds)
-    )
+    show = _showcase(agents, scene, request.seed)
+    return DemoResult(request.out, scene, runs, evaluations, show, first, dict(clock.seconds))
 
 
 def _showcase(agents: dict[str, TrainedAgent], scene: Scene, seed: int) -> Showcase:

@@ -53,6 +53,11 @@ class Request:
             if not 0 <= number <= most:
                 raise ClearwayError(f"{name} {number}: expected 0 to {most}. Give one in that range")
 
+    @classmethod
+    def of_seed(cls, seed: int) -> Request:
+        """The room that a user chooses by a seed: of validation, the uses in turn."""
+        return cls("room", "validation", seed, seed % len(ROOM_USES))
+
     @property
     def use(self) -> str | None:
         """What a room is used as, the four in turn; None of a flat."""

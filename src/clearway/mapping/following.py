@@ -128,10 +128,12 @@ class Follower:
         """Move the beliefs of the own poses by the last actions; moves may have been blocked."""
         action = np.where(state["begun"], state["action"], -1)
         moving = np.flatnonzero(np.isin(action, list(STEPS)))
-        before = state["seen"][moving]
-        same = (self._sight.description(before) * self._sight.description(seen[moving])).sum(axis=1) > SAME
+        before, now = state["seen"][moving], seen[moving]
+        alike = (self._sight.description(before) * self._sight.description(now)).sum(axis=1) > SAME
+        repeats = after["repeats"][moving] == Repeats.ALWAYS
+        same = np.where(repeats, marks_of(before) == marks_of(now), alike)
         for row, evidence, stayed in zip(
-            moving.tolist(), self._sight.whereabouts(before, seen[moving]), same.tolist(), strict=True
+            moving.tolist(), self._sight.whereabouts(before, now), same.tolist(), strict=True
         ):
             done, otherwise = Action(int(action[row])), IF_NOT_SAME[Repeats(int(after["repeats"][row]))]
             moved = float(evidence[MOVED[done]] - evidence[STAYED]) + (IF_SAME if stayed else otherwise)

@@ -50,11 +50,13 @@ def _frames(stage: Stage, session: Viewing, index: int) -> Iterator[np.ndarray]:
 def _walked(walker: Walker) -> Walked:
     states = np.array([step.state for step in walker.steps]) + walker.offset
     trajectory = Trajectory(states, np.array(walker.actions, np.int64))
+    held = [step.held for step in walker.steps if step.held is not None] or None
     if walker.agent is None:
         return Walked(walker.world, walker.target, trajectory, None)
     nothing = (0.0,) * walker.world.next_state.shape[1]
     probabilities = np.array([step.probabilities or nothing for step in walker.steps])
-    return Walked(walker.world, walker.target, trajectory, probabilities)
+    told = any(step.probabilities for step in walker.steps)
+    return Walked(walker.world, walker.target, trajectory, probabilities if told else None, held)
 
 
 def stacked(shown: list[Iterator[np.ndarray]], names: list[str]) -> Iterator[np.ndarray]:

@@ -156,7 +156,9 @@ def _parsed(text: str) -> object:
 
 def _stage_json(stage: Stage) -> dict[str, Any]:
     return {
-        "agents": [{"name": shown.name} for shown in stage.agents],
+        "agents": [
+            {"name": shown.name, "values": shown.tells_values, "map": not shown.tells_values} for shown in stage.agents
+        ],
         "scenes": [scene.name for scene in stage.scenes],
     }
 

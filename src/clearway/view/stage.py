@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from clearway.agents.agent import Agent
+from clearway.agents.agent import Agent, State
 from clearway.agents.by_pose import network_on_poses
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.learn.load import TrainedNetwork, load_network, run_scenes, run_tables
+from clearway.mapping.held import Held
 from clearway.model.lookup import LookupNetwork
 from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
@@ -21,9 +23,46 @@ from clearway.scenes.targets import default_targets
 from clearway.world.world import World, scene_tables
 
 
+class StageAgent(Protocol):
+    """An agent that walks in the viewer."""
+
+    @property
+    def name(self) -> str:
+        """Stands on the page."""
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """All that it walks in."""
+
+    @property
+    def tells_values(self) -> bool:
+        """Whether it tells values and probabilities, and was trained on the stage's targets."""
+
+    @property
+    def zone_level(self) -> ZoneLevel:
+        """Whose zones it knows."""
+
+    @property
+    def reward(self) -> Reward:
+        """What it earns."""
+
+    def place(self, scene: str, target: int) -> World:
+        """Its world with one target, any state in the scene's own numbering.
+
+        Raises:
+            SceneError: there is no such state, or too few lead to it.
+        """
+
+    def on_poses(self, placed: World) -> Agent:
+        """Itself in a world from `place`; it goes by poses, or by features that the world has."""
+
+    def holds(self, placed: World, start: int) -> Callable[[State], Held] | None:
+        """What tells, by its state, what it holds in an episode from a state of the scene; None where it has no map."""
+
+
 @dataclass(frozen=True)
-class StageAgent:
-    """An agent with its run's scenes, in the run's order.
+class StageRun:
+    """An agent with its run's scenes, in the run's order, see `StageAgent`.
 
     Attributes:
         name: of its run folder.
@@ -34,6 +73,13 @@ class StageAgent:
     name: str
     trained: TrainedNetwork
     scenes: tuple[Scene, ...]
+
+    tells_values = True
+
+    @property
+    def zone_level(self) -> ZoneLevel:
+        """As it was trained."""
+        return self.trained.record.zone_level
 
     @cached_property
     def world(self) -> World:
@@ -49,17 +95,16 @@ class StageAgent:
         assert self._lookup is not None
 
     def place(self, scene: str, target: int) -> World:
-        """Its world with one target, trained on or not: a state in the scene's own numbering.
-
-        Raises:
-            SceneError: there is no such state, or too few lead to it.
-        """
+        """See `StageAgent.place`."""
         return self.world.with_targets({scene: (target,)})
 
     def on_poses(self, placed: World) -> Agent:
         """Itself in a world from `place`."""
         scale = self.trained.record.learner.reward_scale
         return network_on_poses(self._lookup.for_targets(placed.target_state), placed, scale)
+
+    def holds(self, placed: World, start: int) -> None:
+        """It keeps no map."""
 
     @property
     def reward(self) -> Reward:
@@ -73,7 +118,7 @@ class Stage:
 
     Attributes:
         scenes: those that every agent knows.
-        targets: states to offer as targets, by scene name: those that the first agent was trained on.
+        targets: states to offer as targets, by scene name: those that the first agent was trained on, if it was.
         agents: none, one or two.
     """
 
@@ -84,7 +129,7 @@ class Stage:
     @property
     def zone_level(self) -> ZoneLevel:
         """Whose zones the map shows: those of poses or of cells."""
-        return self.agents[0].trained.record.zone_level if self.agents else "pose"
+        return self.agents[0].zone_level if self.agents else "pose"
 
     @property
     def reward(self) -> Reward:
@@ -130,7 +175,7 @@ def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None
     agents = []
     for folder, name in zip(folders, _names(folders), strict=True):
         trained = load_network(folder)
-        agents.append(StageAgent(name, trained, tuple(run_scenes(trained.record, scene_files))))
+        agents.append(StageRun(name, trained, tuple(run_scenes(trained.record, scene_files))))
         agents[-1].make_ready()
     first, *others = agents
     scenes = tuple(scene for scene in first.scenes if all(_has(other, scene) for other in others))
@@ -149,7 +194,7 @@ def _names(folders: Sequence[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
 
 
-def _has(shown: StageAgent, scene: Scene) -> bool:
+def _has(shown: StageRun, scene: Scene) -> bool:
     """The agent knows a scene of that name with the same poses and moves; its features may be others."""
     return any(
         own.name == scene.name

@@ -22,7 +22,7 @@ from clearway.errors import ClearwayError
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.view.episode import MOST_WALKERS, Episode, actions_of, letters, read_episode
 from clearway.view.stage import Stage
-from clearway.view.walker import Walker
+from clearway.view.walker import Standing, Walker
 from clearway.world.world import World
 
 Message = dict[str, Any]
@@ -91,6 +91,7 @@ class Viewing:
                 shown.reward,
                 seed=episode.seed,
                 agent=shown.on_poses(placed),
+                holds=shown.holds(placed, start),
                 selection=episode.selection,
                 recorded=actions,
             )
@@ -115,7 +116,7 @@ class Viewing:
             walker.step(action) if index in moving else None
             for index, (walker, action) in enumerate(zip(self.walkers, actions, strict=True))
         ]
-        sent = [asdict(step) if step else None for step in steps]
+        sent = [_sent(step) if step else None for step in steps]
         return {"kind": "steps", "steps": sent, "ended": self._ended(), "link": self.walked().query()}
 
     def _drive(self, action: int, along: bool) -> Message:
@@ -146,7 +147,7 @@ class Viewing:
                     "name": name,
                     "agent": walker.agent is not None,
                     "reward": reward,
-                    "steps": list(map(asdict, walker.steps)),
+                    "steps": list(map(_sent, walker.steps)),
                 }
                 for name, walker, reward in zip(self.names(episode), self.walkers, rewards, strict=False)
             ],
@@ -155,6 +156,9 @@ class Viewing:
         }
 
     def _map(self, index: int) -> Message:
+        if not self.stage.agents[index].tells_values:
+            name = self.stage.agents[index].name
+            raise ClearwayError(f"{name} tells no values of poses where it is not. Choose another map")
         held = self.walkers[index].map_of_mind()
         assert held.probabilities is not None and held.value is not None, "a network tells both"
         return {
@@ -163,6 +167,11 @@ class Viewing:
             "values": np.round(held.value.astype(np.float64), DIGITS).tolist(),
             "probabilities": np.round(held.probabilities.astype(np.float64), DIGITS).tolist(),
         }
+
+
+def _sent(step: Standing) -> Message:
+    """A step as the page gets it."""
+    return {**asdict(replace(step, held=None)), "held": step.held and step.held.to_json()}
 
 
 def _drawn_start(world: World, seed: int) -> int:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 
-from clearway.agents.agent import POSE, Agent, Decisions
+from clearway.agents.agent import POSE, Agent, Decisions, State
 from clearway.agents.selection import ActionSelection, selecting
+from clearway.evaluation.sight import Sight
+from clearway.mapping.held import Held
 from clearway.reward import Reward
 from clearway.view.episode import MOST_STEPS
 from clearway.world.navigation import Navigation
@@ -33,6 +35,7 @@ class Standing:
         probabilities: of the actions from here; None for the user and at the target.
         value: discounted sum of the rewards that the agent expects from here; None for the user.
         next: the action that the agent is about to take; None at the target and for the user.
+        held: what an agent with a map holds to be so; None of others.
     """
 
     state: int
@@ -47,6 +50,7 @@ class Standing:
     probabilities: tuple[float, ...] | None
     value: float | None
     next: int | None
+    held: Held | None = None
 
 
 class Walker:
@@ -58,7 +62,8 @@ class Walker:
         start: state in the scene's own numbering.
         reward: what it earns.
         seed: of sampled actions.
-        agent: who chooses, by the pose; None for the user.
+        agent: who chooses, by its pose or by what it sees; None for the user.
+        holds: tells what the agent holds by its state; None where it has no map.
         selection: how its actions are chosen.
         recorded: actions that it takes before it chooses by itself.
     """
@@ -72,20 +77,22 @@ class Walker:
         *,
         seed: int,
         agent: Agent | None,
+        holds: Callable[[State], Held] | None = None,
         selection: ActionSelection = "sampled",
         recorded: Sequence[int] = (),
     ) -> None:
-        assert agent is None or set(agent.sees) <= {POSE}, "what walks in the viewer knows its pose"
         seeds = torch.tensor([seed])
-        self.world, self.target, self.agent = world, target, agent
+        self.world, self.target, self.agent, self.holds = world, target, agent, holds
         self.chooser = agent and selecting(agent, selection, world)
+        self.sight = self.chooser and Sight(world, self.chooser)
         self.offset = int(world.scene_offset[world.target_scene[target]])
         self.states_here = int(world.scene_offset[world.target_scene[target] + 1]) - self.offset
         self.to_go = world.distance_table()
         self.env = Navigation(world, reward, seeds, history_length=1, reward_dtype=torch.float64)
         self.env.reset(target=torch.tensor([target]), start=torch.tensor([start + self.offset]))
-        goal = {POSE: world.target_state[[target]].numpy()}
-        self.memory = self.chooser.reset(goal, seeds.numpy()) if self.chooser else {}
+        self.memory: State = {}
+        if self.chooser and self.sight:
+            self.memory = self.chooser.reset(self.sight(world.target_state[[target]]), seeds.numpy())
         self.recorded = list(recorded)
         reached = int(self.env.state) == int(world.target_state[target])
         zone = int(world.zone[self.env.state])
@@ -136,9 +143,10 @@ class Walker:
 
     def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Standing:
         before = self.steps[-1] if action is not None else None
-        probabilities = value = following = None
-        if self.chooser is not None:
-            decisions, self.memory = self.chooser.act({POSE: self.env.state.numpy()}, self.memory)
+        probabilities = value = following = held = None
+        if self.chooser and self.sight:
+            decisions, self.memory = self.chooser.act(self.sight(self.env.state), self.memory)
+            held = None if self.holds is None else self.holds(self.memory)
             value = None if decisions.value is None else float(decisions.value[0])
             if not reached:
                 told = decisions.probabilities
@@ -157,4 +165,5 @@ class Walker:
             probabilities=probabilities,
             value=value,
             next=following,
+            held=held,
         )

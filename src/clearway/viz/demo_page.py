@@ -7,17 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
+from clearway.agents.generalist import GENERALIST
 from clearway.evaluation.summary import Evaluation
 from clearway.evaluation.tables import table_text
 from clearway.experiments.demo import DemoResult
+from clearway.experiments.demo_generalist import FirstWalk
 from clearway.learn.provenance import facts_text, hardware, package_versions
 from clearway.viz.contact_sheet import draw_contact_sheet
 from clearway.viz.curves import draw_curves
+from clearway.viz.figures import counted
+from clearway.viz.held import held_picture
 from clearway.viz.maps import Walk, draw_map
 from clearway.viz.page import KeyFigure, Page, Picture, write_page
 from clearway.zones import scene_zones
 
 PICTURES = "pictures"
+BELIEF_PX = (960, 960)  # at most
 VIEWS = 6  # first-person pictures of the room
 SENTENCE = (
     "Two agents learnt to walk to the place where a picture was taken, from pictures alone: one is paid to anticipate "
@@ -35,6 +40,8 @@ def make_demo_page(result: DemoResult, command: str) -> Path:
         title="clearway: anticipating collisions on the way to a picture",
         sentence=SENTENCE,
         key_figures=_key_figures(result.evaluations),
+        unseen=_unseen(result),
+        unseen_text=_unseen_text(result.first),
         maps=_maps(result),
         rooms=_views(result),
         table=table_text(result.evaluations, "scenes"),
@@ -89,6 +96,41 @@ def _maps(result: DemoResult) -> list[Picture]:
     steps = ", ".join(f"{name} {len(walk.actions)}" for name, walk in show.walks.items())
     caption = f"The same start and target for both agents. Steps: {steps}; shortest path {show.shortest_path_steps}."
     return [Picture(file, caption, "The room from above with zones and the ways of both agents")]
+
+
+def _unseen_text(first: FirstWalk) -> str:
+    steps = counted(len(first.walk.actions), "step")
+    went = f"It came to the target in {steps}" if first.reached else f"It did not find the target in {steps}"
+    return (
+        f"The generalist, which comes with clearway, in a room made from seed {first.seed} that it has never entered. "
+        f"{went} with {counted(first.collisions, 'collision')}; "
+        f"the shortest path has {first.shortest_path_steps}. Another room: --room-seed."
+    )
+
+
+def _unseen(result: DemoResult) -> list[Picture]:
+    """The way on the map, what was held at its end, and what was seen."""
+    first, zones = result.first, scene_zones(result.first.scene)
+    way, belief, seen = (f"{PICTURES}/unseen-{name}.png" for name in ("map", "belief", "episode"))
+    states, actions = first.walk.states, first.walk.actions
+    draw_map(first.scene, result.out / way, zones=zones, target=first.target, walks=[Walk(GENERALIST, states)])
+    picture = held_picture(first.scene, first.held, states, first.target, BELIEF_PX)
+    picture.save(result.out / belief)
+    draw_contact_sheet(
+        first.scene,
+        result.out / seen,
+        states=states,
+        actions=actions,
+        zones=zones,
+        target=first.target,
+        title=GENERALIST,
+    )
+    held = "What it held at the end: light where a body can stand; green where the target may be; red, itself."
+    return [
+        Picture(way, "The room as it is, and its way.", "The room from above with zones and the way of the generalist"),
+        Picture(belief, held),
+        Picture(seen, "What it saw on that way. The first picture is the target."),
+    ]
 
 
 def _contact_sheets(result: DemoResult) -> list[Picture]:

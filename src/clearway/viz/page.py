@@ -45,6 +45,8 @@ class Page:
         title: the headline.
         sentence: what this is, in one sentence.
         key_figures: the summary.
+        unseen: the generalist's way in a room that it has never entered, and what it saw.
+        unseen_text: how that went.
         maps: the room from above with the agents' ways.
         rooms: views of the room.
         table: agents and references.
@@ -59,6 +61,8 @@ class Page:
     sentence: str
     table: TableText
     key_figures: Sequence[KeyFigure] = ()
+    unseen: Sequence[Picture] = ()
+    unseen_text: str = ""
     maps: Sequence[Picture] = ()
     rooms: Sequence[Picture] = ()
     more_tables: Mapping[str, TableText] = field(default_factory=dict)

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from clearway import colours
-from clearway.agents.agent import Agent
+from clearway.agents.agent import Agent, State
 from clearway.envs.record import EpisodeSoFar
-from clearway.envs.render import Renderer
+from clearway.envs.render import CAPTION_HEIGHT_PX, PANEL_HEIGHT_PX, Renderer
 from clearway.errors import ClearwayError
 from clearway.evaluation.episodes import Trajectory
-from clearway.evaluation.sight import Sight
+from clearway.evaluation.single import memories
 from clearway.files import written_whole
+from clearway.mapping.held import Held
 from clearway.scenes.actions import Action
 from clearway.scenes.scene import Scene
+from clearway.viz.held import MEANING, held_picture
 from clearway.world.world import World
 
 STRIP_PX, MARGIN_PX, BAR_PX, TEXT_PX = 44, 16, 14, 16
@@ -40,23 +41,30 @@ class Walked:
         target: index of the world's target.
         trajectory: states and actions.
         probabilities: (T + 1, A) of the actions, before each step and after the last; None where no agent told them.
+        held: what an agent with a map held in each of the T + 1 poses; None of others.
     """
 
     world: World
     target: int
     trajectory: Trajectory
     probabilities: np.ndarray | None
+    held: Sequence[Held] | None = None
 
 
-def walked(world: World, agent: Agent, target: int, trajectory: Trajectory) -> Walked:
-    """The episode with what the agent holds of its actions at each pose; it sees poses or features."""
-    sight, thoughts = Sight(world, agent), []
-    memory = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
-    for pose in torch.from_numpy(trajectory.states):
-        decisions, memory = agent.act(sight(pose[None]), memory)
+def walked(
+    world: World, agent: Agent, target: int, trajectory: Trajectory, holds: Callable[[State], Held] | None = None
+) -> Walked:
+    """The episode with what the agent holds of its actions at each pose; it sees poses or features.
+
+    holds: tells, by its state, what an agent with a map holds besides.
+    """
+    thoughts, held = [], []
+    for decisions, state in memories(world, agent, trajectory, target):
         thoughts.append(decisions.probabilities)
+        held += [] if holds is None else [holds(state)]
     told = [thought for thought in thoughts if thought is not None]
-    return Walked(world, target, trajectory, np.concatenate(told) if len(told) == len(thoughts) else None)
+    probabilities = np.concatenate(told) if len(told) == len(thoughts) else None
+    return Walked(world, target, trajectory, probabilities, held or None)
 
 
 def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
@@ -64,12 +72,35 @@ def frames(scenes: Sequence[Scene], shown: Walked) -> Iterator[np.ndarray]:
     renderer = Renderer(scenes, shown.world)
     states, actions = shown.trajectory.states, shown.trajectory.actions
     blocked = shown.world.blocked.numpy()[states[:-1], actions]
+    scene, first = _where(scenes, shown)
     for step in range(len(states)):
         bumps = np.stack([states[:step], actions[:step]], axis=1)[blocked[:step]]
         picture = Image.fromarray(renderer.rgb(EpisodeSoFar(states[: step + 1], bumps), shown.target))
         chosen = int(actions[step]) if step < len(actions) else None
         thought = None if shown.probabilities is None else shown.probabilities[step]
+        if shown.held is not None:
+            goal = int(shown.world.target_state[shown.target]) - first
+            picture = _with_held(picture, scene, shown.held[step], states[: step + 1] - first, goal)
         yield np.asarray(_with_strip(picture, thought, chosen))
+
+
+def _where(scenes: Sequence[Scene], shown: Walked) -> tuple[Scene, int]:
+    """The scene that was walked in, and its first state in the world's numbering."""
+    index = int(shown.world.target_scene[shown.target])
+    return scenes[index], int(shown.world.scene_offset[index])
+
+
+def _with_held(picture: Image.Image, scene: Scene, held: Held, states: np.ndarray, target: int) -> Image.Image:
+    """The picture with what is held beside it."""
+    font = ImageFont.load_default(TEXT_PX)
+    column_px = int(font.getlength(MEANING)) + 1
+    panel = held_picture(scene, held, states, target, (column_px, PANEL_HEIGHT_PX))
+    wide = Image.new("RGB", (picture.width + column_px + 2 * MARGIN_PX, picture.height), colours.PAPER)
+    wide.paste(picture, (0, 0))
+    left = picture.width + MARGIN_PX
+    wide.paste(panel, (left, CAPTION_HEIGHT_PX + (PANEL_HEIGHT_PX - panel.height) // 2))
+    ImageDraw.Draw(wide).text((left, CAPTION_HEIGHT_PX // 2), MEANING, colours.INK, font, anchor="lm")
+    return wide
 
 
 def _with_strip(picture: Image.Image, probabilities: np.ndarray | None, chosen: int | None) -> Image.Image:

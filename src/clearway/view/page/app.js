@@ -23,10 +23,11 @@ async function start() {
   known.stage = await fetched("stage.json");
   $("scene").replaceChildren(...known.stage.scenes.map((name) => element("option", { value: name, textContent: name.replaceAll("_", " ") })));
   $("mind").replaceChildren(...known.stage.agents.map((agent, index) => element("option", { value: index, textContent: agent.name })));
-  for (const part of document.querySelectorAll(".needs-agent")) part.hidden = !known.stage.agents.length;
+  const some = { agent: known.stage.agents.length > 0, values: known.stage.agents.some(({ values }) => values), map: known.stage.agents.some((agent) => agent.map) };
+  for (const [what, there] of Object.entries(some)) for (const part of document.querySelectorAll(`.needs-${what}`)) part.hidden = !there;
+  if (some.map) document.querySelector("input[name=layer][value=held]").checked = true;
   $("scene-field").hidden = known.stage.scenes.length < 2;
   document.title = `clearway: ${known.stage.agents.map((agent) => agent.name).join(", ") || known.stage.scenes[0]}`;
-  $("value-figure").hidden = !known.stage.agents.length;
   $("speed").dispatchEvent(new Event("input"));
   await load(location.hash.slice(1));
 }
@@ -86,11 +87,11 @@ async function takeEpisode(answer) {
   $("race").setAttribute("aria-pressed", answer.drive);
   const pictures = {
     any: known.scene.has_pictures,
-    coarse: known.scene.has_pictures && known.scene.picture_shape[0] < 100,
+    coarse: known.scene.has_pictures && known.scene.picture_shape[0] < 90,
     path: (state) => `scenes/${answer.scene}/${$("sensor").value || "views"}/${state}.jpg`,
   };
   known.pictures = pictures;
-  known.cards = known.walkers.map((walker, index) => createCard(walker, index, pictures, drive));
+  known.cards = known.walkers.map((walker, index) => createCard({ ...walker, values: known.stage.agents[index]?.values }, index, pictures, drive));
   $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
   showTarget(pictures);
   await showLayer(askNow);
@@ -157,7 +158,7 @@ function showTarget(pictures) {
     $("goal-picture").src = pictures.path(target);
     $("goal-picture").alt = `Picture of the target, ${heading(target)}`;
   }
-  const trained = known.stage.agents.length ? (known.scene.targets.includes(target) ? ", trained on" : ", not trained on") : "";
+  const trained = known.stage.agents[0]?.values ? (known.scene.targets.includes(target) ? ", trained on" : ", not trained on") : "";
   $("goal-where").textContent = heading(target) + trained;
   const focused = $("targets").contains(document.activeElement);
   $("targets").replaceChildren(
@@ -175,11 +176,12 @@ const chosenLayer = () => document.querySelector("input[name=layer]:checked").va
 
 async function showLayer(asking = ask) {
   const kind = chosenLayer(), mind = Number($("mind").value);
+  const ofPoses = kind === "value" || kind === "policy";
   $("mind-field").hidden = kind === "zones" || known.stage.agents.length < 2;
-  if (kind !== "zones" && !known.minds.has(mind)) await asking({ do: "map", walker: mind });
+  if (ofPoses && !known.minds.has(mind)) await asking({ do: "map", walker: mind });
   if (kind !== chosenLayer() || mind !== Number($("mind").value)) return; // another was chosen meanwhile
   const { values, probabilities } = known.minds.get(mind) ?? {};
-  const layer = { kind, values, probabilities, range: values && [Math.min(...values), Math.max(...values)] };
+  const layer = { kind, mind, values, probabilities, range: values && [Math.min(...values), Math.max(...values)] };
   map.setLayer(layer);
   showLegend($("legend"), layer);
 }
@@ -284,8 +286,9 @@ function setSpeed(change) {
 }
 
 function chooseLayer(kind) {
-  if (!known.stage.agents.length) return;
-  document.querySelector(`input[name=layer][value=${kind}]`).checked = true;
+  const choice = document.querySelector(`input[name=layer][value=${kind}]`);
+  if (choice.closest("[hidden]")) return;
+  choice.checked = true;
   showLayer();
 }
 

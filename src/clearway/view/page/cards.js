@@ -42,7 +42,7 @@ export function createCard(walker, index, pictures, onDrive) {
   const missing = element("p", { textContent: "no pictures in this scene", hidden: pictures.any });
   view.hidden = !pictures.any;
   view.classList.toggle("coarse", pictures.coarse);
-  const fields = NUMBERS.filter(([key]) => walker.agent || key !== "value").map(([key, name, title]) => {
+  const fields = NUMBERS.filter(([key]) => walker.values || key !== "value").map(([key, name, title]) => {
     const value = element("dd", { "data-field": key, className: "number" });
     return [key, value, element("div", { title }, element("dt", { textContent: name }), value)];
   });
@@ -54,7 +54,7 @@ export function createCard(walker, index, pictures, onDrive) {
     return { row, fill, share };
   });
   const below = walker.agent
-    ? element("ul", { className: "bars", "aria-label": "Probabilities of the next action" }, ...bars.map((bar) => bar.row))
+    ? element("ul", { className: walker.values ? "bars" : "bars untold", "aria-label": walker.values ? "Probabilities of the next action" : "The next action" }, ...bars.map((bar) => bar.row))
     : element(
         "div",
         { className: "drive" },

@@ -1,6 +1,6 @@
 // The page by keyboard alone; what has the focus keeps the keys that it knows itself.
 
-const LAYERS = { 1: "zones", 2: "value", 3: "policy" };
+const LAYERS = { 1: "zones", 2: "value", 3: "policy", 4: "held" };
 const DRIVE = { ArrowUp: 0, ArrowRight: 1, ArrowLeft: 2, ArrowDown: 3 };
 
 export function listenToKeys(acts) {

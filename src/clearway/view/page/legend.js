@@ -1,6 +1,6 @@
 // What the map's colours mean, in words, for the layer shown.
 import { element } from "./cards.js";
-import { ACTIONS, WALKERS, ZONES, ZONE_OPACITY, drawBump, drawTarget, hatching, heat, penOf } from "./looks.js";
+import { ACTIONS, GHOST, STANDS, TARGET, WALKERS, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawTarget, hatching, heat, penOf } from "./looks.js";
 
 function swatch(width, height, paint) {
   const canvas = element("canvas", { ariaHidden: "true" });
@@ -36,6 +36,15 @@ const marks = () => [
 export function showLegend(place, layer) {
   if (layer.kind === "zones") {
     place.replaceChildren(entry(zoneSwatch(2), "collision zone"), entry(zoneSwatch(1), "precollision zone"), ...marks());
+  } else if (layer.kind === "held") {
+    const filled = (colour) => swatch(18, 14, (pen, width, height) => {
+      pen.fillStyle = "#5d646c";
+      pen.fillRect(0, 0, width, height);
+      pen.fillStyle = colour;
+      pen.fillRect(3, 2, width - 6, height - 4);
+    });
+    const own = entry(swatch(18, 18, (pen) => drawAgent(pen, 9, 9.5, 6, 0, GHOST)), "it holds itself to be here");
+    place.replaceChildren(entry(filled(STANDS), "can stand here"), entry(filled(TARGET), "target may be here"), own, ...marks());
   } else if (layer.kind === "value") {
     const scale = swatch(140, 12, (pen, width, height) => {
       for (let x = 0; x < width; x++) {

@@ -5,6 +5,8 @@ export const ZONE_OPACITY = [0, 0.55, 0.55];
 export const HATCH_INK = "#5c0f0b";
 export const WALL = "#3f4650";
 export const TARGET = "#00876c";
+export const STANDS = "#ffffff"; // where an agent holds that a body can stand
+export const GHOST = { colour: "rgb(255 255 255 / 0%)", halo: "#d81b60" }; // where it holds itself to be
 export const INK = "#22272e";
 
 // First agent, second agent, the user: apart in lightness, and in dashes without colour.

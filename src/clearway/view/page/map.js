@@ -1,7 +1,8 @@
 // The map: the room from above, its zones or what an agent thinks of every pose, and the ways walked so far.
-import { ACTIONS, INK, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, lookOf, penOf } from "./looks.js";
+import { ACTIONS, GHOST, INK, STANDS, TARGET, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, lookOf, penOf } from "./looks.js";
 
 const VEIL = "rgb(255 255 255 / 45%)"; // over the cells in the picture from above
+const SHADE = "rgb(29 35 41 / 62%)"; // over the room, where an agent's belief is shown
 const CELL_SHARE = 0.94;
 const LOWEST_PX = 220, LARGEST_CELL_PX = 90;
 
@@ -16,17 +17,20 @@ export function createMap(canvas, onPick, onCursor) {
   const at = (state) => place(...scene.locations_m[state]);
 
   // The point so far ahead of a pose, and to its right, in cells.
-  function beside(state, ahead, right) {
-    const turn = (scene.headings_deg[state] * Math.PI) / 180;
-    const [x, y] = at(state), side = scene.cell_size_m * scale;
+  const beside = (state, ahead, right) => besideAt(at(state), scene.headings_deg[state], ahead, right);
+
+  function besideAt([x, y], heading, ahead, right) {
+    const turn = (heading * Math.PI) / 180, side = scene.cell_size_m * scale;
     return [x + side * (ahead * Math.sin(turn) + right * Math.cos(turn)), y - side * (ahead * Math.cos(turn) - right * Math.sin(turn))];
   }
 
-  function triangle(pen, state) {
-    const reach = CELL_SHARE / 2, aside = reach * Math.tan((scene.turn_deg * Math.PI) / 360);
-    pen.moveTo(...at(state));
-    pen.lineTo(...beside(state, reach, aside));
-    pen.lineTo(...beside(state, reach, -aside));
+  const triangle = (pen, state) => triangleAt(pen, at(state), scene.headings_deg[state], scene.turn_deg);
+
+  function triangleAt(pen, middle, heading, turn) {
+    const reach = CELL_SHARE / 2, aside = reach * Math.tan((turn * Math.PI) / 360);
+    pen.moveTo(...middle);
+    pen.lineTo(...besideAt(middle, heading, reach, aside));
+    pen.lineTo(...besideAt(middle, heading, reach, -aside));
     pen.closePath();
   }
 
@@ -48,7 +52,8 @@ export function createMap(canvas, onPick, onCursor) {
     if (above) pen.drawImage(above, 0, 0, width, height);
     pen.strokeStyle = "#ffffff";
     pen.lineWidth = 0.8;
-    pen.fillStyle = above ? VEIL : ZONES[0];
+    pen.fillStyle = layer.kind === "held" ? SHADE : above ? VEIL : ZONES[0];
+    if (layer.kind === "held") return pen.fillRect(0, 0, width, height);
     for (const state of scene.firstOfCell) {
       const [x, y] = at(state);
       pen.fillRect(x - side / 2, y - side / 2, side, side);
@@ -57,6 +62,30 @@ export function createMap(canvas, onPick, onCursor) {
     if (layer.kind === "zones") paintZones(pen);
     else if (layer.kind === "value") paintValues(pen);
     else paintPolicy(pen, side);
+  }
+
+  // What an agent with a map holds: light where it can stand, green where the target may be, hollow where it is itself.
+  function paintHeld(pen, held) {
+    const side = scene.cell_size_m * scale;
+    for (const [x, z, stands] of held.cells) {
+      const [left, top] = place(x, z);
+      pen.globalAlpha = 0.72 * stands;
+      pen.fillStyle = STANDS;
+      pen.fillRect(left - side / 2 + 0.5, top - side / 2 + 0.5, side - 1, side - 1);
+    }
+    const most = Math.max(...held.target.map(([, , , share]) => share), 0.05);
+    for (const [x, z, heading, share] of held.target) {
+      pen.globalAlpha = 0.15 + 0.75 * (share / most);
+      pen.beginPath();
+      triangleAt(pen, place(x, z), heading, 90);
+      pen.fillStyle = TARGET;
+      pen.fill();
+    }
+    for (const [x, z, heading, share] of held.here) {
+      pen.globalAlpha = Math.max(share, 0.2);
+      drawAgent(pen, ...place(x, z), side * 0.34, heading, GHOST);
+    }
+    pen.globalAlpha = 1;
   }
 
   function paintZones(pen) {
@@ -115,6 +144,8 @@ export function createMap(canvas, onPick, onCursor) {
     if (!scene || !shown || !width) return;
     const pen = penOf(canvas, width, height), side = scene.cell_size_m * scale;
     pen.drawImage(ground, 0, 0, width, height);
+    const seer = layer.kind === "held" ? shown.walkers[layer.mind] : null;
+    if (seer) paintHeld(pen, seer.steps[Math.min(shown.step, seer.steps.length - 1)].held);
     drawTarget(pen, ...at(shown.target), side * 0.27, scene.headings_deg[shown.target]);
     const lanes = shown.walkers.map((_, i) => (i - (shown.walkers.length - 1) / 2) * side * 0.13);
     const thick = Math.min(Math.max(side * 0.08, 2), 5);
