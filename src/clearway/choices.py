@@ -17,7 +17,7 @@ ExperimentName = Literal["table1", "fig3", "fig4", "table2", "table3", "fig5", "
 BudgetName = Literal["smoke", "paper"]
 """See `clearway.experiments.budget`."""
 
-LearnerName = Literal["paper", "paper-a3c", "default"]
+LearnerName = Literal["paper", "paper-a3c", "default", "own-goals"]
 """See `clearway.experiments.setting`."""
 
 PresetName = Literal["default", "paper", "paper-a3c"]
@@ -25,6 +25,9 @@ PresetName = Literal["default", "paper", "paper-a3c"]
 
 FeatureStore = Literal["memory", "float16", "mapped"]
 """See `clearway.world.feature_store`."""
+
+Goals = Literal["given", "seen"]
+"""See `clearway.learn.own_goals`."""
 
 MatmulPrecision = Literal["highest", "medium"]
 """See `clearway.model.precision`."""

@@ -59,6 +59,10 @@ def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):
     [
         (("--algorithm", "a3c", "--set", "hindsight=true"), ("hindsight=true", "a3c's settings", "clip_norm")),
         (
+            ("--algorithm", "a3c", "--goals", "seen"),
+            ("--goals: a3c has no setting goals", "Leave it out"),
+        ),
+        (
             ("--algorithm", "q-learning", "--feature-basis", 8),
             ("--feature-basis: q-learning has no setting", "Leave it out"),
         ),

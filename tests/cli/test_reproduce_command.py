@@ -146,7 +146,13 @@ def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_pat
 
 
 def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
-    assert setting.LEARNERS == {"paper": PAPER_A2C, "paper-a3c": PAPER_A3C, "default": DEFAULT}
+    own_goals = replace(DEFAULT, goals="seen")
+    assert {
+        "paper": PAPER_A2C,
+        "paper-a3c": PAPER_A3C,
+        "default": DEFAULT,
+        "own-goals": own_goals,
+    } == setting.LEARNERS
     assert set(setting.LEARNERS) == set(get_args(LearnerName))
     assert set(EXPERIMENTS) == set(get_args(ExperimentName))
     assert set(BUDGETS) == set(get_args(BudgetName))

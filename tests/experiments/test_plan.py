@@ -34,6 +34,11 @@ def test_whatever_changes_the_agent_changes_the_name(change: dict) -> None:
     assert replace(RUN, **change).name != RUN.name
 
 
+def test_a_learner_s_name_is_what_it_was_before_it_could_set_itself_goals() -> None:
+    assert RUN.name.endswith("fdeec392ab")
+    assert replace(RUN, learner=small_learner(goals="seen")).name != RUN.name
+
+
 @pytest.mark.parametrize(("frames", "half"), [(1, 1), (2, 1), (3, 1), (10, 5)])
 def test_every_training_comes_by_its_half(frames: int, half: int) -> None:
     assert replace(RUN, learner=replace(RUN.learner, frames=frames)).halfway == half

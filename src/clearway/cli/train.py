@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import FeatureStore, PresetName, ZoneLevel
+from clearway.choices import FeatureStore, Goals, PresetName, ZoneLevel
 from clearway.cli.arguments import given_targets, scene_files
 from clearway.cli.console import say
 from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
@@ -50,6 +50,9 @@ class Train:
     feature_basis: int | None = None
     """Learn from features in so many leading principal directions, instead of the preset's choice; 0: as they are. It
     loses nothing where poses are fewer, and costs quality elsewhere."""
+    goals: Goals | None = None
+    """seen: the learner sets itself poses that it has passed as further targets, for which the environment pays
+    nothing; given: it does not, as by default. PPO and A2C."""
     seed: int = 0
     """Of parameters, environments, actions and the choice of targets."""
     threads: int | None = None
@@ -101,7 +104,10 @@ class Train:
             if self.algorithm in PRESETS:
                 raise ClearwayError(f"--algorithm {self.algorithm} is a preset itself. Leave --preset out")
             learner = carried_over(PRESETS[self.preset], type(learner))
-        basis = {} if self.feature_basis is None else {"feature_basis": self.feature_basis}
-        if basis and "feature_basis" not in setting_names(type(learner)):
-            raise ClearwayError(f"--feature-basis: {learner.algorithm} has no setting feature_basis. Leave it out")
-        return with_settings(chosen_learner(learner, self.frames, basis), self.set)
+        wanted = {"feature_basis": self.feature_basis, "goals": self.goals}
+        given = {name: value for name, value in wanted.items() if value is not None}
+        for name in given:
+            if name not in setting_names(type(learner)):
+                option = f"--{name.replace('_', '-')}"
+                raise ClearwayError(f"{option}: {learner.algorithm} has no setting {name}. Leave it out")
+        return with_settings(chosen_learner(learner, self.frames, given), self.set)

@@ -6,7 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from clearway.experiments.generalisation import BAND, HEADINGS, NOTE, TARGET_HEADINGS, Tried, lines, together, tried
+from clearway.experiments.generalisation import (
+    BAND,
+    HEADINGS,
+    NOTE,
+    TARGET_HEADINGS,
+    Tried,
+    lines,
+    together,
+    told_of_own_goals,
+    tried,
+)
 from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, random_walk
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
 from clearway.experiments.plan import Job, TargetSets
@@ -54,7 +64,7 @@ def section(setting: Setting) -> Section:
         for kind, parts in kinds.items()
     }
     headings = ("steps away", "learner", "agent", "seeds", "targets", *HEADINGS, "the paper's sc")
-    notes = (NOTE, reminder(setting.original, original_targets=False), *_replaced(setting))
+    notes = (NOTE, *told_of_own_goals(setting), reminder(setting.original, original_targets=False), *_replaced(setting))
     title = "Success on unseen targets"
     return Section(
         name="fig5",

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.generalisation import BAND, HEADINGS, NOTE, TARGET_HEADINGS, Tried, lines, tried
+from clearway.experiments.generalisation import (
+    BAND,
+    HEADINGS,
+    NOTE,
+    TARGET_HEADINGS,
+    Tried,
+    lines,
+    told_of_own_goals,
+    tried,
+)
 from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, random_walk
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value
@@ -58,7 +67,7 @@ def section(setting: Setting) -> Section:
             "been learnt: see the success on the trained ones. The paper prints its figures as a picture alone."
         ),
         tables=(
-            ReportTable("fig6", title, headings, tuple(rows), (NOTE,)),
+            ReportTable("fig6", title, headings, tuple(rows), (NOTE, *told_of_own_goals(setting))),
             ReportTable(
                 "fig6_targets",
                 f"{title}: every target",

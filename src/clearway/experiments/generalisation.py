@@ -25,6 +25,16 @@ NOTE = (
     "500 steps, so beside it stand the share within 4 times the shortest path, and SPL. Episodes end when both shares "
     "are settled; SPL takes later arrivals for failures. Intervals are over seeds, for these targets."
 )
+OWN_GOALS = (
+    "{}: never given means that the environment never paid for these targets. The learner has set itself every pose "
+    "that it has passed, these among them, so this measures what it learns without being asked, not pictures unseen."
+)
+
+
+def told_of_own_goals(setting: Setting) -> list[str]:
+    """A note on learners that set themselves goals, where there are any."""
+    names = [name for name, learner in setting.learners.items() if getattr(learner, "goals", None) == "seen"]
+    return [OWN_GOALS.format(", ".join(names))] if names else []
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.learn.learner import Learner
+from clearway.learn.old_runs import without_later
 from clearway.reward import Reward
 
 TargetSets = tuple[tuple[int, ...], ...]
@@ -52,7 +53,7 @@ class PlannedRun:
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
-        settings = {"algorithm": self.learner.algorithm, **asdict(self.learner)}
+        settings = {"algorithm": self.learner.algorithm, **without_later(asdict(self.learner))}
         content = [scenes, self.targets, asdict(self.reward), settings, self.seed]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
         targets = sum(len(own) for own in self.targets)

@@ -23,11 +23,17 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.world import World, make_world
 
 SCENES = "scenes"
-LEARNERS: dict[LearnerName, Learner] = {"paper": PAPER_A2C, "paper-a3c": PAPER_A3C, "default": DEFAULT}
+LEARNERS: dict[LearnerName, Learner] = {
+    "paper": PAPER_A2C,
+    "paper-a3c": PAPER_A3C,
+    "default": DEFAULT,
+    "own-goals": replace(DEFAULT, goals="seen"),
+}
 ABOUT_LEARNERS: Mapping[str, str] = {
     "paper": "the paper's settings, A2C in place of A3C (PAPER_A2C)",
     "paper-a3c": "the paper's settings and its A3C (PAPER_A3C)",
     "default": "this project's default recipe",
+    "own-goals": "the default recipe, which sets itself poses that it has passed as further targets (goals=seen)",
 }
 
 
@@ -148,5 +154,5 @@ def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) ->
 
 
 def _budgeted(name: LearnerName, budget: Budget) -> Learner:
-    frames = budget.default_frames if name == "default" else budget.frames
+    frames = budget.default_frames if name in ("default", "own-goals") else budget.frames
     return LEARNERS[name] if frames is None else replace(LEARNERS[name], frames=frames)

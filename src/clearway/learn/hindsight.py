@@ -41,11 +41,15 @@ class Segments:
     rows_per_scene: tuple[int, ...]
 
 
-def find_segments(rollout: Rollout, navigation: Navigation) -> Segments:
-    """The stretches of a rollout that arrive at another target of their scene."""
+def find_segments(rollout: Rollout, navigation: Navigation, told: Tensor | None = None) -> Segments:
+    """The stretches of a rollout that arrive at another target of their scene, one of `told` (M,) bool, all if None."""
     world, choice = navigation.world, navigation.choice
-    members = choice.members[choice.groups]  # (N, J)
-    valid = choice.weights[choice.groups] > 0
+    members, valid = choice.members, choice.weights > 0
+    if told is not None:
+        valid = valid & told[members]
+        slots = torch.argsort(~valid, dim=1, stable=True)[:, : max(1, int(valid.sum(1).max()))]
+        members, valid = members.gather(1, slots), valid.gather(1, slots)
+    members, valid = members[choice.groups], valid[choice.groups]  # (N, J)
     member_state = world.target_state[members]
     hit = rollout.arrived[..., None] == member_state  # (T, N, J)
     hit &= valid & (rollout.target[..., None] != members)
@@ -71,6 +75,7 @@ def hindsight_batch(
     discount: float,
     reward_scale: float,
     trace_lambda: float,
+    told: Tensor | None = None,
 ) -> Batch | None:
     """The rows that hindsight adds to a rollout, ordered by scene; None if it passed no other target.
 
@@ -80,8 +85,9 @@ def hindsight_batch(
         navigation: the environments that the rollout came from.
         network: values and probabilities under the targets passed by.
         discount, reward_scale, trace_lambda: as in the learner's settings.
+        told: (M,) bool, the targets that steps are told again for; None for all.
     """
-    rows = find_segments(rollout, navigation)
+    rows = find_segments(rollout, navigation, told)
     if not len(rows.step):
         return None
     history = rollout.history[rows.step, rows.env]

@@ -1,18 +1,33 @@
 """Runs that earlier versions recorded in another way.
 
 In the first format of run.json every algorithm had the settings of all three. Later on, the reward and the algorithm's
-settings could each clip, and run.json held the reward as it was given rather than as it was paid.
+settings could each clip, and run.json held the reward as it was given rather than as it was paid. Settings that came
+later than a run have the value that changes nothing, `LATER`; names of planned runs leave them out where they have it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
 from clearway.reward import Reward
+
+LATER: Mapping[str, object] = MappingProxyType({"goals": "given"})
+"""Settings that earlier versions did not have, and what was done then."""
+
+
+def with_later(kind: type[Learner], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a run, with those that came later where the algorithm has them."""
+    return {name: value for name, value in LATER.items() if name in setting_names(kind)} | dict(settings)
+
+
+def without_later(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings as they were written before those of `LATER`, where these change nothing."""
+    return {name: value for name, value in settings.items() if name not in LATER or LATER[name] != value}
 
 
 def own_settings(kind: type[Learner], settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from clearway.choices import MatmulPrecision
+from clearway.choices import Goals, MatmulPrecision
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class OnPolicy(OnFeatures, Learner):
     """Lambda of generalised advantage estimation; 1 gives n-step returns."""
     hindsight: bool = True
     """Learn also from passing other targets of the scene by, with truncated importance ratios."""
+    goals: Goals = "given"
+    """What is walked to in training: the given targets, or also poses that the learner has seen, see `own_goals`."""
     lookahead: float = 0.04
     """Weight of the cross-entropy that draws the policy towards what looking one step ahead finds better, at the start;
     falls linearly to 0, see `settle`. 0: none."""

@@ -27,7 +27,7 @@ from clearway.errors import ClearwayError, RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.learner import Learner
-from clearway.learn.old_runs import clipped_once, own_settings
+from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
@@ -300,7 +300,7 @@ def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
 def _learner(content: Mapping[str, Any], version: int) -> Learner:
     kind = algorithm(content["algorithm"])
     settings = {name: value for name, value in content.items() if name != "algorithm"}
-    return _settings(kind, own_settings(kind, settings) if version == 1 else settings)
+    return _settings(kind, with_later(kind, own_settings(kind, settings) if version == 1 else settings))
 
 
 def _maker(content: Mapping[str, Any]) -> str:

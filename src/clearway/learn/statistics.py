@@ -37,6 +37,11 @@ class Counted(Protocol):
 class EpisodeStatistics:
     """Running counts of ended episodes.
 
+    Args:
+        env_count, target_count: N, M.
+        device: of the counts.
+        told: (M,) bool, the targets that `solved` and `take` tell of; all by default.
+
     Attributes:
         open_steps, open_collisions: (N,) float64, of the episodes under way.
         totals: (M, 4) float64, ended episodes, those that reached the target, their steps and collisions, since the
@@ -45,7 +50,8 @@ class EpisodeStatistics:
         recent_success: (M,) float64, success rate over the last window; 0 before the first.
     """
 
-    def __init__(self, env_count: int, target_count: int, device: torch.device) -> None:
+    def __init__(self, env_count: int, target_count: int, device: torch.device, told: Tensor | None = None) -> None:
+        self.told = torch.ones(target_count, dtype=torch.bool, device=device) if told is None else told
         self.open_steps = torch.zeros(env_count, dtype=torch.float64, device=device)
         self.open_collisions = torch.zeros_like(self.open_steps)
         self.totals = torch.zeros(target_count, 4, dtype=torch.float64, device=device)
@@ -77,22 +83,27 @@ class EpisodeStatistics:
 
     @property
     def solved(self) -> int:
-        """Number of targets that every episode of the last window reached."""
-        return int((self.recent_success == 1).sum())
+        """Number of targets told of that every episode of the last window reached."""
+        return int((self.recent_success == 1)[self.told].sum())
+
+    @property
+    def target_count(self) -> int:
+        """Number of targets told of."""
+        return int(self.told.sum())
 
     def take(self) -> Tensor:
-        """The totals (M, 4) since the last call, which start again from zero."""
-        totals = self.totals.clone()
+        """The totals of the targets told of since the last call, (M, 4) or fewer; all start again from zero."""
+        totals = self.totals[self.told]
         self.totals.zero_()
         return totals
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on from here."""
-        return dict(vars(self))
+        return {name: tensor for name, tensor in vars(self).items() if name != "told"}
 
     def load_tensors(self, tensors: dict[str, Tensor]) -> None:
         """Go on from where `tensors` was called."""
-        for name, here in vars(self).items():
+        for name, here in self.tensors().items():
             setattr(self, name, tensors[name].to(here.device).clone())
 
 

@@ -210,7 +210,7 @@ def _run(
             if saves or trainer.finished or any(seen < milestone <= trainer.frames for milestone in milestones):
                 trainer.tensors()  # A3C's workers walk on until then; what is told and what is saved must agree
             tell()
-            view.show(trainer.frames, trainer.statistics.solved, trainer.world.target_count)
+            view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
             if saves:
                 save(trainer, folder, seconds)
                 saved_at, saved_frames = time.monotonic(), trainer.frames

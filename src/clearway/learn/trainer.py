@@ -19,6 +19,7 @@ from clearway.learn.minibatches import Minibatch, dealt_epochs
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.optimiser import clip_gradients, optimisers
+from clearway.learn.own_goals import OwnGoals, goal_world
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.rotation import Rotation, check_division, divided_envs, scene_of_envs
@@ -63,6 +64,10 @@ class Trainer:
 
     def __init__(self, world: World, learner: OnPolicy, reward: Reward, seed: int) -> None:
         self.world, self.learner, self.seed = world, learner, seed
+        self.own_goals: OwnGoals | None = None
+        if learner.goals == "seen":
+            world = goal_world(world)  # that episodes are in; `self.world` has the given targets alone
+            self.own_goals = OwnGoals(world, self.world.target_state)
         self.frames, self.updates = 0, 0
         device = world.device
         self.rotation = Rotation(world.scene_count, learner.scenes_at_once, learner.scene_updates, seed)
@@ -72,6 +77,12 @@ class Trainer:
         self.feature_map, features = network_input(world, learner)
         seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
         choice = TargetChoice.by_scene(world, env_scene)
+        told = None
+        if self.own_goals:
+            told = self.own_goals.given
+            choice.reweigh(
+                self.own_goals.weights(choice, torch.ones(world.target_count, dtype=torch.float64, device=device))
+            )
         self.navigation = Navigation(
             world, reward, seeds, choice=choice, step_limit=learner.step_limit, history_length=learner.history_length
         )
@@ -87,7 +98,7 @@ class Trainer:
         )
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner.optimiser)
         self.observed = Observed(world)
-        self.statistics = EpisodeStatistics(self.env_count, world.target_count, device)
+        self.statistics = EpisodeStatistics(self.env_count, world.target_count, device, told)
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.one_pass = learner.epochs * learner.minibatches == 1
         self.collector = Collector(
@@ -128,7 +139,7 @@ class Trainer:
         steps = self._learn(batch, kept, lr, settings)
         self.frames += self.frames_per_update
         self.updates += 1
-        self._rebalance()
+        self._rebalance(rollout)
         result = {
             **self._loss_figures(steps, explained),
             "hindsight_rows": len(batch) - rows,
@@ -137,6 +148,8 @@ class Trainer:
             "lr": lr,
             "entropy_weight": settings.entropy_weight,
         }
+        if self.own_goals:
+            result["own_goals"] = self.own_goals.count
         check_finite(result, self.frames)
         return result
 
@@ -205,7 +218,7 @@ class Trainer:
         env, step = rollout.truncated.T.nonzero(as_tuple=True)  # ordered by scene, as environments are
         if len(env):
             target = rollout.target[step, env]
-            scene = self.world.target_scene[target]
+            scene = self.navigation.world.target_scene[target]
             rows_per_scene = counted(scene, self.world.scene_count).tolist()
             _, values = self.lookup.judged(rollout.last_history[step, env], target, rows_per_scene)
             bonus[step, env] = self.learner.discount * values
@@ -222,12 +235,13 @@ class Trainer:
             discount=learner.discount,
             reward_scale=learner.reward_scale,
             trace_lambda=learner.gae_lambda,
+            told=self.own_goals.told(self.seed, self.updates) if self.own_goals else None,
         )
         return batch if told is None else merged(batch, told)
 
     def _learn(self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings) -> list[StepFigures]:
         """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
-        learner, world = self.learner, self.world
+        learner, world = self.learner, self.navigation.world
         generator = torch.Generator(world.device).manual_seed(self.seed * SHUFFLE_SALT + self.updates)
         epochs = dealt_epochs(
             batch,
@@ -279,12 +293,16 @@ class Trainer:
             del figures["clipped"]
         return figures
 
-    def _rebalance(self) -> None:
-        """Draw targets more often that are reached less often."""
+    def _rebalance(self, rollout: Rollout) -> None:
+        """Draw targets more often that are reached less often, and poses that the rollout came by as own goals."""
         self.statistics.refresh_success()
-        if self.learner.balance:
-            choice = self.navigation.choice
-            choice.reweigh(balanced_weights(choice, self.statistics.recent_success, self.learner.balance))
+        choice, learner = self.navigation.choice, self.learner
+        if self.own_goals:
+            self.own_goals.see(rollout.history[:, :, -1])
+            self.own_goals.see(rollout.arrived)
+            choice.reweigh(self.own_goals.weights(choice, 1 + learner.balance * (1 - self.statistics.recent_success)))
+        elif learner.balance:
+            choice.reweigh(balanced_weights(choice, self.statistics.recent_success, learner.balance))
 
     def fixed_tensors(self) -> dict[str, Tensor]:
         """The map that prepares features."""
@@ -304,6 +322,8 @@ class Trainer:
             "choice": {"weights": self.navigation.choice.weights},
             "observed": {"next_state": self.observed.next_state},
         }
+        if self.own_goals:
+            parts["own_goals"] = {"known": self.own_goals.known}
         return {name: tensor.detach() for name, tensor in joined(parts).items()}
 
     @torch.no_grad()
@@ -318,6 +338,8 @@ class Trainer:
         self.action_stream.seek(tensors["actions.drawn"].to(self.world.device).clone())
         self.observed.next_state = tensors["observed.next_state"].to(self.world.device).clone()
         self.navigation.choice.reweigh(tensors["choice.weights"].to(self.world.device).clone())
+        if self.own_goals:
+            self.own_goals.known = tensors["own_goals.known"].to(self.world.device).clone()
         self.frames, self.updates = frames, updates
         self._seat(max(updates - 1, 0))
         self.lookup.refresh()

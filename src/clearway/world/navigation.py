@@ -169,14 +169,15 @@ class Navigation:
     def begin_staggered(self) -> None:
         """Begin all episodes, a group's targets in turn, with clocks spread so that cuts do not fall together.
 
-        Environments are ordered by group; there is a step limit.
+        Targets of no weight are left out. Environments are ordered by group; there is a step limit.
         """
         assert self.step_limit is not None
         group, members = self.choice.groups, self.choice.members
         envs = torch.bincount(group, minlength=len(members))
         place = torch.arange(len(group), device=self.world.device) - (envs.cumsum(0) - envs)[group]
-        counts = (self.choice.weights > 0).sum(1)
-        self.reset(target=members[group, place % counts[group]])
+        drawn = self.choice.weights > 0
+        members = members.gather(1, torch.argsort(~drawn, dim=1, stable=True))
+        self.reset(target=members[group, place % drawn.sum(1)[group]])
         self.elapsed = (self.start_stream.uniform() * self.step_limit).long()
 
     def restart(self, ended: Tensor) -> None:

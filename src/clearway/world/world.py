@@ -24,6 +24,7 @@ from clearway.reward import Moves
 from clearway.scenes.actions import BLOCKED
 from clearway.scenes.graph import UNREACHABLE, next_states
 from clearway.scenes.scene import EncoderRecord, Scene
+from clearway.scenes.targets import possible_targets
 from clearway.world.feature_store import joined_features
 from clearway.world.targets import NO_TARGETS, WalkedScene, target_tables
 from clearway.zones import scene_zones
@@ -42,6 +43,7 @@ class World:
         clearance_m: (S,) float64, distance to the nearest obstacle, see `clearance`.
         largest_part: (C,) int64, states of each scene's largest strongly connected component.
         features: (S, F) float32, or as `feature_store` says; None where the scenes have none.
+        may_be_target: (S,) bool, whether a target may be drawn there: in its scene's largest component, not held out.
         target_state: (M,) int64, in the numbering of all scenes.
         target_scene: (M,) int64, ascending.
         start_state: (K,) int64, for target after target all states from which it can be reached, itself excluded.
@@ -59,6 +61,7 @@ class World:
     clearance_m: Tensor
     largest_part: Tensor
     features: Tensor | None
+    may_be_target: Tensor
     target_state: Tensor
     target_scene: Tensor
     start_state: Tensor
@@ -201,6 +204,7 @@ def make_world(
         blocked=torch.from_numpy(graph == BLOCKED),
         largest_part=torch.tensor(largest),
         features=joined_features(scenes, feature_store),
+        may_be_target=torch.from_numpy(np.concatenate([_may_be_target(scene) for scene in scenes])),
         feature_store=feature_store,
         encoder=scenes[0].encoder if scenes else None,
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
@@ -214,6 +218,12 @@ def scene_tables(
 ) -> World:
     """The tables of some scenes, without targets; arguments and errors as of `make_world`."""
     return make_world(scenes, None, zone_level, feature_store)
+
+
+def _may_be_target(scene: Scene) -> np.ndarray:
+    possible = np.zeros(scene.state_count, bool)
+    possible[possible_targets(scene)] = True
+    return possible
 
 
 def _shifted(graph: np.ndarray, first: int) -> np.ndarray:
