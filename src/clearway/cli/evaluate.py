@@ -28,7 +28,8 @@ class Evaluate:
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """The run folder; the .onnx file of an exported agent; or, with --goals, generalist, which comes with clearway."""
+    """The run folder; the .onnx file of an exported agent; or, with --goals or --live, generalist, which comes with
+    clearway."""
     files: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Scene files or folders, as --scenes; with --goals any scenes."""
     episodes: int | None = None
@@ -49,7 +50,8 @@ class Evaluate:
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
     goals: int | None = None
     """Walk to so many goals a scene, drawn by the seed among all its poses, one episode of 500 steps each; the
-    generalist and agents of the algorithm recurrent do in any scenes with pictures."""
+    generalist and agents of the algorithm recurrent do in any scenes with pictures, the generalist with --live too
+    (by default 20)."""
     perturb: tuple[str, ...] = ()
     """With --goals: what is seen on the way is perturbed, the goals' pictures are not. all; geometry: all but light and
     pixel-noise; none; names of the perturbations below, at full strength; or NAME=STRENGTH. A later word changes an
@@ -57,7 +59,7 @@ class Evaluate:
     takes: int | None = None
     """With --perturb: pictures of each pose, each perturbed in its own way, one of which a step shows; by default 4."""
     tour: int = 0
-    """With --goals: steps in which an agent with a map may look around in each scene first."""
+    """With --goals: steps in which an agent with a map may look around in each scene first; live under each setting."""
     held_out: bool = False
     """Evaluate at five targets a scene that trainings in generated rooms and flats leave out, and leave held-out.json
     and held-out.md, live held-out-live.json and held-out-live.md, in the run folder."""
@@ -67,6 +69,9 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
+        if self.room.live and (self.goals is not None or self._is_generalist()):
+            self._at_goals_live()
+            return
         if self.goals is not None:
             self._at_goals(self.goals)
             return
@@ -103,19 +108,7 @@ class Evaluate:
         from clearway.api.goals import STEP_LIMIT, TAKES
         from clearway.cli.goals import evaluate_at_goals
 
-        given = {
-            "--live": self.room.live,
-            "--light and the other flags of --live": self.room != Live(),
-            "--beside": self.beside,
-            "--targets": self.targets,
-            "--pictures": self.pictures,
-            "--held-out": self.held_out,
-            "--episodes": self.episodes,
-        }
-        if asked := [option for option, value in given.items() if value]:
-            raise ClearwayError(
-                f"{asked[0]}: not with --goals, which walks once to each goal. Leave one of the two out"
-            )
+        self._check_goals_alone({"--light and the other flags of --live": self.room != Live()})
         if self.takes is not None and not self.perturb:
             raise ClearwayError("--takes: without --perturb a pose has one picture. Add --perturb")
         evaluate_at_goals(
@@ -130,6 +123,51 @@ class Evaluate:
             tour=self.tour,
             json=self.json,
         )
+
+    def _at_goals_live(self) -> None:
+        from clearway.api.goals import GOALS, STEP_LIMIT
+        from clearway.cli.goals import evaluate_at_goals_live
+
+        self.room.check()
+        given = {
+            "--against": self.room.against,
+            "--selection": self.room.selection != Live().selection,
+            "--checkpoint": self.checkpoint,
+        }
+        self._check_goals_alone(given)
+        if self.perturb or self.takes is not None:
+            option = "--perturb" if self.perturb else "--takes"
+            raise ClearwayError(f"{option}: walks on the grid. Leave it out: --live has a flag for each perturbation")
+        evaluate_at_goals_live(
+            self.folder,
+            self.files + self.scenes,
+            self.room,
+            goals=_or(self.goals, GOALS),
+            step_limit=_or(self.step_limit, STEP_LIMIT),
+            seed=self.seed,
+            tour=self.tour,
+            json=self.json,
+        )
+
+    def _check_goals_alone(self, further: dict[str, object]) -> None:
+        """Raise ClearwayError where an option is given that does not go with goals."""
+        given = {
+            **further,
+            "--beside": self.beside,
+            "--targets": self.targets,
+            "--pictures": self.pictures,
+            "--held-out": self.held_out,
+            "--episodes": self.episodes,
+        }
+        if asked := [option for option, value in given.items() if value]:
+            raise ClearwayError(
+                f"{asked[0]}: not with --goals, which walks once to each goal. Leave one of the two out"
+            )
+
+    def _is_generalist(self) -> bool:
+        from clearway.api.goals import is_generalist
+
+        return is_generalist(self.folder)
 
     def _check_file(self) -> None:
         """Raise ClearwayError where an exported agent is given with what a run folder alone can do."""
