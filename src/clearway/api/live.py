@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from clearway.api.arguments import as_path, as_seed, as_whole
@@ -14,6 +15,7 @@ from clearway.errors import ArgumentError
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built, label_of, sweep_settings
 
 if TYPE_CHECKING:
+    from clearway.agents.agent import Agent
     from clearway.agents.generalist import Generalist
     from clearway.evaluation.goals import GoalEvaluation
 
@@ -82,11 +84,8 @@ def evaluate_live(
     if sweep:
         fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)
         settings = sweep_settings(sweep, as_it_was_built(REFERENCE) if fixed else REFERENCE)
-    walker = agent
-    made = (
-        LiveTouring(agent.explorer(steps, camera=True), lambda state: walker.after(state, camera=True), steps)
-        if steps
-        else agent.behind_camera()
-    )
+    walker: Agent | LiveTouring = agent.behind_camera()
+    if steps:
+        walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
     with torch_threads(1):
-        return walk_to_goals(GENERALIST, made, found, settings, **asked, show=show)
+        return walk_to_goals(GENERALIST, walker, found, settings, **asked, show=show)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -149,7 +150,7 @@ class Evaluate:
             json=self.json,
         )
 
-    def _check_goals_alone(self, further: dict[str, object]) -> None:
+    def _check_goals_alone(self, further: Mapping[str, object]) -> None:
         """Raise ClearwayError where an option is given that does not go with goals."""
         given = {
             **further,

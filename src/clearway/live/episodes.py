@@ -223,7 +223,7 @@ def _note_arrivals(agent: Agent, walkers: Sequence[Walking], camera: Camera, mem
         walker.false_arrivals += wrongly
     there = np.flatnonzero([walker.reached for walker in walkers])
     if len(there):
-        arrived = [walkers[index] for index in there]
+        arrived = [walkers[index] for index in there.tolist()]
         decisions, _ = agent.act(shown(agent, arrived, camera), rows(memory, there))
         assert decisions.arrived is not None, "it told so before"
         for walker, told in zip(arrived, decisions.arrived.tolist(), strict=True):

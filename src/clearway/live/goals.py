@@ -100,7 +100,7 @@ def walk_to_goals(
             name,
             figures[number],
             perturbed={"label": setting.label, "perturbations": setting.perturbations.to_json()},
-            tour={"steps": agent.steps, "collisions": float(np.mean(tours[number]))} if tours[number] else None,
+            tour=_told(agent, tours[number]) if isinstance(agent, LiveTouring) else None,
         )
         for number, setting in enumerate(settings)
     ]
@@ -110,6 +110,11 @@ def _toured(touring: LiveTouring, live: LiveRoom, camera: Camera, setting: Condi
     """The agent that knows a room, and contacts of its tour."""
     tour = walk_live_tour(live, touring.explorer, camera, setting.perturbations, steps=touring.steps, seed=seed)
     return touring.after(tour.state), tour.contacts
+
+
+def _told(touring: LiveTouring, contacts: Sequence[int]) -> dict[str, float]:
+    """What tours of so many contacts each came to."""
+    return {"steps": touring.steps, "collisions": float(np.mean(contacts))}
 
 
 def _figures(table: LiveTable) -> GoalFigures:
