@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from clearway.api.evaluation import EvaluateResult, evaluate, load_agent
     from clearway.api.generation import generate
     from clearway.api.goals import evaluate_goals
+    from clearway.api.live import evaluate_live
     from clearway.api.pretraining import pretrain
     from clearway.api.scenes import build_room, encode_scenes, load_scene, load_scenes
     from clearway.api.training import TrainResult, train
@@ -59,6 +60,7 @@ _HOME = {  # of each name, in the order in which a reader meets them
     "evaluate": "clearway.api.evaluation",
     "EvaluateResult": "clearway.api.evaluation",
     "evaluate_goals": "clearway.api.goals",
+    "evaluate_live": "clearway.api.live",
     "load_agent": "clearway.api.evaluation",
     "Navigator": "clearway.deploy.navigator",
     "ClearwayError": "clearway.errors",
@@ -87,6 +89,7 @@ __all__ = [
     "encode_scenes",
     "evaluate",
     "evaluate_goals",
+    "evaluate_live",
     "generate",
     "load_agent",
     "load_scene",

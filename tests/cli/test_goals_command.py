@@ -57,7 +57,11 @@ def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_
         (("--goals", 0), ("--goals 0",)),
         (("--goals", 500), ("500 goals asked for, the largest part has",)),
         (("--goals", 5, "--episodes", 3), ("--episodes", "Leave one of the two out")),
-        (("--goals", 5, "--live"), ("--live", "Leave one of the two out")),
+        (("--goals", 5, "--live"), ("run: off the grid, generalist alone walks to goals drawn anew",)),
+        (("--goals", 5, "--live", "--against", "x"), ("--against", "Leave one of the two out")),
+        (("--goals", 5, "--live", "--selection", "argmax"), ("--selection", "Leave one of the two out")),
+        (("--goals", 5, "--live", "--light", 2), ("--light is 2, expected at most 1",)),
+        (("--goals", 5, "--live", "--takes", 3), ("--takes", "walks on the grid")),
         (("--goals", 5, "--light", 0.3), ("--light", "Leave one of the two out")),
         (("--goals", 5, "--perturb", "all"), ("grid", "there is no room to walk in: the scene comes from test")),
         (("--goals", 5, "--perturb", "fog"), ("--perturb", "fog", "Choose among none, geometry, all")),
@@ -65,6 +69,7 @@ def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_
         (("--goals", 5, "--takes", 3), ("--takes", "Add --perturb")),
         (("--perturb", "all"), ("--perturb", "goes with --goals alone")),
         (("--perturb", "all", "--live"), ("--perturb", "goes with --goals alone")),
+        (("--goals", 5, "--perturb", "all", "--live"), ("--perturb", "--live has a flag for each")),
         (("--takes", 3), ("--takes", "goes with --goals alone")),
     ],
 )
@@ -119,3 +124,23 @@ def test_rooms_that_cannot_be_made_are_one_line(clearway, run, monkeypatch, word
 def test_rooms_and_scene_files_are_not_mixed(clearway, run):
     words = ("evaluate", run / "run", run / "grid.h5", "--rooms", "validation")
     assert clearway(*words).refusal("--rooms", "grid.h5 is given too")
+
+
+def test_the_generalist_walks_off_the_grid(clearway, tmp_path):
+    words = ("--kind", "room", "--count", 1, "--split", "validation", "--size", 32, 48, "--encoder", "none")
+    made = clearway("scenes", "generate", *words, "--workers", 1, "--out", tmp_path)
+    assert made.code == 0, made
+    words = ("evaluate", "generalist", tmp_path, "--live", "--goals", 2, "--step-limit", 2)
+    (found,) = clearway(*words, "--angle-noise", 5, "--json").json["results"]
+    assert found["agent"] == "generalist" and found["perturbed"]["perturbations"]["angle_noise"] == 5
+    wanted = {"success", "success_4x", "spl", "collisions", "steps", "episodes"}
+    assert wanted <= set(found["average"]) and len(found["scenes"]) == 1 and found["average"]["episodes"] == 2
+    shown = clearway(*words, "--light", 0.3)
+    assert shown.code == 0 and "2 goals in 1 scenes" in shown.out and "light ± 30%" in shown.out, shown
+    assert max(map(len, shown.out.splitlines())) <= 80
+
+
+def test_off_the_grid_the_generalist_needs_rooms_to_walk_in(clearway, run):
+    assert clearway("evaluate", "generalist", "--live").refusal("no scenes", "Name scene files")
+    refused = clearway("evaluate", "generalist", run / "grid.h5", "--live", "--goals", 5)
+    assert refused.refusal("grid", "there is no room to walk in: the scene comes from test")

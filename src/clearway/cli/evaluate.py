@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -30,7 +31,8 @@ class Evaluate:
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """The run folder; the .onnx file of an exported agent; or, with --goals, generalist, which comes with clearway."""
+    """The run folder; the .onnx file of an exported agent; or, with --goals or --live, generalist, which comes with
+    clearway."""
     files: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Scene files or folders, as --scenes; with --goals any scenes."""
     episodes: int | None = None
@@ -51,7 +53,8 @@ class Evaluate:
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
     goals: int | None = None
     """Walk to so many goals a scene, drawn by the seed among all its poses, one episode of 500 steps each; the
-    generalist and agents of the algorithm recurrent do in any scenes with pictures."""
+    generalist and agents of the algorithm recurrent do in any scenes with pictures, the generalist with --live too
+    (by default 20)."""
     perturb: tuple[str, ...] = ()
     """With --goals: what is seen on the way is perturbed, the goals' pictures are not. all; geometry: all but light and
     pixel-noise; none; names of the perturbations below, at full strength; or NAME=STRENGTH. A later word changes an
@@ -66,7 +69,7 @@ class Evaluate:
     count: int | None = None
     """With --rooms: so many of them; by default 10."""
     tour: int = 0
-    """With --goals: steps in which an agent with a map may look around in each scene first."""
+    """With --goals: steps in which an agent with a map may look around in each scene first; live under each setting."""
     held_out: bool = False
     """Evaluate at five targets a scene that trainings in generated rooms and flats leave out, and leave held-out.json
     and held-out.md, live held-out-live.json and held-out-live.md, in the run folder."""
@@ -76,6 +79,9 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
+        if self.room.live and (self.goals is not None or self._is_generalist()):
+            self._at_goals_live()
+            return
         if self.goals is not None or self.rooms is not None:
             self._at_goals()
             return
@@ -114,33 +120,16 @@ class Evaluate:
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
         from clearway.api.goals import GOALS, STEP_LIMIT, TAKES
-        from clearway.cli.goals import evaluate_at_goals, generated
+        from clearway.cli.goals import evaluate_at_goals
 
-        given = {
-            "--live": self.room.live,
-            "--light and the other flags of --live": self.room != Live(),
-            "--beside": self.beside,
-            "--targets": self.targets,
-            "--pictures": self.pictures,
-            "--held-out": self.held_out,
-            "--episodes": self.episodes,
-        }
-        if asked := [option for option, value in given.items() if value]:
-            option = "--rooms" if self.goals is None else "--goals"
-            raise ClearwayError(
-                f"{asked[0]}: not with {option}, which walks once to each goal. Leave one of the two out"
-            )
+        self._check_goals_alone({"--light and the other flags of --live": self.room != Live()})
         if self.takes is not None and not self.perturb:
             raise ClearwayError("--takes: without --perturb a pose has one picture. Add --perturb")
-        goals, files = as_whole("goals", _or(self.goals, GOALS), 1), self.files + self.scenes
-        if self.rooms is not None:
-            if files:
-                raise ClearwayError(f"--rooms: makes rooms of its own, and {files[0]} is given too. Leave one out")
-            files = tuple(generated(self.rooms, self.kind or "room", _or(self.count, ROOMS)))
+        goals = as_whole("goals", _or(self.goals, GOALS), 1)
         evaluate_at_goals(
             self.folder,
             self.checkpoint,
-            files,
+            self._scenes_of_goals(),
             goals=goals,
             step_limit=_or(self.step_limit, STEP_LIMIT),
             seed=self.seed,
@@ -149,6 +138,63 @@ class Evaluate:
             tour=self.tour,
             json=self.json,
         )
+
+    def _at_goals_live(self) -> None:
+        from clearway.api.goals import GOALS, STEP_LIMIT
+        from clearway.cli.goals import evaluate_at_goals_live
+
+        self.room.check()
+        given = {
+            "--against": self.room.against,
+            "--selection": self.room.selection != Live().selection,
+            "--checkpoint": self.checkpoint,
+        }
+        self._check_goals_alone(given)
+        if self.perturb or self.takes is not None:
+            option = "--perturb" if self.perturb else "--takes"
+            raise ClearwayError(f"{option}: walks on the grid. Leave it out: --live has a flag for each perturbation")
+        evaluate_at_goals_live(
+            self.folder,
+            self._scenes_of_goals(),
+            self.room,
+            goals=_or(self.goals, GOALS),
+            step_limit=_or(self.step_limit, STEP_LIMIT),
+            seed=self.seed,
+            tour=self.tour,
+            json=self.json,
+        )
+
+    def _scenes_of_goals(self) -> tuple[Path, ...]:
+        """The scene files given, or the generated rooms asked for."""
+        from clearway.cli.goals import generated
+
+        files = self.files + self.scenes
+        if self.rooms is None:
+            return files
+        if files:
+            raise ClearwayError(f"--rooms: makes rooms of its own, and {files[0]} is given too. Leave one out")
+        return tuple(generated(self.rooms, self.kind or "room", _or(self.count, ROOMS)))
+
+    def _check_goals_alone(self, further: Mapping[str, object]) -> None:
+        """Raise ClearwayError where an option is given that does not go with goals."""
+        given = {
+            **further,
+            "--beside": self.beside,
+            "--targets": self.targets,
+            "--pictures": self.pictures,
+            "--held-out": self.held_out,
+            "--episodes": self.episodes,
+        }
+        if asked := [option for option, value in given.items() if value]:
+            option = "--rooms" if self.goals is None and self.rooms is not None else "--goals"
+            raise ClearwayError(
+                f"{asked[0]}: not with {option}, which walks once to each goal. Leave one of the two out"
+            )
+
+    def _is_generalist(self) -> bool:
+        from clearway.api.goals import is_generalist
+
+        return is_generalist(self.folder)
 
     def _check_file(self) -> None:
         """Raise ClearwayError where an exported agent is given with what a run folder alone can do."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, stdout_console
+from clearway.cli.live import Live, status_line
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
@@ -16,6 +17,13 @@ if TYPE_CHECKING:
     from clearway.evaluation.goals import GoalEvaluation
 
 NUMBERS = ("collisions", "steps")  # figures that are no shares
+SETTING_WIDTH = 16
+LIVE_HEADINGS = {
+    "success_4x": "within\n4 x",
+    "collisions": "contacts",
+    "false_arrivals": "false\narrivals",
+    "missed_arrivals": "missed\narrivals",
+}
 
 
 def evaluate_at_goals(
@@ -60,6 +68,64 @@ def generated(split: SplitName, kind: PlanKind, count: int) -> list[Path]:
     from clearway.api.generation import generate
 
     return generate(kind, count, split=split, encoder="none", show_progress=True)
+
+
+def evaluate_at_goals_live(
+    agent: Path,
+    files: Sequence[Path],
+    options: Live,
+    *,
+    goals: int,
+    step_limit: int,
+    seed: int,
+    tour: int,
+    json: bool,
+) -> None:
+    """Walk off the grid to goals drawn in some scene files, and print what came of it under each setting."""
+    from clearway.api.live import evaluate_live
+
+    if not files:
+        raise ClearwayError("--live: no scenes. Name scene files behind the agent")
+    with status_line() as show:
+        found = evaluate_live(
+            str(agent),
+            scene_files(files),
+            goals=goals,
+            step_limit=step_limit,
+            seed=seed,
+            perturb=options.perturbations,
+            sweep=options.strengths if options.sweep else (),
+            tour=tour,
+            show=show,
+        )
+    if json:
+        print_json({"results": [one.to_json() for one in found]})
+        return
+    stdout_console().print(_live_table(found))
+
+
+def _live_table(found: Sequence[GoalEvaluation]) -> object:
+    """A row a setting: means over scenes, and success as a share of that of the first one."""
+    from rich.table import Table
+
+    average = found[0].average
+    title = f"{found[0].agent} off the grid: {average.episodes} goals in {len(found[0].scenes)} scenes"
+    if (tour := found[0].tour) is not None:
+        title += f", after tours of {tour['steps']} steps"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("", width=SETTING_WIDTH)
+    names = [name for name, value in asdict(average).items() if name != "episodes" and value is not None]
+    for name in names:
+        table.add_column(LIVE_HEADINGS.get(name, name), justify="right")
+    if len(found) > 1:
+        table.add_column("of\nfirst", justify="right")
+    for one in found:
+        told = asdict(one.average)
+        cells = [_cell(name, told[name]) for name in names]
+        if len(found) > 1:
+            cells.append(_cell("", told["success"] / average.success if average.success else None))
+        table.add_row(str((one.perturbed or {})["label"]), *cells)
+    return table
 
 
 def _table(found: Sequence[GoalEvaluation]) -> object:

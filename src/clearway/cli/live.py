@@ -12,7 +12,7 @@ from clearway.choices import HELD_OUT
 from clearway.cli.arguments import check_at_least, check_finite, check_positive, check_seeds, scene_files
 from clearway.cli.console import print_json, say, say_held_out, stderr_console, stdout_console
 from clearway.errors import ClearwayError
-from clearway.live.conditions import MOST, REARRANGING, REFERENCE, Perturbations
+from clearway.live.conditions import MOST, REARRANGING, REFERENCE, Perturbations, as_it_was_built
 
 if TYPE_CHECKING:
     from clearway.learn.load import TrainedNetwork
@@ -106,7 +106,7 @@ def evaluate_live(
     with stages(agents, scenes, targets) as places:
         settings = sweep_settings(options.strengths, _reference(places)) if options.sweep else [one]
         outcomes: list[LiveOutcome] = []
-        with _status() as show:
+        with status_line() as show:
             show("on the grid")
             report = LiveReport((), walk_on_grid(agents, scenes, targets, protocol), targets, protocol, encoder)
             for setting in settings:
@@ -128,7 +128,7 @@ def _reference(places: list[LiveScene]) -> Perturbations:
     if not fixed:
         return REFERENCE
     say(f"the sweep leaves out {' and '.join(REARRANGING)}: nothing can be moved in the MuJoCo model of {fixed[0]}")
-    return replace(REFERENCE, **{name: type(getattr(REFERENCE, name))() for name in REARRANGING})
+    return as_it_was_built(REFERENCE)
 
 
 def _draw(folder: Path, places: list[LiveScene], outcomes: list[LiveOutcome]) -> None:
@@ -155,7 +155,7 @@ def _check_rooms_can_be_built() -> None:
 
 
 @contextmanager
-def _status() -> Iterator[Callable[[str], None]]:
+def status_line() -> Iterator[Callable[[str], None]]:
     """A line on standard error that says what goes on, if it is a terminal."""
     console = stderr_console()
     if not console.is_terminal:

@@ -1,1 +1,1 @@
-"""Trained agents off the grid: in the room itself, with a continuous pose, live pictures and MuJoCo's contacts."""
+"""Agents off the grid: in the room itself, with a continuous pose, live pictures and MuJoCo's contacts."""

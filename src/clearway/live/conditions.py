@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 
@@ -72,6 +72,11 @@ MOST = {
 
 REARRANGING = ("move_furniture", "new_obstacle")
 """Of these, what changes where things stand: there is nothing to move in MuJoCo models of others."""
+
+
+def as_it_was_built(perturbations: Perturbations) -> Perturbations:
+    """The same, but everything stands where it stood."""
+    return replace(perturbations, **{name: type(getattr(perturbations, name))() for name in REARRANGING})
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.agents.agent import FEATURES, Agent, Observation, rows
+from clearway.agents.agent import FEATURES, Agent, Observation, State, rows
 from clearway.agents.selection import Argmax
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds
@@ -59,6 +59,9 @@ class LiveTable:
         changed: (N,) bool, the room was arranged otherwise than it was built.
         layouts: of every episode.
         walks: of every episode, (T + 1, 3): x, z, heading in degrees.
+        false_arrivals: (N,) int64, steps at which the agent held wrongly that it was at the target; None where it says
+            nothing of it.
+        told_arrival: (N,) bool, it held so where it was; None likewise.
     """
 
     target: np.ndarray
@@ -75,6 +78,8 @@ class LiveTable:
     changed: np.ndarray
     layouts: tuple[Arrangement, ...]
     walks: tuple[np.ndarray, ...]
+    false_arrivals: np.ndarray | None = None
+    told_arrival: np.ndarray | None = None
 
     def __len__(self) -> int:
         """N."""
@@ -129,29 +134,36 @@ def run_live_episodes(
     env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
     env.reset(target=target)
     walkers = [
-        _Walker(live, int(start), int(world.target_state[goal]), Draws(int(seed), perturbations))
+        Walking(live, int(start), int(world.target_state[goal]), Draws(int(seed), perturbations))
         for start, goal, seed in zip(env.state, target, seeds, strict=True)
     ]
     agent = Argmax(agent) if protocol.selection == "argmax" else agent
     walking = np.arange(len(walkers))
     memory = agent.reset(_wanted(live, world, target), seeds.numpy())
     for _ in range(protocol.step_limit):
-        seen = {RGB: _seen([walkers[episode] for episode in walking], camera)} if RGB in agent.sees else {}
-        decisions, memory = agent.act(seen, memory)
+        decisions, memory = agent.act(shown(agent, [walkers[episode] for episode in walking], camera), memory)
         for episode, action in zip(walking, decisions.action.tolist(), strict=True):
             walkers[episode].act(Action(action))
         still = np.array([not walkers[episode].reached for episode in walking])
+        if decisions.arrived is not None:
+            _note_arrivals(agent, [walkers[episode] for episode in walking], camera, memory, decisions.arrived)
         walking, memory = walking[still], rows(memory, still)
         if show_steps is not None:
             show_steps(len(walking))
         if not len(walking):
             break
     distance = world.distance_table()[target, env.state].numpy()
-    return _table(walkers, target.numpy(), distance)
+    return _table(walkers, target.numpy(), distance, tells_arrivals=decisions.arrived is not None)
 
 
-class _Walker:
-    """One episode: the body in its layout of the room, and what has happened so far."""
+class Walking:
+    """One episode: the body in its layout of the room, and what has happened so far.
+
+    Args:
+        live: the room.
+        start, target: states of its scene.
+        draws: the chances of the episode.
+    """
 
     def __init__(self, live: LiveRoom, start: int, target: int, draws: Draws) -> None:
         scene = live.scene
@@ -163,6 +175,7 @@ class _Walker:
         self.changed = self.layout != live.as_built()
         self.steps: list[Motion] = []
         self.walk = [self.walker.pose]
+        self.false_arrivals, self.told_arrival = 0, False
 
     def act(self, action: Action) -> None:
         """Take a step."""
@@ -199,13 +212,31 @@ def _wanted(live: LiveRoom, world: World, target: Tensor) -> Observation:
     return found
 
 
-def _seen(walkers: Sequence[_Walker], camera: Camera) -> np.ndarray:
+def shown(agent: Agent, walkers: Sequence[Walking], camera: Camera) -> Observation:
+    """What an agent is given to see of its episodes (B)."""
+    return {RGB: _seen(walkers, camera)} if RGB in agent.sees else {}
+
+
+def _note_arrivals(agent: Agent, walkers: Sequence[Walking], camera: Camera, memory: State, held: np.ndarray) -> None:
+    """Count what an agent held (B,) bool before the step, nobody being at the target, and ask who is there now."""
+    for walker, wrongly in zip(walkers, held.tolist(), strict=True):
+        walker.false_arrivals += wrongly
+    there = np.flatnonzero([walker.reached for walker in walkers])
+    if len(there):
+        arrived = [walkers[index] for index in there.tolist()]
+        decisions, _ = agent.act(shown(agent, arrived, camera), rows(memory, there))
+        assert decisions.arrived is not None, "it told so before"
+        for walker, told in zip(arrived, decisions.arrived.tolist(), strict=True):
+            walker.told_arrival = told
+
+
+def _seen(walkers: Sequence[Walking], camera: Camera) -> np.ndarray:
     """Pictures (B, height, width, 3) uint8 of what each sees."""
     pictures = camera([walker.shot() for walker in walkers])
     return np.stack([walker.draws.seen(picture) for walker, picture in zip(walkers, pictures, strict=True)])
 
 
-def _table(walkers: list[_Walker], target: np.ndarray, distance: np.ndarray) -> LiveTable:
+def _table(walkers: list[Walking], target: np.ndarray, distance: np.ndarray, *, tells_arrivals: bool) -> LiveTable:
     gaps_m = [np.concatenate([step.gaps_m for step in walker.steps]) for walker in walkers]
     sample_s = STEP_S / SAMPLES
     return LiveTable(
@@ -223,4 +254,6 @@ def _table(walkers: list[_Walker], target: np.ndarray, distance: np.ndarray) -> 
         changed=np.array([walker.changed for walker in walkers]),
         layouts=tuple(walker.layout for walker in walkers),
         walks=tuple(np.array(walker.walk) for walker in walkers),
+        false_arrivals=np.array([walker.false_arrivals for walker in walkers]) if tells_arrivals else None,
+        told_arrival=np.array([walker.told_arrival for walker in walkers]) if tells_arrivals else None,
     )

@@ -1,0 +1,91 @@
+"""`evaluate_live`: the generalist off the grid, at goals drawn anew in any rooms."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from clearway.api.arguments import as_path, as_seed, as_whole
+from clearway.api.goals import GOALS, STEP_LIMIT, is_generalist
+from clearway.api.scenes import Scenes, load_scenes
+from clearway.api.takes import Perturbed, perturbations_asked
+from clearway.errors import ArgumentError
+from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built, label_of, sweep_settings
+
+if TYPE_CHECKING:
+    from clearway.agents.agent import Agent
+    from clearway.agents.generalist import Generalist
+    from clearway.evaluation.goals import GoalEvaluation
+
+
+def evaluate_live(
+    agent: str | os.PathLike[str] | Generalist,
+    scenes: Scenes,
+    *,
+    goals: int = GOALS,
+    step_limit: int = STEP_LIMIT,
+    seed: int = 0,
+    perturb: Perturbed = "none",
+    sweep: tuple[float, ...] = (),
+    tour: int = 0,
+    show: Callable[[str], None] = lambda text: None,
+) -> list[GoalEvaluation]:
+    """Walk off the grid to goals drawn in some rooms, one episode a goal: at any place and heading, by live pictures.
+
+    Goals and starts are those of `evaluate_goals`. A goal is reached within 25 cm and 45 degrees of its pose;
+    `collisions` are moves that ended at an obstacle.
+
+    Args:
+        agent: "generalist", which comes with clearway, or a `Generalist`.
+        scenes: files, folders of them, or scenes, with pictures, of rooms that can be built again.
+        goals: of each scene, distinct poses of its largest part.
+        step_limit: steps after which an episode has failed.
+        seed: of goals, starts and chances.
+        perturb: what is changed, as of `evaluate_goals`.
+        sweep: instead of `perturb`, nothing changed, each perturbation alone and all together, at each of these
+            strengths, shares of the full ones. Nothing is moved where a scene is a MuJoCo model of others.
+        tour: steps in which the agent looks around in each room first, as it was built, but with what `perturb` does to
+            moves and pictures.
+        show: is told what goes on, a line each time.
+
+    Returns:
+        How it did under each setting, named by `perturbed["label"]`; one where there is no sweep.
+
+    Raises:
+        ArgumentError: an argument is of the wrong kind or out of range.
+        ClearwayError: a scene has no room that can be built again, no pictures, too few poses, or other steps and turns
+            than the agent.
+    """
+    from clearway.agents.generalist import GENERALIST, Generalist, check_steps
+    from clearway.live.goals import LiveTouring, walk_to_goals
+    from clearway.live.live_room import MODEL_SOURCE
+    from clearway.torch_threads import torch_threads
+
+    asked = {
+        "goals": as_whole("goals", goals, 1),
+        "step_limit": as_whole("step_limit", step_limit, 1),
+        "seed": as_seed("seed", seed),
+    }
+    steps = as_whole("tour", tour, 0)
+    perturbations = perturbations_asked(perturb)
+    if sweep and perturbations != Perturbations():
+        raise ArgumentError("sweep sets the perturbations itself. Leave perturb out")
+    if isinstance(agent, str | os.PathLike) and is_generalist(as_path("agent", agent)):
+        agent = Generalist.shipped()
+    if not isinstance(agent, Generalist):
+        problem = f"{agent!s:.80}: off the grid, {GENERALIST} alone walks to goals drawn anew"
+        raise ArgumentError(f"{problem}. Evaluate a run at its targets: clearway evaluate RUN --live, without --goals")
+    found = load_scenes(scenes)
+    for scene in found:
+        check_steps(scene)
+    settings = [Condition(label_of(perturbations), perturbations)]
+    if sweep:
+        fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)
+        settings = sweep_settings(sweep, as_it_was_built(REFERENCE) if fixed else REFERENCE)
+    walker: Agent | LiveTouring = agent.behind_camera()
+    if steps:
+        walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
+    with torch_threads(1):
+        return walk_to_goals(GENERALIST, walker, found, settings, **asked, show=show)

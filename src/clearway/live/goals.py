@@ -1,0 +1,137 @@
+"""Walks off the grid to goals drawn anew in any rooms, by an agent that is bound to none.
+
+Goals and starts are those of `evaluation.goals`, an episode to each; a goal is reached as any live target is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from clearway.agents.agent import Agent, State
+from clearway.evaluation.goals import GoalEvaluation, GoalFigures, drawn_goals
+from clearway.evaluation.metrics import SC_DETOUR
+from clearway.live.conditions import Condition
+from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
+from clearway.live.live_room import LiveRoom, check_is_room, live_room
+from clearway.live.tours import walk_live_tour
+from clearway.rooms.detail import taken_fast
+from clearway.rooms.render import Camera, studio
+from clearway.scenes.scene import Scene
+from clearway.scenes.sensors import RGB
+from clearway.world.world import make_world
+
+
+@dataclass(frozen=True)
+class LiveTouring:
+    """How an agent is made by a tour.
+
+    Attributes:
+        explorer: who walks the tour, by colour pictures.
+        after: makes the agent, by the explorer's state at the end of a tour.
+        steps: of the tour.
+    """
+
+    explorer: Agent
+    after: Callable[[State], Agent]
+    steps: int
+
+
+def walk_to_goals(
+    name: str,
+    agent: Agent | LiveTouring,
+    scenes: Sequence[Scene],
+    settings: Sequence[Condition],
+    *,
+    goals: int,
+    step_limit: int,
+    seed: int,
+    show: Callable[[str], None] = lambda text: None,
+) -> list[GoalEvaluation]:
+    """How an agent does under each setting; collisions are contacts.
+
+    Args:
+        name: of the agent.
+        agent: who walks, by colour pictures; or how it is made in each scene and setting, by a tour of its own.
+        scenes: with colour pictures, of rooms that can be built again; distinct names.
+        settings: what is changed.
+        goals: of each scene.
+        step_limit: steps after which an episode has failed.
+        seed: of goals, starts and chances.
+        show: is told what goes on.
+
+    Raises:
+        SceneError: a scene has no pictures, fewer poses than goals, or no room that can be built again; or nothing can
+            be moved in it.
+        AgentError: the agent sees something else than colour pictures.
+    """
+    wanted = {}
+    for scene in scenes:  # before what takes long
+        check_is_room(scene)
+        scene.seen_by(RGB)
+        wanted[scene.name] = drawn_goals(scene, goals, seed)
+    figures: list[dict[str, GoalFigures]] = [{} for _ in settings]
+    tours: list[list[int]] = [[] for _ in settings]
+    protocol = LiveProtocol(1, step_limit, seed, "sampled")
+    for scene in scenes:
+        show(f"building {scene.name}")
+        live = live_room(scene)
+        world = make_world([scene], {scene.name: wanted[scene.name]})
+        height_px, width_px = scene.seen_by(RGB).shape[1:3]
+        lens = live.lens(height_px, width_px, fast=taken_fast(scene.made_by.notes))
+        with studio(live.model, lens) as camera:
+            for number, setting in enumerate(settings):
+                here = f"{setting.label}: {name} in {scene.name}"
+                show(here)
+                walker = agent
+                if isinstance(walker, LiveTouring):
+                    walker, contacts = _toured(walker, live, camera, setting, seed)
+                    tours[number].append(contacts)
+
+                def walking(count: int, here: str = here) -> None:
+                    show(f"{here}, {count} episodes walking")
+
+                table = run_live_episodes(live, world, walker, camera, setting.perturbations, protocol, walking)
+                figures[number][scene.name] = _figures(table)
+    return [
+        GoalEvaluation(
+            name,
+            figures[number],
+            perturbed={"label": setting.label, "perturbations": setting.perturbations.to_json()},
+            tour=_told(agent, tours[number]) if isinstance(agent, LiveTouring) else None,
+        )
+        for number, setting in enumerate(settings)
+    ]
+
+
+def _toured(touring: LiveTouring, live: LiveRoom, camera: Camera, setting: Condition, seed: int) -> tuple[Agent, int]:
+    """The agent that knows a room, and contacts of its tour."""
+    tour = walk_live_tour(live, touring.explorer, camera, setting.perturbations, steps=touring.steps, seed=seed)
+    return touring.after(tour.state), tour.contacts
+
+
+def _told(touring: LiveTouring, contacts: Sequence[int]) -> dict[str, float]:
+    """What tours of so many contacts each came to."""
+    return {"steps": touring.steps, "collisions": float(np.mean(contacts))}
+
+
+def _figures(table: LiveTable) -> GoalFigures:
+    """Means over episodes."""
+    success_4x = table.reached & (table.steps <= SC_DETOUR * table.shortest_path_steps)
+    spl = table.reached * table.shortest_path_steps / np.maximum(table.steps, table.shortest_path_steps)
+    false, missed = None, None
+    if table.false_arrivals is not None and table.told_arrival is not None:
+        false = float((table.false_arrivals > 0).mean())
+        missed = float(1 - table.told_arrival[table.reached].mean()) if table.reached.any() else None
+    return GoalFigures(
+        success=float(table.reached.mean()),
+        success_4x=float(success_4x.mean()),
+        spl=float(spl.mean()),
+        collisions=float(table.contacts.mean()),
+        steps=float(table.steps.mean()),
+        episodes=len(table),
+        false_arrivals=false,
+        missed_arrivals=missed,
+    )

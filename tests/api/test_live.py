@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import clearway
+from clearway import evaluate_live
+from clearway.agents.generalist import Generalist
+from clearway.errors import ArgumentError, SceneError
+from clearway.live import goals
+from clearway.live.conditions import REFERENCE, Perturbations
+from clearway.perception import eyes
+from clearway.perception.eyes import write_eyes
+from clearway.scenes.scene import Provenance
+from helpers.made import corridor_scene, grid_scene
+from helpers.small_eyes import small_eyes
+from helpers.small_live import walkable_live
+
+
+@pytest.fixture(scope="module")
+def live():
+    return walkable_live()
+
+
+@pytest.fixture(scope="module")
+def agent(tmp_path_factory) -> Generalist:
+    """The generalist, behind eyes that have learnt nothing."""
+    folder = tmp_path_factory.mktemp("eyes")
+    write_eyes(folder, small_eyes(), {})
+    return Generalist(eyes.from_record(eyes.find_record(str(folder))))
+
+
+@pytest.fixture
+def walkable(live, monkeypatch):
+    monkeypatch.setattr(goals, "live_room", lambda scene: live)
+    return live.scene
+
+
+def test_it_walks_off_the_grid_and_a_seed_repeats(agent, walkable):
+    settings = {"goals": 3, "step_limit": 4}
+    (told,) = evaluate_live(agent, walkable, perturb="angle-noise=3", **settings)
+    assert told.agent == "generalist" and told.perturbed["label"] == "turn ± 3°"
+    assert told.average.episodes == 3 and told.average.false_arrivals is not None
+    (again,) = evaluate_live(agent, walkable, perturb=Perturbations(angle_noise=3.0), **settings)
+    assert again.to_json() == told.to_json()
+    said = []
+    (toured,) = evaluate_live(agent, walkable, tour=5, show=said.append, **settings)
+    assert toured.tour is not None and toured.tour["steps"] == 5
+    assert said[0] == "building walkable" and said[1] == "none: generalist in walkable"
+
+
+@pytest.mark.slow
+def test_a_sweep_walks_every_setting(agent, walkable):
+    found = evaluate_live(agent, walkable, goals=2, step_limit=2, sweep=(1.0,))
+    labels = [one.perturbed["label"] for one in found]
+    assert len(labels) == 10 and labels[0] == "none" and labels[-1] == "all, strength 1"
+    assert found[-1].perturbed["perturbations"] == REFERENCE.to_json()
+
+
+def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
+    monkeypatch.setattr(Generalist, "shipped", classmethod(lambda kind: agent))
+    with pytest.raises(SceneError, match=r"grid: there is no room to walk in: the scene comes from test"):
+        evaluate_live("generalist", grid_scene(1), goals=2)
+    long = replace(corridor_scene(5), cell_size_m=0.25)
+    for walk in (evaluate_live, clearway.evaluate_goals):
+        with pytest.raises(SceneError, match=r"corridor: moves of 0\.25 m and turns of 90 degrees, and the generalist"):
+            walk("generalist", long, goals=2)
+    built = replace(corridor_scene(5), made_by=Provenance("room", room="bathroom", seed=0), observations=None)
+    with pytest.raises(SceneError, match="corridor: has no pictures"):
+        evaluate_live("generalist", built, goals=2)
+    with pytest.raises(ArgumentError, match=r"runs/x: off the grid, generalist alone walks to goals"):
+        evaluate_live("runs/x", corridor_scene(5))
+    with pytest.raises(ArgumentError, match="sweep sets the perturbations itself"):
+        evaluate_live("generalist", corridor_scene(5), perturb="all", sweep=(1.0,))
