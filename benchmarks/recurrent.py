@@ -204,12 +204,16 @@ def main() -> None:
         paid = OURS.trainer(world, COLLISION_AWARE, 0)
         assert isinstance(taught, RecurrentTrainer) and isinstance(paid, RecurrentTrainer)
         rates: dict[str, list[float]] = {}
+
+        def keep(name: str, rate: float) -> None:
+            rates.setdefault(name, []).append(rate)
+            print(f"{name}: {rate:,.0f} frames/s", flush=True)
+
         for _ in range(ROUNDS):
-            rates.setdefault("ours", []).append(our_rate(paid, asked.seconds))
-            rates.setdefault("ours, taught", []).append(our_rate(taught, asked.seconds))
+            keep("ours", our_rate(paid, asked.seconds))
+            keep("ours, taught", our_rate(taught, asked.seconds))
             for envs, steps in THEIRS:
-                name = f"RecurrentPPO, {envs} x {steps}"
-                rates.setdefault(name, []).append(their_rate(world, paid, envs, steps, asked.seconds))
+                keep(f"RecurrentPPO, {envs} x {steps}", their_rate(world, paid, envs, steps, asked.seconds))
     medians = {name: statistics.median(found) for name, found in rates.items()}
     best = max(rate for name, rate in medians.items() if name.startswith("RecurrentPPO"))
     told = {
@@ -222,7 +226,7 @@ def main() -> None:
     }
     asked.out.write_text(json.dumps(told, indent=1) + "\n")
     for name, rate in medians.items():
-        print(f"{name}: {rate:,.0f} frames/s")
+        print(f"median, {name}: {rate:,.0f} frames/s")
     print(f"ours by the best of theirs: {told['ours_by_theirs']:.1f}")
     print(told["memory"])
 
