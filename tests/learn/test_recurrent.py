@@ -15,7 +15,7 @@ from clearway.learn.load import load_agent
 from clearway.learn.recurrent import Recurrent
 from clearway.learn.recurrent_trainer import RecurrentTrainer
 from clearway.learn.train import RunRequest, train
-from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, RecurrentShape, SeenPairs, last_step
+from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, RecurrentShape, SeenPairs, last_step, likeness
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
@@ -86,18 +86,84 @@ def test_the_agent_says_in_an_episode_what_the_network_said_in_training(world: W
     tensors = {**trainer.tensors(), **trainer.fixed_tensors()}
     agent = LEARNER.agent(None, tensors, 0).on_poses(world)  # type: ignore[arg-type]  # no run, no record
     assert world.features is not None
-    target, hidden, last = world.features[[8, 22]], torch.zeros(2, 16), torch.zeros(2, LAST_COUNT)
-    state = agent.reset({FEATURES: target.numpy()}, np.array([3, 4]))
-    path = [world.features[poses] for poses in ([0, 30], [4, 30], [5, 34])]
+    target, hidden, last = torch.tensor([1, 3]), torch.zeros(2, 16), torch.zeros(2, LAST_COUNT)
+    state = agent.reset({FEATURES: world.features[world.target_state[target]].numpy()}, np.array([3, 4]))
+    own = torch.zeros(2, dtype=torch.int64)
+    path = [torch.tensor(poses) for poses in ([0, 30], [4, 30], [8, 34], [8, 42])]  # the first arrives
     for seen, onward in zip(path, [*path[1:], path[-1]], strict=True):
         with torch.no_grad():
-            said = trainer.network(trainer.pairs(seen, target), last, hidden)
-        decisions, state = agent.act({FEATURES: seen.numpy()}, state)
-        np.testing.assert_allclose(decisions.probabilities, torch.softmax(said.scores, 1).numpy(), atol=1e-5)
-        np.testing.assert_allclose(decisions.value, said.value.numpy(), atol=1e-5)
+            said = trainer.network(trainer.seen(target, seen, own), last, hidden)
+        decisions, state = agent.act({FEATURES: world.features[seen].numpy()}, state)
+        np.testing.assert_allclose(decisions.probabilities, torch.softmax(said.scores, 1).numpy(), atol=1e-3)
+        np.testing.assert_allclose(decisions.value, said.value.numpy(), atol=2e-3)
+        np.testing.assert_array_equal(decisions.arrived, said.arrived.numpy() > 0)
         hidden = said.hidden
-        last = last_step(torch.from_numpy(decisions.action), trainer.pairs.likeness(onward, seen))
-    assert trainer.pairs.likeness(world.features[[30]], world.features[[30]]).item() == pytest.approx(1)
+        last = last_step(torch.from_numpy(decisions.action), trainer.seen.likeness((onward, own), (seen, own)))
+
+
+def test_the_table_holds_what_the_eyes_compare(world: World):
+    assert world.features is not None
+    with_takes = world.with_takes([world.features[:20, None] * 0.5, world.features[20:, None] * 0.5])
+    trainer = trainer_of(with_takes)
+    target, state, take = torch.tensor([0, 2, 4, 4]), torch.tensor([3, 19, 20, 43]), torch.tensor([0, 1, 1, 0])
+    seen = torch.stack([world.features[s] * (0.5 if t else 1) for s, t in zip(state, take, strict=True)])
+    told = trainer.pairs(seen, world.features[world.target_state[target]])
+    torch.testing.assert_close(trainer.seen(target, state, take), told, rtol=2e-3, atol=2e-3)
+    alike = trainer.seen.likeness((state, take), (state, torch.zeros_like(take)))
+    torch.testing.assert_close(alike, torch.tensor([1.0, 0.5, 0.5, 1.0]), rtol=1e-3, atol=1e-3)
+    rows = 2 * (3 * 20 + 2 * 40), 2 * (20 + 40)
+    assert trainer.seen.bytes == rows[0] * 2 * trainer.pairs.count + rows[1] * 4 * 16
+
+
+def test_every_step_shows_one_of_the_takes_and_of_the_scenes_own_pictures(world: World):
+    assert world.features is not None
+    own = trainer_of(world)
+    assert own.seen.takes == 1 and not own.take.any()
+    other = trainer_of(
+        world.with_takes([world.features[:20, None].repeat(1, 2, 1), world.features[20:, None].repeat(1, 2, 1)])
+    )
+    shown = []
+    for _ in range(3):
+        other.update()
+        shown.append(other.take)
+    counts = torch.bincount(torch.cat(shown), minlength=3)
+    assert len(counts) == 3 and (counts > 5).all()
+
+
+def test_the_network_says_along_an_episode_what_it_says_step_by_step():
+    network = RecurrentActorCritic(RecurrentShape(5, 8), seed=1)
+    pairs, last, begins = torch.randn(6, 3, 5), torch.randn(6, 3, LAST_COUNT), torch.rand(6, 3) < 0.3
+    first = hidden = torch.randn(3, 8)
+    said = []
+    for step in range(6):
+        said.append(network(pairs[step], last[step], torch.where(begins[step, :, None], 0.0, hidden)))
+        hidden = said[-1].hidden
+    along = network.along(pairs, last, first, begins)
+    for name in ("scores", "value", "arrived", "hidden"):
+        torch.testing.assert_close(getattr(along, name), torch.stack([getattr(one, name) for one in said]))
+
+
+def test_a_network_that_forgets_says_the_same_whatever_went_before():
+    network = RecurrentActorCritic(RecurrentShape(5, 8, remembers=False), seed=1)
+    pairs, last = torch.randn(3, 5), torch.randn(3, LAST_COUNT)
+    one, other = network(pairs, last, torch.zeros(3, 8)), network(pairs, last, torch.randn(3, 8))
+    torch.testing.assert_close(one.scores, other.scores)
+
+
+def test_it_learns_to_say_that_it_has_arrived(tmp_path: Path):
+    world = make_world(seen_by_eyes(tmp_path / "eyes", corridor_scene(5)), {"corridor": [8, 16]})
+    learner = replace(LEARNER, frames=20_000, taught=1.0, envs=40, width=48, teacher_share=0.0)
+    learner = replace(learner, taught_lr_start=3e-3, taught_lr_end=2e-3)
+    trainer = trainer_of(world, learner)
+    said = []
+    while not trainer.finished:
+        said.append(trainer.update()["arrival_loss"])
+    assert said[-1] < 0.1 * said[0]
+    agent = learner.agent(None, {**trainer.tensors(), **trainer.fixed_tensors()}, 0).on_poses(world)  # type: ignore[arg-type]
+    table = run_episodes(world, agent, episodes_per_target=20, step_limit=200, seed=1)
+    assert table.told_arrival is not None and table.false_arrivals is not None
+    assert table.told_arrival[table.reached].mean() > 0.8
+    assert (table.false_arrivals > 0).mean() < 0.2
 
 
 def test_scenes_of_another_encoder_are_refused():
@@ -125,11 +191,12 @@ def test_pairs_are_standardised_and_kept_by_their_tensors(world: World):
     seen, target = world.features[:30], world.features[torch.arange(30) % 7]
     pairs.fit(seen, target)
     told = pairs(seen, target)
-    assert told.shape == (30, pairs.count) == (30, 16 + 5 + 1 + 4 + SMALL.grid.count)
+    assert told.shape == (30, pairs.count) == (30, 16 + 5 + 1 + 4 + 63 + SMALL.grid.count)
     np.testing.assert_allclose(told.mean(0), 0, atol=1e-4)
     again = SeenPairs.from_tensors(pairs.tensors())
     torch.testing.assert_close(again(seen, target), told, rtol=0, atol=0)
-    torch.testing.assert_close(pairs.likeness(seen, seen), torch.ones(30))
+    described = pairs.description(seen)
+    torch.testing.assert_close(likeness(described, described), torch.ones(30))
 
 
 def test_what_is_remembered_changes_what_is_said():

@@ -5,18 +5,20 @@ Axis letters: B episodes, F features, H width.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
 from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.agents.encoded import Encoded
-from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, SeenPairs, last_step
+from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, SeenPairs, last_step, likeness
 from clearway.perception.encoder import Encoder
 
 
 class RecurrentAgent:
-    """Draws its actions by a recurrent network.
+    """Draws its actions by a recurrent network, and says by it whether it has arrived.
 
     Args:
         network: the parameters.
@@ -47,11 +49,13 @@ class RecurrentAgent:
         """Actions drawn by the policy; see `Agent.act`."""
         seen = self._features(observation)
         now, target, before = (torch.from_numpy(features) for features in (seen, state["target"], state["seen"]))
-        last = last_step(torch.from_numpy(state["action"]), self._pairs.likeness(now, before))
+        alike = likeness(self._pairs.description(now), self._pairs.description(before))
+        last = last_step(torch.from_numpy(state["action"]), alike)
         last = torch.where(torch.from_numpy(state["begun"])[:, None], last, torch.zeros(LAST_COUNT))
         said = self._network(self._pairs(now, target), last, torch.from_numpy(state["hidden"]))
         probabilities = torch.softmax(said.scores, dim=1, dtype=torch.float64)
         decisions, chance = drawn(probabilities.numpy(), state[CHANCE], said.value.numpy())
+        decisions = replace(decisions, arrived=said.arrived.numpy() > 0)
         after = {
             "hidden": said.hidden.numpy(),
             "begun": np.ones_like(state["begun"]),

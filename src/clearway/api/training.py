@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
@@ -30,6 +30,9 @@ from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
 from clearway.torch_threads import torch_threads
+
+if TYPE_CHECKING:
+    import numpy as np
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
 
@@ -133,6 +136,7 @@ def train(
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
+    takes = _takes(loaded, learner, number, show_progress)
     request = RunRequest(
         scenes=loaded,
         targets=chosen,
@@ -143,6 +147,7 @@ def train(
         paths=by_name(pairs),
         device=as_word("device", device),
         feature_store=store,  # type: ignore[arg-type]
+        takes=takes,
     )
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
@@ -154,6 +159,23 @@ def train(
             metrics=tuple(folder.metrics()),
             folder=None if out is None else path,
         )
+
+
+def _takes(scenes: Sequence[Scene], learner: Learner, seed: int, show_progress: bool) -> Sequence[np.ndarray] | None:
+    """Features of the perturbed pictures that a learner wants to see, (S, K, F) a scene; None: it wants none."""
+    if not learner.takes:
+        return None
+    from clearway.agents.agent import FEATURES
+    from clearway.api.takes import perturbations_asked, takes_seen
+    from clearway.live.live_room import check_is_room
+
+    for scene in scenes:  # before what takes long
+        check_is_room(scene)
+    everything = perturbations_asked("all")
+    taken = takes_seen(
+        scenes, everything, (FEATURES,), None, takes=learner.takes, seed=seed, show_progress=show_progress
+    )
+    return taken.seen[FEATURES]
 
 
 def chosen_learner(

@@ -42,6 +42,7 @@ AT_LEAST_ZERO = {
     "ratio_clip",
     "value_weight",
     "feature_basis",
+    "takes",
 }
 ZERO_TO_ONE = {"discount", "gae_lambda", "step_size", "explore_start", "explore_end"}
 BELOW_ONE = {"settle"}
@@ -85,6 +86,11 @@ class Learner:
     def history_length(self) -> int:
         """Poses that the agent knows, the present one among them."""
         return 1
+
+    @property
+    def takes(self) -> int:
+        """Perturbed pictures of every pose that training shows besides the scenes' own; 0: none."""
+        return 0
 
     @property
     def heads_by_scene(self) -> bool:

@@ -52,6 +52,11 @@ class Recurrent(Learner):
     """Steps after which a training episode is cut."""
     width: int = 256
     """Of the network."""
+    remembers: bool = True
+    """False: forget at every step what came before the last one, to see what memory brings."""
+    takes: int = 0
+    """Perturbed pictures of every pose (camera, light, furniture), of which, and of the scene's own, each step shows
+    one; the rooms must be such as can be built again."""
     discount: float = 0.99
     gae_lambda: float = 0.95
     teacher_share: float = 0.5
@@ -62,7 +67,7 @@ class Recurrent(Learner):
     lr_end: float = 3e-5
     """Adam's learning rates fall geometrically from start to end, in each part."""
     epochs: int = 2
-    """Passes over each rollout of PPO."""
+    """Passes over each rollout of PPO; where it is taught there is one."""
     minibatches: int = 4
     """Groups of environments in a pass."""
     ratio_clip: float = 0.2
@@ -88,6 +93,10 @@ class Recurrent(Learner):
         """Frames in which the planner teaches."""
         return round(self.taught * self.frames)
 
+    def shape(self, pair_count: int) -> RecurrentShape:
+        """Sizes of its network, for so many numbers of a pair."""
+        return RecurrentShape(pair_count, self.width, self.remembers)
+
     def trainer(self, world: World, reward: Reward, seed: int) -> RecurrentTrainer:
         """A trainer at its first frame. Raises RunError where the scenes are not seen by eyes."""
         if world.encoder is None or world.encoder.settings.get("kind") != eyes.KIND:
@@ -99,7 +108,7 @@ class Recurrent(Learner):
     def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedRecurrent:
         """The agent of a run from the tensors of its checkpoint; see `Learner.agent`."""
         pairs = SeenPairs.from_tensors(part_of(tensors, "pairs"))
-        network = RecurrentActorCritic(RecurrentShape(pairs.count, self.width))
+        network = RecurrentActorCritic(self.shape(pairs.count))
         network.load_state_dict(part_of(tensors, "network"))
         return TrainedRecurrent(record, network, pairs, frames)
 

@@ -5,12 +5,15 @@ Axis letters: T steps, N environments, D numbers of a pair, H width, A actions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import softplus
 
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import geometric, linear
@@ -20,41 +23,45 @@ from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.teacher import Teacher
-from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, RecurrentShape, SeenPairs, last_step
+from clearway.model.pair_table import FIT_PAIRS, PairTable
+from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, RecurrentOutput, SeenPairs, last_step
 from clearway.perception.eyes_network import Eyes
 from clearway.reward import Reward
-from clearway.world.navigation import Navigation, TargetChoice
+from clearway.world.navigation import Navigation, TargetChoice, Transition
 from clearway.world.streams import Streams
 from clearway.world.world import World
 
 if TYPE_CHECKING:
     from clearway.learn.recurrent import Recurrent
 
-TEACHER_STREAM, WHO_STREAM, FIT_STREAM, SHUFFLE_STREAM = 11, 12, 13, 14
-FIT_PAIRS = 4096  # by which what is seen is standardised
+FIT_STREAM, SHUFFLE_STREAM = 13, 14
+STREAMS = {"actions": ACTION_STREAM, "teacher": 11, "who": 12, "takes": 15}
 VALUE_WEIGHT = 1.0
 
 
 @dataclass(frozen=True)
 class Walked:
-    """T steps of N environments.
+    """T steps of N environments, and where targets were reached, R times.
 
     Attributes:
         pairs: (T, N, D), what was seen beside the target.
         last: (T, N, LAST_COUNT), of the step before.
         hidden: (N, H), what was remembered before the first step.
         begins: (T, N) bool, an episode begins with this step.
+        best: (T, N, A) bool, what the teacher would do.
         action, target: (T, N) int64.
         log_probability, value: (T, N), by the policy that walked.
         reward: (T, N) float32.
         reached, truncated, blocked: (T, N) bool.
         value_after: (N,), of what is seen after the last step.
+        there: (R, D + LAST_COUNT), what was seen at a target once it was reached, and of the step before.
     """
 
     pairs: Tensor
     last: Tensor
     hidden: Tensor
     begins: Tensor
+    best: Tensor
     action: Tensor
     target: Tensor
     log_probability: Tensor
@@ -64,6 +71,11 @@ class Walked:
     truncated: Tensor
     blocked: Tensor
     value_after: Tensor
+    there: Tensor
+
+
+PolicyLoss: TypeAlias = Callable[[Walked, Tensor, Tensor, Tensor], tuple[Tensor, dict[str, Tensor]]]
+"""Of what was walked, the environments (B,), log-probabilities (T, B, A) and advantages (T, B): a loss and figures."""
 
 
 class RecurrentTrainer:
@@ -86,7 +98,9 @@ class RecurrentTrainer:
         self.frames, self.updates = 0, 0
         device, count = world.device, learner.envs
         self.pairs = SeenPairs(eyes).to(device)
-        self.network = RecurrentActorCritic(RecurrentShape(self.pairs.count, learner.width), seed).to(device)
+        drawn = torch.arange(FIT_PAIRS, dtype=torch.int64, device=device) + (seed << 32)
+        self.seen = PairTable(world, self.pairs, Streams(drawn, FIT_STREAM))
+        self.network = RecurrentActorCritic(learner.shape(self.pairs.count), seed).to(device)
         self.optimiser = Adam(dict(self.network.named_parameters()))
         self.teacher = Teacher(world, reward, learner.discount)
         seeds = torch.arange(count, dtype=torch.int64, device=device) + (seed << 32)
@@ -96,14 +110,12 @@ class RecurrentTrainer:
             world, reward, seeds, choice=choice, step_limit=learner.step_limit, history_length=1
         )
         self.statistics = EpisodeStatistics(count, world.target_count, device)
-        self.streams = {
-            name: Streams(seeds, purpose)
-            for name, purpose in (("actions", ACTION_STREAM), ("teacher", TEACHER_STREAM), ("who", WHO_STREAM))
-        }
+        self.streams = {name: Streams(seeds, purpose) for name, purpose in STREAMS.items()}
         self.hidden = torch.zeros(count, learner.width, device=device)
         self.last = torch.zeros(count, LAST_COUNT, device=device)
-        self._fit()
+        self.begins = torch.ones(count, dtype=torch.bool, device=device)
         self.navigation.begin_staggered()
+        self.take = self._drawn_take()
 
     @property
     def finished(self) -> bool:
@@ -121,47 +133,24 @@ class RecurrentTrainer:
         Raises:
             RunError: the loss or a gradient is not finite.
         """
-        figures = self._be_taught() if self.is_taught else self._earn()
-        self.frames += self.learner.envs * self.learner.rollout_steps
+        learner, taught, frames = self.learner, self.learner.taught_frames, self.frames
+        if self.is_taught:
+            walked = self._walk(learner.teacher_share * (1 - frames / taught))
+            lr = geometric(learner.taught_lr_start, learner.taught_lr_end, frames, taught)
+            figures = self._learn(walked, 1, lr, self._taught_loss)
+        else:
+            walked, left = self._walk(), learner.frames - taught
+            lr = geometric(learner.lr_start, learner.lr_end, frames - taught, left)
+            entropy_weight = linear(learner.entropy_start, learner.entropy_end, frames - taught, left)
+            figures = self._learn(walked, learner.epochs, lr, partial(self._paid_loss, entropy_weight))
+        self.frames += learner.envs * learner.rollout_steps
         self.updates += 1
         check_finite(figures, self.frames)
         return figures
 
-    def _be_taught(self) -> Figures:
-        """Walk T steps and learn the teacher's actions on the way."""
-        learner, progress = self.learner, self.frames / self.learner.taught_frames
-        hidden, losses, agreements, walked = self.hidden, [], [], []
-        for _ in range(learner.rollout_steps):
-            target, state = self.navigation.target, self.navigation.state
-            best = self.teacher[target, state]
-            said = self.network(self._seen(), self.last, hidden)
-            log_probability = torch.log_softmax(said.scores, dim=1)
-            right = torch.where(best, log_probability, -torch.inf).logsumexp(dim=1)
-            losses.append(-right.mean())
-            agreements.append(right.detach().exp().mean())
-            own = sample_actions(said.scores.detach(), self.streams["actions"].uniform())
-            teachers = sample_actions(torch.where(best, 0.0, -torch.inf), self.streams["teacher"].uniform())
-            by_teacher = self.streams["who"].uniform() < learner.teacher_share * (1 - progress)
-            step = self._step(torch.where(by_teacher, teachers, own))
-            hidden = torch.where(step[2][:, None], 0.0, said.hidden)
-            walked.append((target, *step))
-        self.hidden = hidden.detach()
-        self._count(walked)
-        loss = torch.stack(losses).mean()
-        self._differentiate(loss)
-        norm = clip_gradients(self._gradients(), learner.clip_norm, each_tensor=False)
-        lr = geometric(learner.taught_lr_start, learner.taught_lr_end, self.frames, learner.taught_frames)
-        self.optimiser.step(lr)
-        agreement = torch.stack(agreements).mean()
-        return {"loss": loss.item(), "agreement": agreement.item(), "gradient_norm": norm.item(), "lr": lr}
-
-    def _earn(self) -> Figures:
-        """Walk T steps and learn from what they earned."""
+    def _learn(self, walked: Walked, epochs: int, lr: float, policy_loss: PolicyLoss) -> Figures:
+        """Passes over T steps, each in minibatches of environments; means of the figures."""
         learner = self.learner
-        before, left = learner.taught_frames, learner.frames - learner.taught_frames
-        lr = geometric(learner.lr_start, learner.lr_end, self.frames - before, left)
-        entropy_weight = linear(learner.entropy_start, learner.entropy_end, self.frames - before, left)
-        walked = self._walk()
         discount = torch.where(walked.reached | walked.truncated, 0.0, learner.discount)
         advantage = generalised_advantages(
             walked.reward, discount, walked.value, walked.value_after, learner.gae_lambda
@@ -169,122 +158,111 @@ class RecurrentTrainer:
         returns = advantage + walked.value
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-6)
         told = []
-        for epoch in range(learner.epochs):
+        for epoch in range(epochs):
             order = torch.from_numpy(self._shuffled(epoch)).to(self.world.device)
             for some in order.chunk(learner.minibatches):
-                told.append(self._improve(walked, some, advantage, returns, entropy_weight, lr))
-        means = torch.stack(told).mean(0).tolist()
-        names = ("loss", "policy_loss", "value_loss", "entropy", "gradient_norm")
-        return {**dict(zip(names, means, strict=True)), "lr": lr}
+                said = self.network.along(
+                    walked.pairs[:, some], walked.last[:, some], walked.hidden[some], walked.begins[:, some]
+                )
+                loss, parts = policy_loss(walked, some, torch.log_softmax(said.scores, dim=2), advantage[:, some])
+                parts["value_loss"] = (said.value - returns[:, some]).square().mean() / 2
+                parts["arrival_loss"] = self._arrival_loss(walked, some, said)
+                loss = loss + VALUE_WEIGHT * parts["value_loss"] + parts["arrival_loss"]
+                for parameter in self.network.parameters():
+                    parameter.grad = None
+                loss.backward()
+                norm = clip_gradients(self._gradients(), learner.clip_norm, each_tensor=False)
+                self.optimiser.step(lr)
+                told.append({"loss": loss, **parts, "gradient_norm": norm})
+        means = torch.stack([torch.stack([figures[name] for name in told[0]]).detach() for figures in told]).mean(0)
+        return {**dict(zip(told[0], means.tolist(), strict=True)), "lr": lr}
 
-    def _improve(
-        self, walked: Walked, some: Tensor, advantage: Tensor, returns: Tensor, entropy_weight: float, lr: float
-    ) -> Tensor:
-        """One step of PPO on some environments; loss, its parts, entropy and the gradient's norm, (5,)."""
-        hidden, scores, values = walked.hidden[some], [], []
-        for step in range(len(walked.pairs)):
-            hidden = torch.where(walked.begins[step, some][:, None], 0.0, hidden)
-            said = self.network(walked.pairs[step, some], walked.last[step, some], hidden)
-            hidden = said.hidden
-            scores.append(said.scores)
-            values.append(said.value)
-        log_probabilities = torch.log_softmax(torch.stack(scores), dim=2)
+    def _taught_loss(
+        self, walked: Walked, some: Tensor, log_probabilities: Tensor, advantage: Tensor
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """The policy's loss under the teacher, and its figures."""
+        right = torch.where(walked.best[:, some], log_probabilities, -torch.inf).logsumexp(dim=2)
+        return -right.mean(), {"agreement": right.exp().mean()}
+
+    def _paid_loss(
+        self, entropy_weight: float, walked: Walked, some: Tensor, log_probabilities: Tensor, advantage: Tensor
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """The policy's loss of PPO, and its figures."""
         taken = log_probabilities.gather(2, walked.action[:, some, None])[..., 0]
         ratio = (taken - walked.log_probability[:, some]).exp()
         clipped = ratio.clamp(1 - self.learner.ratio_clip, 1 + self.learner.ratio_clip)
-        gain = advantage[:, some]
-        policy_loss = -torch.minimum(ratio * gain, clipped * gain).mean()
-        value_loss = (torch.stack(values) - returns[:, some]).square().mean() / 2
+        policy_loss = -torch.minimum(ratio * advantage, clipped * advantage).mean()
         entropy = -(log_probabilities.exp() * log_probabilities).sum(dim=2).mean()
-        loss = policy_loss + VALUE_WEIGHT * value_loss - entropy_weight * entropy
-        self._differentiate(loss)
-        norm = clip_gradients(self._gradients(), self.learner.clip_norm, each_tensor=False)
-        self.optimiser.step(lr)
-        return torch.stack([loss, policy_loss, value_loss, entropy, norm]).detach()
+        return policy_loss - entropy_weight * entropy, {"policy_loss": policy_loss, "entropy": entropy}
+
+    def _arrival_loss(self, walked: Walked, some: Tensor, said: RecurrentOutput) -> Tensor:
+        """Cross-entropy of whether this is the target: at no step on the way, and where it was reached."""
+        step, env = walked.reached.nonzero(as_tuple=True)
+        place = torch.full((self.learner.envs,), -1, device=env.device)
+        place[some] = torch.arange(len(some), device=env.device)
+        row = (place[env] >= 0).nonzero()[:, 0]
+        remembered = said.hidden[step[row], place[env[row]]]
+        pairs, last = walked.there[row].tensor_split([self.pairs.count], dim=1)
+        there = self.network(pairs, last, remembered).arrived
+        total = softplus(said.arrived).sum() + softplus(-there).sum()
+        return total / (said.arrived.numel() + len(there))
 
     @torch.no_grad()
-    def _walk(self) -> Walked:
-        """T steps by the policy."""
-        rows, walked, hidden_first = [], [], self.hidden
-        begins = torch.zeros(self.learner.envs, dtype=torch.bool, device=self.world.device)
+    def _walk(self, teachers_share: float = 0.0) -> Walked:
+        """T steps by the policy, some of them by the teacher."""
+        rows, there, hidden_first = [], [], self.hidden
         for _ in range(self.learner.rollout_steps):
-            pairs, last, target = self._seen(), self.last, self.navigation.target
+            pairs, last, begins, target = self._seen(), self.last, self.begins, self.navigation.target
+            best = self.teacher[target, self.navigation.state]
             said = self.network(pairs, last, self.hidden)
             action = sample_actions(said.scores, self.streams["actions"].uniform())
+            if teachers_share > 0:
+                teachers = sample_actions(torch.where(best, 0.0, -torch.inf), self.streams["teacher"].uniform())
+                action = torch.where(self.streams["who"].uniform() < teachers_share, teachers, action)
             log_probability = torch.log_softmax(said.scores, dim=1).gather(1, action[:, None])[:, 0]
-            step = self._step(action, said.hidden)
-            rows.append((pairs, last, begins, action, target, log_probability, said.value, step[0]))
-            walked.append((target, *step))
-            begins = step[2]
-            self.hidden = torch.where(begins[:, None], 0.0, said.hidden)
+            reward, happened, arrived = self._step(action, said.hidden)
+            there.append(arrived)
+            did = (action, target, log_probability, said.value, reward)
+            rows.append((pairs, last, begins, best, *did, happened.reached, happened.truncated, happened.blocked))
         value_after = self.network(self._seen(), self.last, self.hidden).value
-        self._count(walked)
-        pairs, last, begin, action, target, log_probability, value, reward = (
-            torch.stack(part) for part in zip(*rows, strict=True)
-        )
-        _, _, reached, ended, blocked = (torch.stack(part) for part in zip(*walked, strict=True))
-        return Walked(
-            pairs=pairs,
-            last=last,
-            hidden=hidden_first,
-            begins=begin,
-            action=action,
-            target=target,
-            log_probability=log_probability,
-            value=value,
-            reward=reward,
-            reached=reached,
-            truncated=ended & ~reached,
-            blocked=blocked,
-            value_after=value_after,
-        )
+        names = [field.name for field in fields(Walked) if field.name not in ("hidden", "value_after", "there")]
+        steps = {name: torch.stack(part) for name, part in zip(names, zip(*rows, strict=True), strict=True)}
+        walked = Walked(**steps, hidden=hidden_first, value_after=value_after, there=torch.cat(there))
+        self.statistics.add(walked)
+        return walked
 
-    def _step(self, action: Tensor, hidden: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Walk one step; what it earned, and where (N,) the target was reached, the episode ended, the move blocked.
+    def _step(self, action: Tensor, remembered: Tensor) -> tuple[Tensor, Transition, Tensor]:
+        """Walk one step; what it earned (N,), what happened, and what is seen where targets were reached.
 
-        With what is remembered (N, H), episodes that are cut earn what their last pose is worth as well.
+        Episodes that are cut earn what their last pose is worth as well, by what is remembered (N, H).
         """
-        seen = self._features(self.navigation.state)
+        before = (self.navigation.state, self.take)
         step = self.navigation.step(action)
-        likeness = self.pairs.likeness(self._features(step.state), seen)
-        last, reward = last_step(action, likeness), step.reward
-        if hidden is not None and step.truncated.any():
-            worth = self.network(self._seen(), last, hidden).value
-            reward = reward + self.learner.discount * torch.where(step.truncated, worth, 0.0)
+        self.take = self._drawn_take()
+        last = last_step(action, self.seen.likeness((step.state, self.take), before))
+        reward = step.reward
+        cut, reached = (flag.nonzero()[:, 0] for flag in (step.truncated, step.reached))
+        if len(cut):
+            worth = self.network(self._seen(cut), last[cut], remembered[cut]).value
+            reward = reward.index_add(0, cut, self.learner.discount * worth)
+        there = torch.cat([self._seen(reached), last[reached]], dim=1)
         self.navigation.restart(step.ended)
         self.last = torch.where(step.ended[:, None], 0.0, last)
-        return reward, step.reached, step.ended, step.blocked
+        self.hidden = torch.where(step.ended[:, None], 0.0, remembered)
+        self.begins = step.ended
+        return reward, step, there
 
-    @torch.no_grad()
-    def _seen(self) -> Tensor:
-        """(N, D), what is seen beside the target."""
-        target = self.world.target_state[self.navigation.target]
-        return self.pairs(self._features(self.navigation.state), self._features(target))
+    def _seen(self, index: Tensor | None = None) -> Tensor:
+        """(B, D), what is seen beside the target in the environments in index (B,), all by default."""
+        rows = (self.navigation.target, self.navigation.state, self.take)
+        return self.seen(*(rows if index is None else (part[index] for part in rows)))
 
-    def _features(self, state: Tensor) -> Tensor:
-        assert self.world.features is not None
-        return self.world.features[state].float()
-
-    def _fit(self) -> None:
-        """Standardise what is seen by pairs of poses and targets drawn at random."""
-        world = self.world
-        drawn = Streams(torch.arange(FIT_PAIRS, device=world.device) + (self.seed << 32), FIT_STREAM)
-        target = (drawn.uniform() * world.target_count).long()
-        place = (drawn.uniform() * world.start_count[target]).long()
-        start = world.start_state[world.start_offset[target] + place]
-        self.pairs.fit(self._features(start), self._features(world.target_state[target]))
+    def _drawn_take(self) -> Tensor:
+        """(N,) int64, which picture of its pose every environment sees; 0 is the scene's own."""
+        return (self.streams["takes"].uniform() * self.seen.takes).long()
 
     def _shuffled(self, epoch: int) -> np.ndarray:
         return np.random.default_rng([self.seed, SHUFFLE_STREAM, self.updates, epoch]).permutation(self.learner.envs)
-
-    def _count(self, walked: list) -> None:
-        target, _, reached, ended, blocked = (torch.stack(part) for part in zip(*walked, strict=True))
-        self.statistics.add(_Counted(target, reached, ended & ~reached, blocked))
-
-    def _differentiate(self, loss: Tensor) -> None:
-        for parameter in self.network.parameters():
-            parameter.grad = None
-        loss.backward()
 
     def _gradients(self) -> list[Tensor]:
         return [parameter.grad for parameter in self.network.parameters() if parameter.grad is not None]
@@ -303,7 +281,7 @@ class RecurrentTrainer:
             "optimiser": self.optimiser.tensors(),
             "navigation": self.navigation.tensors(),
             "statistics": self.statistics.tensors(),
-            "memory": {"hidden": self.hidden, "last": self.last},
+            "memory": {"hidden": self.hidden, "last": self.last, "begins": self.begins, "take": self.take},
             "drawn": {name: stream.drawn for name, stream in self.streams.items()},
         }
         return {name: tensor.detach() for name, tensor in joined(parts).items()}
@@ -317,17 +295,8 @@ class RecurrentTrainer:
         self.optimiser.load_tensors(part_of(tensors, "optimiser"))
         self.navigation.load_tensors(part_of(tensors, "navigation"))
         self.statistics.load_tensors(part_of(tensors, "statistics"))
-        self.hidden, self.last = (tensors[f"memory.{name}"].to(here).clone() for name in ("hidden", "last"))
+        for name in ("hidden", "last", "begins", "take"):
+            setattr(self, name, tensors[f"memory.{name}"].to(here).clone())
         for name, stream in self.streams.items():
             stream.seek(tensors[f"drawn.{name}"].to(here).clone())
         self.frames, self.updates = frames, updates
-
-
-@dataclass(frozen=True)
-class _Counted:
-    """What `EpisodeStatistics` counts, (T, N) each."""
-
-    target: Tensor
-    reached: Tensor
-    truncated: Tensor
-    blocked: Tensor

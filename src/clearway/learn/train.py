@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -84,6 +85,7 @@ class RunRequest:
         paths: file of each scene by name, where it has one.
         device: torch device, for example "cpu" or "cuda".
         feature_store: where features are kept, see `clearway.world.feature_store`.
+        takes: features of so many other pictures of each scene's states as the learner wants, (S, K, F) a scene.
 
     Raises:
         RunError: the seed is out of range.
@@ -98,6 +100,7 @@ class RunRequest:
     paths: Mapping[str, Path] | None = None
     device: str = "cpu"
     feature_store: FeatureStore = "memory"
+    takes: Sequence[np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -110,7 +113,10 @@ class RunRequest:
     def trainer(self) -> Learning:
         """A trainer at its first frame."""
         device, reward = usable_device(self.device), self.paid  # before the scenes, which may take long
-        world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store).to(device)
+        world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store)
+        if self.takes is not None:
+            world = world.with_takes(self.takes)
+        world = world.to(device)
         return self.learner.trainer(world, reward, self.seed)
 
 

@@ -16,10 +16,29 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
+from clearway.perception.around import PLACES_M
 from clearway.perception.eyes_network import DIRECTIONS, Eyes, EyesShape
 from clearway.scenes.actions import ACTION_COUNT
 
 LEAST_DEVIATION = 1e-2
+
+
+class Sighted(NamedTuple):
+    """What eyes tell of pictures by themselves.
+
+    Attributes:
+        description: (B, description_width).
+        tokens: (B, T, C).
+        told: (B, 4 + 63 + T), free ways, places to stand, depth.
+    """
+
+    description: Tensor
+    tokens: Tensor
+    told: Tensor
+
+    def rows(self, index: Tensor) -> Sighted:
+        """Those of some pictures, by index."""
+        return Sighted(*(values[index] for values in self))
 
 
 class SeenPairs(nn.Module):
@@ -43,27 +62,30 @@ class SeenPairs(nn.Module):
     def count(self) -> int:
         """D."""
         shape = self.eyes.shape
-        return shape.hidden_width + 5 + 1 + DIRECTIONS + shape.grid.count
+        return shape.hidden_width + 5 + 1 + DIRECTIONS + len(PLACES_M) + shape.grid.count
 
-    def split(self, features: Tensor) -> tuple[Tensor, Tensor]:
-        """Descriptions (B, description_width) and tokens (B, T, C) of features (B, F)."""
-        shape = self.eyes.shape
-        width = shape.description_width
-        return features[:, :width], features[:, width:].unflatten(1, (shape.grid.count, shape.token_width))
+    def sight(self, features: Tensor) -> Sighted:
+        """What features (B, F) tell of pictures by themselves."""
+        description, flat = features.float().tensor_split([self.eyes.shape.description_width], dim=1)
+        tokens = flat.unflatten(1, (self.eyes.shape.grid.count, self.eyes.shape.token_width))
+        glance = self.eyes.glance(tokens)
+        return Sighted(description, tokens, torch.cat([glance.free, glance.stands, glance.depth], dim=1))
 
-    def forward(self, seen: Tensor, target: Tensor) -> Tensor:
-        """(B, D) numbers, standardised, that tell of features (B, F) of what is seen and of the target."""
-        here, tokens = self.split(seen.float())
-        there, target_tokens = self.split(target.float())
-        glance, target_glance = self.eyes.glance(tokens), self.eyes.glance(target_tokens)
-        told = self.eyes.compare(tokens, target_tokens, glance.depth, target_glance.depth)
-        alike = (here * there).sum(dim=1, keepdim=True)
-        parts = [told.vector, told.place_m, told.turn, told.overlap[:, None], alike, glance.free, glance.depth]
+    def compared(self, seen: Sighted, target: Sighted) -> Tensor:
+        """(B, D) numbers, standardised, that tell of what is seen and of the target."""
+        count = self.eyes.shape.grid.count
+        told = self.eyes.compare(seen.tokens, target.tokens, seen.told[:, -count:], target.told[:, -count:])
+        alike = likeness(seen.description, target.description)[:, None]
+        parts = [told.vector, told.place_m, told.turn, told.overlap[:, None], alike, seen.told]
         return (torch.cat(parts, dim=1) - self.mean) / self.deviation
 
-    def likeness(self, seen: Tensor, before: Tensor) -> Tensor:
-        """(B,) cosine of the descriptions of features (B, F): 1 where nothing changed."""
-        return (self.split(seen.float())[0] * self.split(before.float())[0]).sum(dim=1)
+    def forward(self, seen: Tensor, target: Tensor) -> Tensor:
+        """`compared` by features (B, F) of both."""
+        return self.compared(self.sight(seen), self.sight(target))
+
+    def description(self, features: Tensor) -> Tensor:
+        """(B, description_width) of features (B, F)."""
+        return features[:, : self.eyes.shape.description_width].float()
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `from_tensors` needs."""
@@ -91,6 +113,11 @@ class SeenPairs(nn.Module):
         self.deviation.copy_(told.std(dim=0).clamp_min(LEAST_DEVIATION))
 
 
+def likeness(first: Tensor, second: Tensor) -> Tensor:
+    """(B,) cosine of descriptions (B, description_width): 1 where the pictures are the same."""
+    return (first * second).sum(dim=1)
+
+
 @dataclass(frozen=True)
 class RecurrentShape:
     """Sizes of the network.
@@ -98,10 +125,12 @@ class RecurrentShape:
     Attributes:
         pair_count: D.
         width: H.
+        remembers: False: it forgets at every step what came before the last one.
     """
 
     pair_count: int
     width: int = 256
+    remembers: bool = True
 
 
 class RecurrentOutput(NamedTuple):
@@ -110,11 +139,13 @@ class RecurrentOutput(NamedTuple):
     Attributes:
         scores: (B, A) logits of actions.
         value: (B,).
+        arrived: (B,) logit: this is the target.
         hidden: (B, H), what is remembered.
     """
 
     scores: Tensor
     value: Tensor
+    arrived: Tensor
     hidden: Tensor
 
 
@@ -146,10 +177,28 @@ class RecurrentActorCritic(nn.Module):
             self.memory = nn.GRUCell(width, width)
             self.policy = nn.Sequential(nn.Linear(2 * width, width), nn.ReLU(), nn.Linear(width, ACTION_COUNT))
             self.value = nn.Linear(2 * width, 1)
+            self.arrived = nn.Linear(2 * width, 1)
 
     def forward(self, pairs: Tensor, last: Tensor, hidden: Tensor) -> RecurrentOutput:
         """One step of B episodes: pairs (B, D), last (B, LAST_COUNT) by `last_step`, hidden (B, H), zeros at first."""
         entered = self.entry(torch.cat([pairs, last], dim=1))
-        remembered = self.memory(entered, hidden)
-        both = torch.cat([entered, remembered], dim=1)
-        return RecurrentOutput(self.policy(both), self.value(both)[:, 0], remembered)
+        return self._said(entered, self.memory(entered, self._kept(hidden)))
+
+    def along(self, pairs: Tensor, last: Tensor, hidden: Tensor, begins: Tensor) -> RecurrentOutput:
+        """T steps of B episodes, (T, B, ...) each; an episode begins where begins (T, B) bool says so.
+
+        hidden: (B, H), before the first step. The same as T calls, faster.
+        """
+        entered = self.entry(torch.cat([pairs, last], dim=2))
+        remembered = []
+        for step in range(len(entered)):
+            hidden = self.memory(entered[step], self._kept(torch.where(begins[step, :, None], 0.0, hidden)))
+            remembered.append(hidden)
+        return self._said(entered, torch.stack(remembered))
+
+    def _kept(self, hidden: Tensor) -> Tensor:
+        return hidden if self.shape.remembers else torch.zeros_like(hidden)
+
+    def _said(self, entered: Tensor, remembered: Tensor) -> RecurrentOutput:
+        both = torch.cat([entered, remembered], dim=-1)
+        return RecurrentOutput(self.policy(both), self.value(both)[..., 0], self.arrived(both)[..., 0], remembered)

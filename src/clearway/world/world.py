@@ -51,6 +51,7 @@ class World:
         start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
         feature_store: where features are kept, see there.
         encoder: the record of what made the features; None where the scenes have none, or do not say.
+        takes: (S, K, F) float16, features of K other pictures of every state; None: none.
     """
 
     scene_names: tuple[str, ...]
@@ -70,6 +71,7 @@ class World:
     start_count: Tensor
     feature_store: FeatureStore = "memory"
     encoder: EncoderRecord | None = None
+    takes: Tensor | None = None
 
     @property
     def scene_count(self) -> int:
@@ -122,6 +124,12 @@ class World:
         found = target_tables(walked, targets).items()
         tables: dict[str, Any] = {name: torch.from_numpy(table).to(self.device) for name, table in found}
         return replace(self, **tables)
+
+    def with_takes(self, takes: Sequence[np.ndarray]) -> World:
+        """The same tables, shared, with features of other pictures: of each scene in turn (S of the scene, K, F)."""
+        joined = torch.cat([torch.from_numpy(np.asarray(part, np.float16)) for part in takes]).to(self.device)
+        assert self.features is not None and joined.shape == (self.state_count, joined.shape[1], self.features.shape[1])
+        return replace(self, takes=joined)
 
     def _walked(self, index: int) -> WalkedScene:
         first = int(self.scene_offset[index])
