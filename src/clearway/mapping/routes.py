@@ -47,7 +47,7 @@ def ways_from(poses: Sequence[LatticePose], entering: np.ndarray) -> np.ndarray:
     for row, pose in enumerate(poses):
         prices = np.append(entering[row].ravel(), np.float32(1))[price]
         steps = csr_array((prices, after, first), shape=(cost.shape[1], cost.shape[1]))
-        start = np.ravel_multi_index(pose.index, entering[row].shape)
+        start = int(np.ravel_multi_index(pose.index, entering[row].shape))
         cost[row] = np.minimum(dijkstra(steps, indices=start, limit=FAR), FAR)
     return cost.reshape(entering.shape)
 
