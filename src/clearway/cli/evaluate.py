@@ -28,7 +28,8 @@ class Evaluate:
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """The run folder; the .onnx file of an exported agent; or, with --goals, generalist, which comes with clearway."""
+    """The run folder; the .onnx file of an exported agent; or, with --goals, generalist, which comes with clearway,
+    or a file that it was exported to."""
     files: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Scene files or folders, as --scenes; with --goals any scenes."""
     episodes: int | None = None
