@@ -34,7 +34,7 @@ from PIL import Image
 
 from clearway.agents.agent import Agent
 from clearway.deploy.navigator import open_agent
-from clearway.deploy.onnx_file import OnnxAgent
+from clearway.deploy.onnx_file import OnnxAgent, read_onnx
 from clearway.scenes.sensors import RGB
 
 SIZE = (300, 400)
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rounds", type=int, default=3, help="through all numbers of clients; their median is printed")
     options = parser.parse_args(arguments)
     if options.run:
-        backends = {"PyTorch": open_agent(options.run), "onnxruntime": OnnxAgent(options.agent, threads=1)}
+        backends = {"PyTorch": open_agent(options.run), "onnxruntime": OnnxAgent(read_onnx(options.agent, threads=1))}
         print_backends(backends)
     with served(options.agent) as url:
         print("| clients | requests/s | p50 ms | p99 ms | pictures a batch | model's share |")

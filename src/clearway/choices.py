@@ -43,3 +43,6 @@ MODEL_SUFFIXES = (".xml", ".urdf")
 
 SplitName = Literal["train", "validation", "test"]
 """See `clearway.generation.split`."""
+
+GENERALIST = "generalist"
+"""In place of a run folder: the agent that comes with clearway, see `clearway.agents.generalist`."""

@@ -9,8 +9,8 @@ from clearway.agents.mapping import MappingAgent
 from clearway.evaluation import metrics
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.tours import Touring, walk_tour
+from clearway.mapping.eyes_sight import EyesSight
 from clearway.mapping.settings import MappingSettings
-from clearway.mapping.sight import Sight
 from clearway.world.world import make_world
 from helpers.agents import check_agent
 from helpers.made import grid_scene
@@ -80,7 +80,7 @@ def test_a_tour_follows_from_its_seed(scene, world):
 def test_it_keeps_the_protocol(tmp_path, kind):
     seen = seen_by_eyes(tmp_path / "eyes", grid_scene(2))[0]
     features = seen.features.astype(np.float32)
-    sight = Sight(small_eyes().eval())
+    sight = EyesSight(small_eyes().eval())
     settings = MappingSettings(side=15)
     explorer = Explorer(sight, 4, settings=settings)
     agent = {"explorer": explorer, "plain": MappingAgent(sight, settings=settings)}.get(kind)

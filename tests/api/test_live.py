@@ -28,7 +28,7 @@ def agent(tmp_path_factory) -> Generalist:
     """The generalist, behind eyes that have learnt nothing."""
     folder = tmp_path_factory.mktemp("eyes")
     write_eyes(folder, small_eyes(), {})
-    return Generalist(eyes.from_record(eyes.find_record(str(folder))))
+    return Generalist.by_eyes(eyes.from_record(eyes.find_record(str(folder))))
 
 
 @pytest.fixture

@@ -20,6 +20,7 @@ from clearway.perception.random_resnet import ResNetShape, fit_record
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import grid_scene
+from helpers.one_file import OneFile
 from helpers.small_runs import small_learner, small_request
 
 TINY = ResNetShape(8, (16,), (1,), "basic")
@@ -70,3 +71,9 @@ def policy_file(deployed: Deployed) -> Path:
     path = deployed.agent.with_name("policy.onnx")
     export_onnx(deployed.chosen, path, with_encoder=False)
     return path
+
+
+@pytest.fixture(scope="session")
+def one_file(tmp_path_factory: pytest.TempPathFactory) -> OneFile:
+    """The generalist with small eyes, and its file."""
+    return OneFile(tmp_path_factory.mktemp("generalist"))

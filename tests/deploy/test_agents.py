@@ -11,7 +11,7 @@ from clearway.agents.agent import FEATURES, Agent, Observation
 from clearway.agents.by_features import FeatureAgent
 from clearway.agents.selection import Argmax
 from clearway.deploy.from_run import RunAgent
-from clearway.deploy.onnx_file import OnnxAgent
+from clearway.deploy.onnx_file import OnnxAgent, read_onnx
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.learn.load import run_world
 from clearway.scenes.sensors import RGB
@@ -35,8 +35,8 @@ def made(name: str, deployed, policy_file: Path) -> Agent:
     return {
         "PyTorch": lambda: RunAgent(deployed.chosen),
         "PyTorch by features": lambda: FeatureAgent(deployed.chosen.policy),
-        "onnxruntime": lambda: OnnxAgent(deployed.agent),
-        "onnxruntime by features": lambda: OnnxAgent(policy_file),
+        "onnxruntime": lambda: OnnxAgent(read_onnx(deployed.agent)),
+        "onnxruntime by features": lambda: OnnxAgent(read_onnx(policy_file)),
     }[name]()
 
 
@@ -67,7 +67,7 @@ def test_all_of_them_do_the_same(deployed, policy_file) -> None:
 
 
 def test_features_of_a_target_that_are_known_are_not_made_again(deployed) -> None:
-    agent, known = OnnxAgent(deployed.agent), deployed.scenes[1].features[[3, 9]]
+    agent, known = OnnxAgent(read_onnx(deployed.agent)), deployed.scenes[1].features[[3, 9]]
     other = agent.reset({RGB: deployed.pictures[[0, 0]], FEATURES: known}, np.arange(2))
     np.testing.assert_array_equal(other["target"], known)
     own = agent.reset({RGB: deployed.pictures[[3, 9]]}, np.arange(2))
@@ -109,8 +109,8 @@ def test_evaluated_on_the_grid_they_walk_the_episodes_of_the_network(
 def test_a_circle_is_found_by_pictures_too(deployed, cellar) -> None:
     """An agent of pictures that is certain of its actions is not walked to the cap, and its counts are the same."""
     settings = {"scenes": deployed.scenes[1:], "selection": "argmax", "episodes_per_target": 8, "step_limit": 401}
-    skipped = run_episodes(cellar, OnnxAgent(deployed.agent), **settings)
-    every = run_episodes(cellar, OnnxAgent(deployed.agent), record=True, **settings)
+    skipped = run_episodes(cellar, OnnxAgent(read_onnx(deployed.agent)), **settings)
+    every = run_episodes(cellar, OnnxAgent(read_onnx(deployed.agent)), record=True, **settings)
     assert skipped.looped.any()
     for column in COUNTS:
         assert np.array_equal(getattr(skipped, column), getattr(every, column)), column

@@ -13,7 +13,7 @@ from torch.nn.functional import interpolate
 
 from clearway.deploy.card import card_from_json
 from clearway.deploy.from_run import load_run_in_scene, picture_encoder
-from clearway.deploy.onnx_file import OnnxAgent
+from clearway.deploy.onnx_file import OnnxAgent, read_onnx
 from clearway.deploy.onnx_graph import resize_weights
 from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
@@ -61,7 +61,7 @@ def test_policy_with_encoder_equals_the_evaluated_agent(deployed, rows) -> None:
     rng = np.random.default_rng(rows)
     states = rng.integers(0, len(deployed.pictures), (6, rows))
     targets = rng.integers(0, 2, rows)
-    agent, known_goal = OnnxAgent(deployed.agent), np.array([3, 9])[targets]
+    agent, known_goal = OnnxAgent(read_onnx(deployed.agent)), np.array([3, 9])[targets]
     memory = agent.reset({RGB: deployed.pictures[known_goal]}, np.arange(rows))
     (empty,) = [name for name, values in memory.items() if values.shape == (rows, 4, agent.card.feature_count)]
     memory = {**memory, empty: np.full_like(memory[empty], np.nan)}  # a start must not look at it
@@ -78,7 +78,7 @@ def test_policy_with_encoder_equals_the_evaluated_agent(deployed, rows) -> None:
 @pytest.mark.parametrize("size", [(12, 16), (16, 20), (37, 21), (240, 320), (1, 1)])
 def test_pictures_of_any_size_are_prepared_as_the_encoder_does(deployed, size) -> None:
     pictures = np.random.default_rng(0).integers(0, 256, (3, *size, 3), np.uint8)
-    agent = OnnxAgent(deployed.agent)
+    agent = OnnxAgent(read_onnx(deployed.agent))
     begin = agent.reset({RGB: pictures}, np.arange(3))
     _, after = agent.act({RGB: pictures}, begin)
     expected = encoder_from_record(deployed.scenes[1].encoder).encode(pictures)
@@ -94,7 +94,7 @@ def test_resizing_is_pytorch_s(given, wanted) -> None:
 
 
 def test_only_where_an_episode_starts_is_the_history_filled(deployed) -> None:
-    agent = OnnxAgent(deployed.agent)
+    agent = OnnxAgent(read_onnx(deployed.agent))
     history = np.arange(2 * 4 * 16, dtype=np.float32).reshape(2, 4, 16)
     begin = agent.reset({RGB: deployed.pictures[:2]}, np.arange(2))
     memory = {**begin, "begun": np.array([False, True]), "history": history}
@@ -105,7 +105,7 @@ def test_only_where_an_episode_starts_is_the_history_filled(deployed) -> None:
 
 
 def test_the_card_says_what_the_agent_is(deployed) -> None:
-    card = OnnxAgent(deployed.agent).card
+    card = OnnxAgent(read_onnx(deployed.agent)).card
     assert (card.scene, card.takes_pictures, card.history_length, card.feature_count) == ("cellar", True, 4, 16)
     assert card.actions == ("move forward", "turn right", "turn left", "move backward")
     assert card.picture_size == (12, 16)
@@ -118,7 +118,7 @@ def test_the_card_says_what_the_agent_is(deployed) -> None:
 
 
 def test_the_card_of_a_policy_alone(deployed, policy_file) -> None:
-    alone = OnnxAgent(policy_file).card
+    alone = OnnxAgent(read_onnx(policy_file)).card
     assert alone.encoder["identity"] == deployed.scenes[1].encoder.identity
     assert (alone.takes_pictures, alone.normalisation["pixels"]) == (False, None)
 
@@ -153,6 +153,6 @@ def test_the_card_of_an_agent_that_sees_depth_says_so(deployed) -> None:
 
 
 def test_a_card_of_before_observations_were_described_is_read(deployed) -> None:
-    kept = json.loads(OnnxAgent(deployed.agent).card.to_json()) | {"format_version": 1}
+    kept = json.loads(OnnxAgent(read_onnx(deployed.agent)).card.to_json()) | {"format_version": 1}
     del kept["observation"]
     assert card_from_json(json.dumps(kept), "here").observation is None

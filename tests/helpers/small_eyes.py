@@ -12,7 +12,7 @@ from clearway.perception.eyes import write_eyes
 from clearway.perception.eyes_network import Eyes, EyesShape
 from clearway.scenes.scene import Scene
 
-SMALL = EyesShape(widths=(8, 8, 8), token_width=4, description_width=16, hidden_width=16, height_px=32, width_px=48)
+SMALL = EyesShape(widths=(8, 8, 8), token_width=4, description_width=16, hidden_width=16, height_px=48, width_px=64)
 
 
 def small_eyes(seed: int = 0, shape: EyesShape = SMALL) -> Eyes:

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from clearway.agents.agent import State
 from clearway.agents.exploring import Explorer, map_of
 from clearway.agents.mapping import MappingAgent
+from clearway.choices import GENERALIST
 from clearway.errors import SceneError
 from clearway.mapping.lattice import HEADINGS, STEP_M
+from clearway.mapping.room_map import RoomMap
 from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
 from clearway.perception import eyes
 from clearway.perception.encode import encoded
+from clearway.perception.encoder import Encoder, EncoderWarning
 from clearway.perception.eyes import EyesEncoder
+from clearway.scenes.aspect import other_aspect
 from clearway.scenes.scene import Scene
-from clearway.world.world import World
 
-GENERALIST = "generalist"
+if TYPE_CHECKING:
+    from clearway.world.world import World
+
+__all__ = ["GENERALIST", "Generalist"]
 
 
 @dataclass(frozen=True)
@@ -27,34 +35,49 @@ class Generalist:
     """Makes agents that go by the same eyes.
 
     Attributes:
-        encoder: the eyes.
+        encoder: the eyes; its record has the `shape` of their network.
+        sight: compares features of theirs.
         settings: how the agents weigh what they are told.
     """
 
-    encoder: EyesEncoder
+    encoder: Encoder
+    sight: Sight
     settings: MappingSettings = field(default_factory=MappingSettings)
 
     @classmethod
     def shipped(cls) -> Generalist:
         """By the eyes that come with this version. Raises EncoderError where they are missing or damaged."""
-        return cls(eyes.from_record(eyes.find_record()))
+        return cls.by_eyes(eyes.from_record(eyes.find_record()))
+
+    @classmethod
+    def by_eyes(cls, encoder: EyesEncoder) -> Generalist:
+        """By eyes on PyTorch."""
+        from clearway.mapping.eyes_sight import EyesSight
+
+        return cls(encoder, EyesSight(encoder.eyes))
+
+    @property
+    def picture_px(self) -> tuple[int, int]:
+        """Height and width of the pictures that the eyes were taught on."""
+        shape: Any = self.encoder.record.settings["shape"]
+        return int(shape["height_px"]), int(shape["width_px"])
 
     def on_poses(self, world: World) -> MappingAgent:
         """The agent on the grid: it goes by features of its eyes, in any world."""
-        return MappingAgent(self._sight, settings=self.settings)
+        return MappingAgent(self.sight, settings=self.settings)
 
-    def behind_camera(self) -> MappingAgent:
-        """The agent that sees pictures."""
-        return MappingAgent(self._sight, self.encoder, settings=self.settings)
+    def behind_camera(self, known: RoomMap | None = None) -> MappingAgent:
+        """The agent that sees pictures, in a room of which a tour has made a map, or in any."""
+        return MappingAgent(self.sight, self.encoder, known, self.settings)
 
     def explorer(self, steps: int, *, camera: bool = False) -> Explorer:
         """Who tours a room, for so many steps: on the grid, or behind a camera."""
-        return Explorer(self._sight, steps, self.encoder if camera else None, settings=self.settings)
+        return Explorer(self.sight, steps, self.encoder if camera else None, settings=self.settings)
 
     def after(self, state: State, *, camera: bool = False) -> MappingAgent:
         """The agent that knows a room by an explorer's state at the end of its tour; where, as of `explorer`."""
         encoder = self.encoder if camera else None
-        return MappingAgent(self._sight, encoder, known=map_of(state), settings=self.settings)
+        return MappingAgent(self.sight, encoder, known=map_of(state), settings=self.settings)
 
     def seen(self, scenes: Sequence[Scene]) -> list[Scene]:
         """Any scenes with pictures as its own eyes see them.
@@ -62,14 +85,17 @@ class Generalist:
         Raises:
             EncoderError: a scene has no pictures.
             SceneError: a step or a turn there is not as long as its own.
+
+        Warns:
+            EncoderWarning: a scene's pictures have another aspect than those that the eyes were taught on.
         """
         for scene in scenes:
             check_steps(scene)
+            if scene.observations is not None:
+                _, height, width, _ = scene.observations.shape
+                if problem := other_aspect((height, width), self.picture_px):
+                    warnings.warn(f"scene {scene.name}: {problem}", EncoderWarning, stacklevel=2)
         return [encoded(scene, self.encoder) for scene in scenes]
-
-    @property
-    def _sight(self) -> Sight:
-        return Sight(self.encoder.eyes)
 
 
 def check_steps(scene: Scene) -> None:

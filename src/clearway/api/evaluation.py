@@ -15,7 +15,7 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.targets import Targets, chosen_targets
 from clearway.api.training import TrainResult
-from clearway.choices import HELD_OUT
+from clearway.choices import GENERALIST, HELD_OUT
 from clearway.deploy.card import Card
 from clearway.deploy.navigator import open_agent
 from clearway.errors import ArgumentError
@@ -233,6 +233,8 @@ def _check_fits(card: Card, scenes: Sequence[Scene]) -> None:
 
     Features may be those of a file that does not say what made them; then their number has to do.
     """
+    if card.kind == GENERALIST:
+        raise ArgumentError("agent: is for any room, without targets of its own. Give it goals (evaluate --goals)")
     if [scene.name for scene in scenes] != [card.scene]:
         given = ", ".join(scene.name for scene in scenes)
         raise ArgumentError(f"scenes: the agent is for scene {card.scene}, given {given}. Give that scene alone")

@@ -43,9 +43,10 @@ def evaluate_goals(
     """Walk to goals drawn in some scenes: the agent, then a random walk and shortest paths, one episode a goal.
 
     Args:
-        agent: "generalist", which comes with clearway; a run folder or what `load_agent` gave; or an agent of your own,
-            as of `evaluate`. The generalist and agents of the algorithm "recurrent" see any scenes with pictures by
-            their own eyes; others walk, to any goals, in the scenes of their training alone.
+        agent: "generalist", which comes with clearway, or a file that it was exported to; a run folder or what
+            `load_agent` gave; or an agent of your own, as of `evaluate`. The generalist and agents of the algorithm
+            "recurrent" see any scenes with pictures by their own eyes; others walk, to any goals, in the scenes of
+            their training alone.
         scenes: files, folders of them, or scenes.
         goals: of each scene, distinct poses of its largest part.
         step_limit: steps after which an episode has failed.
@@ -81,7 +82,7 @@ def evaluate_goals(
     found = load_scenes(scenes)
     if isinstance(agent, str | os.PathLike):
         path = as_path("agent", agent)
-        agent = Generalist.shipped() if is_generalist(path) else load.load_agent(path)
+        agent = goal_agent(path)
     if tour_steps and not isinstance(agent, Generalist):
         problem = f"tour={tour_steps}: {_named(agent)[0]} keeps no map, and would have nothing of a tour"
         raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
@@ -103,11 +104,30 @@ def evaluate_goals(
         return walked.evaluate_goals({name: make}, found, takes=seen, **settings)
 
 
-def is_generalist(path: Path) -> bool:
-    """Whether the agent that comes with clearway is meant, not a folder of this name."""
-    from clearway.agents.generalist import GENERALIST
+def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Generalist:
+    """The agent that comes with clearway, that of an exported file, or a run's, from one of its checkpoints.
 
-    return str(path) == GENERALIST and not path.exists()
+    Raises:
+        ArgumentError: the file holds an agent for one scene.
+        ClearwayError: it cannot be read.
+    """
+    from clearway.agents.generalist import GENERALIST, Generalist
+    from clearway.api.evaluation import is_exported, load_agent
+    from clearway.deploy.generalist import GeneralistAgent
+    from clearway.deploy.navigator import open_agent
+
+    named = str(path) == GENERALIST and not path.exists()
+    if not named and not is_exported(path):
+        return load_agent(path, checkpoint)
+    if checkpoint is not None:
+        raise ArgumentError(f"checkpoint={checkpoint}: {path} has none. Leave it out")
+    if named:
+        return Generalist.shipped()
+    agent = open_agent(path)
+    if not isinstance(agent, GeneralistAgent):
+        problem = f"{path}: holds the agent for scene {agent.card.scene}, and goals are for agents of any room"
+        raise ArgumentError(f"{problem}. Evaluate it without goals")
+    return agent.generalist
 
 
 def _check_sees(agent: object) -> None:

@@ -32,7 +32,7 @@ class Evaluate:
 
     folder: Annotated[Path, tyro.conf.Positional]
     """The run folder; the .onnx file of an exported agent; or, with --goals or --live, generalist, which comes with
-    clearway."""
+    clearway; with --goals also a file that it was exported to."""
     files: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
     """Scene files or folders, as --scenes; with --goals any scenes."""
     episodes: int | None = None

@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 
 import tyro
 
+from clearway.choices import GENERALIST
 from clearway.cli.arguments import check_ending, scene_files
 from clearway.cli.console import say
-from clearway.errors import EncoderError
+from clearway.errors import ClearwayError, EncoderError
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class ExportAgent:
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """The run folder."""
+    """The run folder; or generalist, which comes with clearway and walks in any room."""
     out: Path = Path("agent.onnx")
     """The file."""
     format: Literal["onnx"] = "onnx"
@@ -41,6 +42,9 @@ class ExportAgent:
         from clearway.deploy.from_run import load_run_in_scene
 
         check_ending(".onnx", out=self.out)
+        if str(self.folder) == GENERALIST and not self.folder.exists():
+            self._generalist()
+            return
         files = scene_files(self.scenes) if self.scenes else None
         chosen = load_run_in_scene(self.folder, self.scene, checkpoint=self.checkpoint, files=files)
         try:
@@ -53,3 +57,16 @@ class ExportAgent:
         if others:
             said += f" (--scene chooses another: {', '.join(others)})"
         say(said)
+
+    def _generalist(self) -> None:
+        from clearway.agents.generalist import Generalist
+        from clearway.deploy.export import export_generalist
+        from clearway.perception import eyes
+
+        given = {"--scene": self.scene, "--checkpoint": self.checkpoint, "--scenes": self.scenes}
+        asked = [option for option, value in given.items() if value] + ([] if self.encoder else ["--no-encoder"])
+        if asked:
+            raise ClearwayError(f"{asked[0]}: not with {GENERALIST}, which is one agent for all rooms. Leave it out")
+        encoder = eyes.from_record(eyes.find_record())
+        export_generalist(encoder, Generalist.by_eyes(encoder).settings, self.out)
+        say(f"{GENERALIST} with its eyes: {self.out}, {self.out.stat().st_size / 1e6:.1f} MB, for any room")

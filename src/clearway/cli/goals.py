@@ -40,13 +40,12 @@ def evaluate_at_goals(
     json: bool,
 ) -> None:
     """Walk to goals drawn in some scene files, and print what came of it."""
-    from clearway.api.evaluation import load_agent
-    from clearway.api.goals import evaluate_goals, is_generalist
+    from clearway.api.goals import evaluate_goals, goal_agent
 
     if not files:
         raise ClearwayError("--goals: no scenes. Name scene files behind the run, or give --rooms validation")
     found = evaluate_goals(
-        agent if is_generalist(agent) else load_agent(agent, checkpoint),
+        goal_agent(agent, checkpoint),
         scene_files(files),
         goals=goals,
         step_limit=step_limit,

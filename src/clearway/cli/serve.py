@@ -14,6 +14,7 @@ from clearway.errors import ClearwayError
 
 TOKEN_VARIABLE = "CLEARWAY_TOKEN"
 FEWEST_TOKEN_LETTERS = 16
+NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Serve:
     """
 
     agent: Annotated[Path, tyro.conf.Positional]
-    """The run folder, or a file that clearway export wrote."""
+    """The run folder, a file that clearway export wrote, or generalist, which comes with clearway."""
     scene: str | None = None
     """Name of the scene that the agent is for; by default the run's first."""
     host: str = "127.0.0.1"
@@ -44,6 +45,7 @@ class Serve:
         """Load the agent, then answer until interrupted."""
         from clearway.serve.limits import Limits
         from clearway.serve.run import run_service, servable_agent
+        from clearway.serve.sessions import state_bytes
         from clearway.web.guard import new_token
         from clearway.web.local import address_of, listening
 
@@ -63,4 +65,8 @@ class Serve:
             say(f"scene {agent.card.scene}: {address_of(listener, self.host)}")
             if not own:
                 say(f"token: {token}")
+            each = state_bytes(agent)
+            if limits.sessions * each > NOTABLE_BYTES:
+                whole = limits.sessions * each / 1e6
+                say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
             run_service(agent, listener, token, limits)

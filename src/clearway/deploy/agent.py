@@ -5,24 +5,50 @@ Axis letters: F features.
 
 from __future__ import annotations
 
-from typing import Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from clearway.agents.agent import FEATURES, Agent, Observation
+from clearway.agents.agent import FEATURES, Agent, Observation, State
+from clearway.choices import GENERALIST
 from clearway.deploy.card import Card
 from clearway.errors import DeployError
+from clearway.scenes.aspect import other_aspect
 from clearway.scenes.sensors import RGB
+
+if TYPE_CHECKING:
+    from clearway.mapping.room_map import RoomMap
 
 MAX_PICTURE_SIDE = 4_096  # pixels
 
 
 class DeployedAgent(Agent, Protocol):
-    """A trained agent for one scene, however it is computed, that says what it is."""
+    """A trained agent, however it is computed, that says what it is."""
 
     @property
     def card(self) -> Card:
         """What the agent is."""
+
+
+@runtime_checkable
+class KeepsMaps(Protocol):
+    """A deployed agent that may tour a room, and keeps a map of it."""
+
+    def explorer(self) -> Agent:
+        """Who tours a room; targets are of no interest to it."""
+
+    def map_of(self, state: State) -> RoomMap:
+        """What a tour has found, by the explorer's state."""
+
+    def knowing(self, known: RoomMap) -> Agent:
+        """The agent in the room of a map."""
+
+    def write_map(self, path: Path, known: RoomMap) -> None:
+        """Write a map to a file. Raises OSError."""
+
+    def read_map(self, path: Path) -> RoomMap:
+        """The map in a file. Raises DeployError where it is none that the agent can go by."""
 
 
 def sight_of(card: Card) -> str:
@@ -50,18 +76,31 @@ def checked_seen(seen: object, card: Card) -> np.ndarray:
     except ValueError as fault:  # rows of unequal lengths
         wanted, reason = "picture" if card.takes_pictures else "feature vector", " ".join(str(fault).split())[:120]
         raise DeployError(f"what is seen is no {wanted} ({reason}). Give an array") from fault
-    return checked_picture(array) if card.takes_pictures else _checked_features(array, card)
+    return checked_picture(array, card) if card.takes_pictures else _checked_features(array, card)
 
 
-def checked_picture(picture: np.ndarray) -> np.ndarray:
-    """The picture, (height, width, 3) uint8. Raises DeployError where it is something else, or too large."""
+def checked_picture(picture: np.ndarray, card: Card | None = None) -> np.ndarray:
+    """The picture, (height, width, 3) uint8, for an agent, or for one that is unknown.
+
+    Raises:
+        DeployError: it is something else, too large, or has another aspect than an agent for any room was taught on.
+    """
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
         problem = f"the picture is {picture.dtype} {picture.shape}, expected uint8 (height, width, 3)"
         raise DeployError(f"{problem}. Give an RGB picture with values from 0 to 255")
     if max(picture.shape) > MAX_PICTURE_SIDE:
         problem = f"the picture is {picture.shape[1]} x {picture.shape[0]} pixels"
         raise DeployError(f"{problem}, expected at most {MAX_PICTURE_SIDE} a side. Make it smaller first")
+    if card is not None and (problem := aspect_problem(picture, card)):
+        raise DeployError(problem)
     return picture
+
+
+def aspect_problem(picture: np.ndarray, card: Card) -> str | None:
+    """What is to be told of a picture (height, width, 3) whose aspect an agent for any room was not taught on."""
+    if card.kind != GENERALIST or card.picture_size is None:
+        return None
+    return other_aspect(picture.shape[:2], card.picture_size)
 
 
 def _checked_features(features: np.ndarray, card: Card) -> np.ndarray:

@@ -10,7 +10,7 @@ import clearway
 from clearway import files
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import RunInScene
-from clearway.deploy.onnx_file import OnnxAgent
+from clearway.deploy.onnx_file import OnnxAgent, read_onnx
 from clearway.errors import DeployError
 from clearway.version import __version__
 
@@ -32,11 +32,11 @@ def cached_agent(chosen: RunInScene, tell: Callable[[str], object]) -> OnnxAgent
     path = files.cache_dir() / "agents" / f"{chosen.scene.name}-{_key(chosen)}.onnx"
     with files.locked(path):
         try:
-            return OnnxAgent(path)
+            return OnnxAgent(read_onnx(path))
         except DeployError:
             tell(f"exporting the agent for scene {chosen.scene.name}, once ...")
             export_onnx(chosen, path)
-    return OnnxAgent(path)
+    return OnnxAgent(read_onnx(path))
 
 
 def _key(chosen: RunInScene) -> str:

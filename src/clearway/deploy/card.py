@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
+from clearway.choices import GENERALIST
 from clearway.errors import DeployError
 
-FORMAT_VERSION = 2  # 2 since there is `observation`
+FORMAT_VERSION = 3  # 2 since there is `observation`, 3 since there is `kind`
 EXPORT_AGAIN = "Export it again with clearway export"
+SIAMESE = "siamese"
+ANY_ROOM = "any room"  # stands for the scene of an agent that is bound to none
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,9 @@ class Card:
         picture_size: (height, width) in pixels of the pictures that it was trained on, or None where that is unknown.
         training: what the agent was trained with, for the record (JSON values).
         observation: what a picture of the scene is to the encoder, as `Sensor.to_json` has it: name, shape, dtype, unit
-            and range; None where that is unknown.
+            and range; None where that is unknown. Of the generalist also its lens, `vertical_fov_deg`.
+        kind: of agent: `SIAMESE`, the paper's network in one scene, or `GENERALIST`.
+        settings: what the agent goes by besides what its file computes (JSON values).
     """
 
     scene: str
@@ -40,6 +45,13 @@ class Card:
     picture_size: tuple[int, int] | None
     training: Mapping[str, object]
     observation: Mapping[str, object] | None = None
+    kind: str = SIAMESE
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def draws(self) -> bool:
+        """The agent tells probabilities of its actions, and draws by them."""
+        return self.kind != GENERALIST
 
     def to_json(self) -> str:
         """As JSON text, for `card_from_json`."""

@@ -6,16 +6,23 @@ import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import torch
 
+from clearway.agents.generalist import Generalist
+from clearway.deploy.card import Card
+from clearway.deploy.eyes_graph import EyesGraph
 from clearway.deploy.from_run import RunInScene, exportable_encoder
+from clearway.deploy.generalist import card_of
 from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
 from clearway.deploy.onnx_graph import AgentGraph
 from clearway.errors import DeployError
 from clearway.files import written_whole
+from clearway.mapping.settings import MappingSettings
+from clearway.perception.eyes import EyesEncoder
 from clearway.version import __version__
 
 OPSET = 18
@@ -48,6 +55,39 @@ def export_onnx(chosen: RunInScene, path: Path, *, with_encoder: bool = True) ->
         inputs = {"picture": picture, "start": torch.zeros(2, dtype=torch.bool), **inputs}
         axes = {"picture": {0: batch, 1: height, 2: width}, "start": {0: batch}, **axes}
         outputs, graph = [*outputs, "history_after"], AgentGraph(policy, encoder)
+    _write(path, card, graph, inputs, outputs, axes)
+
+
+def export_generalist(encoder: EyesEncoder, settings: MappingSettings, path: Path) -> None:
+    """Write the agent that is bound to no room: its eyes are in the file, its settings on the card; see `OnnxEyes`.
+
+    Raises:
+        DeployError: the packages of the extra `onnx` are not installed.
+    """
+    card = card_of(replace(Generalist.by_eyes(encoder), settings=settings))
+    features = torch.zeros(2, card.feature_count)
+    pictures, seen, pairs = (torch.export.Dim(name, min=0) for name in ("pictures", "seen", "pairs"))
+    height, width = torch.export.Dim("height", min=1), torch.export.Dim("width", min=1)
+    inputs = {"picture": torch.zeros(2, *EXAMPLE_SIDES, 3, dtype=torch.uint8)}
+    inputs |= {name: features.repeat(repeats, 1) for name, repeats in (("seen", 2), ("first", 3), ("second", 3))}
+    axes: dict[str, dict[int, Any]] = {
+        "picture": {0: pictures, 1: height, 2: width},
+        "seen": {0: seen},
+        "first": {0: pairs},
+        "second": {0: pairs},
+    }
+    _write(path, card, EyesGraph(encoder.eyes), inputs, ["features", "stands", "whereabouts"], axes)
+
+
+def _write(
+    path: Path,
+    card: Card,
+    graph: torch.nn.Module,
+    inputs: dict[str, torch.Tensor],
+    outputs: list[str],
+    axes: dict[str, dict[int, Any]],
+) -> None:
+    """Write a graph with its card, sealed."""
     model = _translated(graph.eval(), inputs, outputs, axes)
     _sign(model, {CARD_KEY: card.to_json(), CHECKSUM_KEY: NO_DIGEST.decode()})
     with written_whole(path) as part:

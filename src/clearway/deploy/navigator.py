@@ -6,15 +6,20 @@ from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
 from threading import Lock
-from typing import Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from clearway.agents.agent import Agent, Decisions, State
 from clearway.agents.selection import Argmax
-from clearway.deploy.agent import DeployedAgent, as_observation
+from clearway.choices import GENERALIST
+from clearway.deploy.agent import DeployedAgent, KeepsMaps, as_observation
+from clearway.deploy.card import ANY_ROOM, Card
 from clearway.errors import DeployError
 from clearway.scenes.actions import Action
+
+if TYPE_CHECKING:
+    from clearway.mapping.room_map import RoomMap
 
 Selection = Literal["sampled", "argmax"]
 
@@ -24,43 +29,71 @@ class Decision(NamedTuple):
 
     Attributes:
         action: the action chosen.
-        probabilities: (A,) float32, of all actions.
-        value: the discounted return that the agent expects, in units of the reward.
+        probabilities: (A,) float32, of all actions; None where the agent tells none.
+        value: the discounted return that the agent expects, in units of the reward; None likewise.
     """
 
     action: Action
-    probabilities: np.ndarray
-    value: float
+    probabilities: np.ndarray | None
+    value: float | None
 
 
 def open_agent(source: str | Path, scene: str | None = None) -> DeployedAgent:
-    """A trained agent from an ONNX file or a run folder.
+    """A trained agent from an ONNX file or a run folder, or "generalist", which comes with clearway.
 
     Args:
-        source: the file, or the folder.
+        source: the file, the folder, or the name.
         scene: which of a run's scenes the agent is in; None for the first. A file holds one scene.
 
     Raises:
         ClearwayError: it cannot be read, was changed, is for another scene, or its encoder cannot be had.
     """
     path = Path(source)
-    if path.is_dir():
+    if str(source) == GENERALIST and not path.exists():
+        from clearway.agents.generalist import Generalist
+        from clearway.deploy.generalist import GeneralistAgent
+
+        agent: DeployedAgent = GeneralistAgent(Generalist.shipped())
+    elif path.is_dir():
         from clearway.deploy.from_run import RunAgent, load_run_in_scene
 
         return RunAgent(load_run_in_scene(path, scene))
-    from clearway.deploy.onnx_file import OnnxAgent
-
-    agent = OnnxAgent(path)
+    else:
+        agent = _of_file(path)
     if scene not in (None, agent.card.scene):
-        raise DeployError(f"{path}: is for scene {agent.card.scene}, not {scene}. Export the run with --scene {scene}")
+        remedy = "Leave the scene out" if agent.card.scene == ANY_ROOM else f"Export the run with --scene {scene}"
+        raise DeployError(f"{path}: is for scene {agent.card.scene}, not {scene}. {remedy}")
     return agent
+
+
+def _of_file(path: Path) -> DeployedAgent:
+    from clearway.deploy.onnx_file import OnnxAgent, read_onnx
+
+    file = read_onnx(path)
+    if file.card.kind == GENERALIST:
+        from clearway.deploy.generalist import exported_generalist
+
+        return exported_generalist(file)
+    return OnnxAgent(file)
+
+
+def check_selection(selection: str, card: Card) -> None:
+    """Raise DeployError where there is no such selection, or the agent has nothing to choose among."""
+    if selection not in get_args(Selection):
+        raise DeployError(f"selection is {selection!r}. Choose one of {', '.join(get_args(Selection))}")
+    if selection != get_args(Selection)[0] and not card.draws:
+        raise DeployError(f"selection is {selection!r}, and the agent draws nothing that it could choose. Leave it out")
 
 
 class Navigator:
     """Walks to where a picture was taken. Threads may share it; calls are answered one after the other.
 
+    With an agent that keeps maps, the generalist, it may tour a room first (`explore`), and then go to any target in it
+    by the map that the tour has made.
+
     Args:
-        source: an ONNX file, a run folder, or an agent opened with `open_agent`, which several navigators may share.
+        source: an ONNX file, a run folder, "generalist", or an agent opened with `open_agent`, which several navigators
+            may share.
         scene: which of a run's scenes; None for the first. A file and an opened agent hold one, which it must be.
         selection: "sampled" draws actions by their probabilities, as in training and in the published protocol;
             "argmax" takes the most probable one, and can walk in circles.
@@ -78,8 +111,6 @@ class Navigator:
         selection: Selection = "sampled",
         seed: int | None = None,
     ) -> None:
-        if selection not in get_args(Selection):
-            raise DeployError(f"selection is {selection!r}. Choose one of {', '.join(get_args(Selection))}")
         if not isinstance(source, str | Path) and not (isinstance(source, Agent) and hasattr(source, "card")):
             problem = f"source is {source!r:.60}, expected an ONNX file, a run folder or an opened agent"
             raise DeployError(f"{problem}. Give one of these")
@@ -87,9 +118,14 @@ class Navigator:
         self.card = agent.card
         if scene not in (None, self.card.scene):
             raise DeployError(f"the agent is for scene {self.card.scene}, not {scene}. Open the agent for {scene}")
+        check_selection(selection, self.card)
+        self._deployed = agent
         self._agent: Agent = Argmax(agent) if selection == "argmax" else agent
         self._episode_seeds, self._lock = episode_seeds(seed), Lock()
         self._state: State | None = None
+        self._arrived: bool | None = None
+        self._tour: tuple[Agent, State] | None = None
+        self._known: RoomMap | None = None
 
     def set_target(self, picture: object) -> None:
         """Begin an episode: from the next picture on, walk to where this one was taken.
@@ -103,7 +139,11 @@ class Navigator:
         """
         target = as_observation(picture, self.card)
         with self._lock:
-            self._state = self._agent.reset(target, next(self._episode_seeds))
+            if self._tour is not None:
+                maker = self._keeps_maps()
+                self._known, self._tour = maker.map_of(self._tour[1]), None
+                self._agent = maker.knowing(self._known)
+            self._state, self._arrived = self._agent.reset(target, next(self._episode_seeds)), None
 
     def act(self, picture: object) -> Decision:
         """What to do, seeing a picture; the same kinds as in `set_target`.
@@ -116,13 +156,80 @@ class Navigator:
             if self._state is None:
                 raise DeployError("there is no target yet. Call set_target first")
             decisions, self._state = self._agent.act(seen, self._state)
+            self._arrived = arrival_of(decisions)
         return decision_of(decisions)
+
+    @property
+    def arrived(self) -> bool | None:
+        """Whether the agent held at its last act that it is at the target; None where it cannot tell, or none was."""
+        return self._arrived
+
+    def explore(self, picture: object) -> Decision:
+        """What to do, seeing a picture, to get to know the room; the same kinds as in `act`.
+
+        The first call begins a tour, anew where there was one. The next target ends it: from then on the navigator goes
+        by the map that it has made, and the robot may stand anywhere in the room.
+
+        Raises:
+            DeployError: as of `act`, or the agent keeps no map.
+        """
+        seen = as_observation(picture, self.card)
+        with self._lock:
+            if self._tour is None:
+                explorer = self._keeps_maps().explorer()
+                self._tour = explorer, explorer.reset({}, next(self._episode_seeds))
+                self._state = self._arrived = None
+            explorer, state = self._tour
+            decisions, state = explorer.act(seen, state)
+            self._tour = explorer, state
+        return decision_of(decisions)
+
+    def save_map(self, path: str | Path) -> None:
+        """Write the map of the room to a file, a safetensors file that says which eyes made it.
+
+        Raises:
+            DeployError: there is no map yet, the agent keeps none, or it cannot be written.
+        """
+        with self._lock:
+            maker = self._keeps_maps()
+            known = self._known if self._tour is None else maker.map_of(self._tour[1])
+        if known is None:
+            raise DeployError("there is no map yet. Call explore first, picture after picture")
+        try:
+            maker.write_map(Path(path), known)
+        except OSError as fault:
+            raise DeployError(f"{path}: cannot be written ({fault.strerror}). Choose another file") from fault
+
+    def load_map(self, path: str | Path) -> None:
+        """Go by the map in a file from the next target on.
+
+        Raises:
+            DeployError: it cannot be read, was altered, other eyes made it, or the agent keeps no maps.
+        """
+        with self._lock:
+            maker = self._keeps_maps()
+            self._known = maker.read_map(Path(path))
+            self._agent, self._tour = maker.knowing(self._known), None
+            self._state = self._arrived = None
+
+    def _keeps_maps(self) -> KeepsMaps:
+        if not isinstance(self._deployed, KeepsMaps):
+            problem = f"the agent for scene {self.card.scene} keeps no map, and would have nothing of a tour"
+            raise DeployError(f"{problem}. Open {GENERALIST}")
+        return self._deployed
 
 
 def decision_of(decisions: Decisions) -> Decision:
-    """The decision of a batch of one, by an agent that tells probabilities and value."""
-    assert decisions.probabilities is not None and decisions.value is not None
-    return Decision(Action(int(decisions.action[0])), decisions.probabilities[0], float(decisions.value[0]))
+    """The decision of a batch of one."""
+    told, value = decisions.probabilities, decisions.value
+    return Decision(
+        Action(int(decisions.action[0])), None if told is None else told[0], None if value is None else float(value[0])
+    )
+
+
+def arrival_of(decisions: Decisions) -> bool | None:
+    """Whether the agent of a batch of one holds that it is at the target; None where it cannot tell."""
+    return None if decisions.arrived is None else bool(decisions.arrived[0])
 
 
 def episode_seeds(seed: int | None) -> Iterator[np.ndarray]:

@@ -7,6 +7,7 @@ found by its bytes, so that no parser sees a file before it was checked.
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from clearway.agents import memory
 from clearway.agents.agent import FEATURES, Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.deploy.agent import sight_of
-from clearway.deploy.card import EXPORT_AGAIN, Card, card_from_json
+from clearway.deploy.card import EXPORT_AGAIN, SIAMESE, Card, card_from_json
 from clearway.errors import DeployError
 
 CARD_KEY, CHECKSUM_KEY = "clearway", "clearway.sha256"
@@ -45,8 +46,23 @@ def check_seal(content: bytes, source: str) -> None:
         raise DeployError(f"{source}: has changed since it was exported (its SHA-256 differs). {EXPORT_AGAIN}")
 
 
-class OnnxAgent:
-    """An exported agent on onnxruntime, see `DeployedAgent`.
+@dataclass(frozen=True)
+class OnnxFile:
+    """An exported agent's file, open.
+
+    Attributes:
+        session: of onnxruntime.
+        card: what the agent is.
+        source: the path, for errors.
+    """
+
+    session: Any
+    card: Card
+    source: str
+
+
+def read_onnx(path: Path, threads: int | None = None) -> OnnxFile:
+    """An exported agent's file.
 
     Args:
         path: the file.
@@ -55,13 +71,28 @@ class OnnxAgent:
     Raises:
         DeployError: there is no such file, it is no exported agent or was changed, or onnxruntime is not installed.
     """
+    content = _content(path)
+    check_seal(content, str(path))
+    session = _session(content, path, threads)
+    metadata = session.get_modelmeta().custom_metadata_map
+    return OnnxFile(session, card_from_json(metadata.get(CARD_KEY, ""), str(path)), str(path))
 
-    def __init__(self, path: Path, threads: int | None = None) -> None:
-        content = _content(path)
-        check_seal(content, str(path))
-        self._session = _session(content, path, threads)
-        metadata = self._session.get_modelmeta().custom_metadata_map
-        self.card: Card = card_from_json(metadata.get(CARD_KEY, ""), str(path))
+
+class OnnxAgent:
+    """The paper's network in one scene, exported, on onnxruntime; see `DeployedAgent`.
+
+    Args:
+        file: that holds it.
+
+    Raises:
+        DeployError: it holds another kind of agent.
+    """
+
+    def __init__(self, file: OnnxFile) -> None:
+        self._session, self.card = file.session, file.card
+        if self.card.kind != SIAMESE:
+            problem = f"{file.source}: holds an agent of the kind {self.card.kind!r:.40}, unknown to this clearway"
+            raise DeployError(f"{problem}. Upgrade clearway")
         self.sees: tuple[str, ...] = (sight_of(self.card),)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:

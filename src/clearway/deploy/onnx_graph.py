@@ -30,8 +30,8 @@ class AgentGraph(nn.Module):
         self.policy, self.encoder_network, self.features_of = policy, encoder.network, encoder.features_of
         size = encoder.preprocessing
         self.height, self.width = size.height, size.width
-        self.register_buffer("pixel_mean", torch.tensor(size.mean).view(1, 3, 1, 1))
-        self.register_buffer("pixel_std", torch.tensor(size.std).view(1, 3, 1, 1))
+        self.register_buffer("pixel_mean", torch.tensor(size.mean))
+        self.register_buffer("pixel_std", torch.tensor(size.std))
         standardised = encoder.mean is not None and encoder.std is not None
         count = encoder.feature_count
         self.register_buffer("feature_mean", torch.from_numpy(encoder.mean) if standardised else torch.zeros(count))
@@ -46,11 +46,17 @@ class AgentGraph(nn.Module):
 
     def features(self, picture: Tensor) -> Tensor:
         """Features (B, F) of pictures (B, height, width, 3) uint8."""
-        planes = picture.permute(0, 3, 1, 2).float()
-        rows = resize_weights(planes.shape[2], self.height)
-        columns = resize_weights(planes.shape[3], self.width)
-        pixels = (rows @ (planes @ columns.T) / 255 - self.pixel_mean) / self.pixel_std
+        pixels = to_input(picture, self.height, self.width, self.pixel_mean, self.pixel_std)
         return (self.features_of(pixels) - self.feature_mean) / self.feature_std
+
+
+def to_input(picture: Tensor, height: int, width: int, mean: Tensor, std: Tensor) -> Tensor:
+    """A network's input (B, 3, height, width) of pictures (B, h, w, 3) uint8, as `preprocess.to_pixels` makes it."""
+    planes = picture.permute(0, 3, 1, 2).float()
+    rows, columns = resize_weights(planes.shape[2], height), resize_weights(planes.shape[3], width)
+    upright = (planes @ columns.T).mT.flatten(0, 2)  # a plain matrix: onnxruntime then takes no pictures at all too
+    resized = (upright @ rows.T).reshape(picture.shape[0], 3, width, height).mT
+    return (resized / 255 - mean.view(1, 3, 1, 1)) / std.view(1, 3, 1, 1)
 
 
 def resize_weights(given: int, wanted: int) -> Tensor:

@@ -70,8 +70,7 @@ class EyesEncoder:
     @property
     def feature_count(self) -> int:
         """F."""
-        shape = self.eyes.shape
-        return shape.description_width + shape.grid.count * shape.token_width
+        return self.eyes.shape.feature_count
 
     def encode(self, pictures: np.ndarray) -> np.ndarray:
         """Features (B, F) float32 of pictures (B, height, width, 3) uint8, which may have another size.

@@ -50,6 +50,11 @@ class EyesShape:
         rows, columns = self.height_px // 16, self.width_px // 16
         return TokenGrid(rows, columns, aspect=self.width_px / self.height_px)
 
+    @property
+    def feature_count(self) -> int:
+        """F, of the encoder: the description, then the tokens."""
+        return self.description_width + self.grid.count * self.token_width
+
     def to_json(self) -> dict[str, object]:
         """As JSON values."""
         return {key: list(v) if isinstance(v, tuple) else v for key, v in asdict(self).items()}

@@ -60,8 +60,9 @@ class StepAnswer(BaseModel):
 
     action: str
     action_index: int
-    probabilities: list[float]
-    value: float
+    probabilities: list[float] | None
+    value: float | None
+    arrived: bool | None
     step: int
 
 
@@ -123,7 +124,7 @@ def make_app(service: Service) -> FastAPI:
     @app.post("/sessions", status_code=201, dependencies=token, responses=_faults(*OPENING))
     async def open_session(opening: Opening) -> Opened:
         """Open a session; it expires when it is not used."""
-        session = service.sessions.open(opening.selection, opening.seed)
+        session = service.open(opening.selection, opening.seed)
         return Opened(session_id=session.id, expires_after_s=service.limits.idle_s)
 
     @app.delete("/sessions/{session_id}", status_code=204, dependencies=token, responses=_faults(*CLOSING))
@@ -196,8 +197,9 @@ def _answer(service: Service, answer: Answer) -> StepAnswer:
     return StepAnswer(
         action=service.card.actions[decision.action],
         action_index=int(decision.action),
-        probabilities=decision.probabilities.tolist(),
+        probabilities=None if decision.probabilities is None else decision.probabilities.tolist(),
         value=decision.value,
+        arrived=answer.arrived,
         step=answer.step,
     )
 

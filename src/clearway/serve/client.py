@@ -18,7 +18,7 @@ from clearway.scenes.actions import Action
 
 TIMEOUT_S = 30.0
 KEEP_ALIVE_S = 3.0  # of an idle connection; the service's is longer, so that it never closes one that is used
-ANSWER = ("action_index", "probabilities", "value")  # of a step
+ANSWER = ("action_index", "probabilities", "value", "arrived")  # of a step
 KINDS = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png", b"RIFF": "image/webp"}
 
 
@@ -122,9 +122,14 @@ class Client:
 
 
 class ClientSession:
-    """An agent on its way, kept by the service; see `Client.session`. Used as a context, it is closed at the end."""
+    """An agent on its way, kept by the service; see `Client.session`. Used as a context, it is closed at the end.
+
+    Attributes:
+        arrived: whether the agent held at its last act that it is at the target; None where it cannot tell.
+    """
 
     def __init__(self, client: Client, session_id: str) -> None:
+        self.arrived: bool | None = None
         self._client, self.session_id, self._path = client, session_id, f"/sessions/{session_id}"
 
     def set_target(self, picture: object) -> None:
@@ -139,12 +144,14 @@ class ClientSession:
             DeployError: it is no picture, or a file that cannot be read.
         """
         self._client.ask("PUT", f"{self._path}/target", **_body(picture))
+        self.arrived = None
 
     def act(self, picture: object) -> Decision:
         """What to do, seeing a picture; kinds and errors as in `set_target`."""
         answer = self._client.ask_json("POST", f"{self._path}/steps", *ANSWER, **_body(picture))
-        probabilities = np.array(answer["probabilities"], np.float32)
-        return Decision(Action(answer["action_index"]), probabilities, float(answer["value"]))
+        told, value, self.arrived = (answer[name] for name in ANSWER[1:])
+        probabilities = None if told is None else np.array(told, np.float32)
+        return Decision(Action(answer["action_index"]), probabilities, None if value is None else float(value))
 
     def close(self) -> None:
         """End the session. Raises ServiceError where it has ended already."""

@@ -24,10 +24,10 @@ SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client tha
 
 
 def servable_agent(source: Path, scene: str | None, tell: Callable[[str], object]) -> DeployedAgent:
-    """The agent of an exported file, or of a run folder, which is exported to the cache first.
+    """The agent of an exported file, the generalist, or that of a run folder, which is exported to the cache first.
 
     Args:
-        source: the file or the folder.
+        source: the file, "generalist" or the folder.
         scene: see `open_agent`.
         tell: see `cached_agent`.
 

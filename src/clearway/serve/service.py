@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.agents.selection import most_probable
-from clearway.deploy.agent import DeployedAgent
-from clearway.deploy.navigator import Decision, decision_of
+from clearway.deploy.agent import DeployedAgent, aspect_problem
+from clearway.deploy.navigator import Decision, Selection, arrival_of, check_selection, decision_of
 from clearway.errors import DeployError
 from clearway.serve.batching import Batcher
 from clearway.serve.decoding import decoded
@@ -23,9 +23,10 @@ from clearway.serve.sessions import Session, Sessions
 
 @dataclass(frozen=True)
 class Answer:
-    """A decision and its number in the episode, from 1."""
+    """A decision, whether the agent holds that it has arrived (None: it cannot tell), and the step's number, from 1."""
 
     decision: Decision
+    arrived: bool | None
     step: int
 
 
@@ -55,6 +56,14 @@ class Service:
         """There is room for another session and another picture."""
         return not self.sessions.full and self.batcher.waiting < self.limits.waiting
 
+    def open(self, selection: Selection, seed: int | None) -> Session:
+        """A new session. Raises Fault where there are too many, or the agent draws nothing."""
+        try:
+            check_selection(selection, self.card)
+        except DeployError as fault:
+            raise Fault("invalid_request", str(fault)) from fault
+        return self.sessions.open(selection, seed)
+
     async def set_target(self, session: Session, content: bytes) -> None:
         """Begin an episode with the picture file of a target; on a Fault the session stays as it was."""
         async with session.turn:
@@ -71,8 +80,11 @@ class Service:
             session.steps += 1
             if session.selection == "argmax":
                 decisions = most_probable(decisions)
-            return Answer(decision_of(decisions), session.steps)
+            return Answer(decision_of(decisions), arrival_of(decisions), session.steps)
 
     async def _decoded(self, content: bytes) -> np.ndarray:
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._decoders, decoded, content, self.limits.picture_pixels)
+        picture = await loop.run_in_executor(self._decoders, decoded, content, self.limits.picture_pixels)
+        if problem := aspect_problem(picture, self.card):
+            raise Fault("unsupported_picture", problem)
+        return picture

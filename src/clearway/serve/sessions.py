@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from clearway.agents.agent import State
+from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import Selection, episode_seeds
+from clearway.scenes.sensors import RGB
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 
@@ -42,6 +44,13 @@ class Session:
     state: State | None = None
     steps: int = 0
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+
+def state_bytes(agent: DeployedAgent) -> int:
+    """What an agent's memory of one episode takes, which every session with a target keeps."""
+    height, width = agent.card.picture_size or (1, 1)
+    state = agent.reset({RGB: np.zeros((1, height, width, 3), np.uint8)}, np.zeros(1, np.int64))
+    return sum(values.nbytes for values in state.values())
 
 
 class Sessions:

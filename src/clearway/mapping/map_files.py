@@ -1,0 +1,114 @@
+"""Files of `RoomMap`: a safetensors file whose header says, as JSON, which eyes made it and its SHA-256.
+
+The hash guards against damage, not against forgers; shapes and values are checked besides.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from clearway.errors import DeployError
+from clearway.files import parse_json, written_whole
+from clearway.mapping.lattice import HEADINGS
+from clearway.mapping.room_map import RoomMap
+
+FORMAT_VERSION = 1
+HEADER = "clearway.map"
+MAX_BYTES, MAX_SIDE, MAX_PICTURES = 256 * 1024**2, 1025, 10_000
+DTYPES = {"room": np.float32, "shut": np.bool_, "taken": np.int64, "features": np.float16}
+AGAIN = "Tour the room again"
+
+
+def write_map(path: Path, known: RoomMap, eyes: str) -> None:
+    """Write a map, with the identity of the eyes that made it. Raises OSError."""
+    from safetensors.numpy import save
+
+    arrays = {name: np.ascontiguousarray(getattr(known, name), dtype) for name, dtype in DTYPES.items()}
+    header = {"format_version": FORMAT_VERSION, "eyes": eyes, "sha256": _sha256(arrays)}
+    with written_whole(path) as part:
+        part.write_bytes(save(arrays, {HEADER: json.dumps(header)}))
+
+
+def read_map(path: Path, eyes: str, feature_count: int) -> RoomMap:
+    """The map in a file.
+
+    Args:
+        path: the file.
+        eyes: identity of those that are to go by it.
+        feature_count: F, of theirs.
+
+    Raises:
+        DeployError: it cannot be read, is no map, was altered, or other eyes made it.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise DeployError(f"{path}: larger than {MAX_BYTES >> 20} MiB, which no map is. Check the path")
+        content = path.read_bytes()
+    except OSError as fault:
+        raise DeployError(f"{path}: cannot be read ({fault.strerror}). Check the path") from fault
+    try:
+        header = _header(content)
+        version, made_by, sha256 = (header[name] for name in ("format_version", "eyes", "sha256"))
+        arrays = load(content)
+    except (SafetensorError, ValueError, KeyError, TypeError) as fault:
+        reason = " ".join(str(fault).split())[:120]
+        raise DeployError(f"{path}: not the map of a room, or damaged ({reason}). {AGAIN}") from fault
+    if version != FORMAT_VERSION:
+        raise DeployError(f"{path}: of format {version!r:.20}, this clearway reads {FORMAT_VERSION}. {AGAIN}")
+    if made_by != eyes:
+        problem = f"{path}: made by other eyes ({made_by!r:.40}), and the agent's are {eyes!r:.40}"
+        raise DeployError(f"{problem}. {AGAIN}, or open the agent that made it")
+    if problem := _problem(arrays, feature_count):
+        raise DeployError(f"{path}: {problem}. {AGAIN}")
+    if _sha256(arrays) != sha256:
+        raise DeployError(f"{path}: altered, its SHA-256 is not what its header says. {AGAIN}")
+    return RoomMap(**arrays)
+
+
+def _header(content: bytes) -> Mapping[str, object]:
+    """Our own part of a safetensors file's header. Raises ValueError, KeyError or TypeError where there is none."""
+    length = int.from_bytes(content[:8], "little")
+    if len(content) < 8 or length > len(content) - 8:
+        raise ValueError("its header is cut off")
+    return parse_json(parse_json(content[8 : 8 + length].decode())["__metadata__"][HEADER])
+
+
+def _problem(arrays: Mapping[str, np.ndarray], feature_count: int) -> str | None:
+    """What keeps arrays from being a map."""
+    if arrays.keys() != DTYPES.keys():
+        return f"holds {', '.join(sorted(arrays))}, expected {', '.join(DTYPES)}"
+    side, count = len(arrays["room"]) if arrays["room"].ndim else 0, len(arrays["taken"]) if arrays["taken"].ndim else 0
+    shapes = {
+        "room": (side, side),
+        "shut": (HEADINGS, side, side),
+        "taken": (count, 3),
+        "features": (count, feature_count),
+    }
+    for name, shape in shapes.items():
+        found = arrays[name]
+        if found.shape != shape or found.dtype != DTYPES[name]:
+            return f"{name} is {found.dtype} {found.shape}, expected {np.dtype(DTYPES[name])} {shape}"
+    if not 1 <= side <= MAX_SIDE or not 1 <= count <= MAX_PICTURES:
+        return f"has {count} pictures on {side} x {side} cells, at most {MAX_PICTURES} on {MAX_SIDE} x {MAX_SIDE}"
+    if (arrays["taken"] < 0).any() or (arrays["taken"] >= (HEADINGS, side, side)).any():
+        return "a picture's pose lies outside it"
+    if not all(np.isfinite(arrays[name]).all() for name in ("room", "features")):
+        return "holds NaN or Inf"
+    return None
+
+
+def _sha256(arrays: Mapping[str, np.ndarray]) -> str:
+    """Of the arrays, in their order."""
+    digest = hashlib.sha256()
+    for name in DTYPES:
+        digest.update(f"{name} {arrays[name].dtype} {arrays[name].shape}\n".encode())
+        digest.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,22 @@
+"""Whether pictures have the aspect that those of a training had."""
+
+from __future__ import annotations
+
+SLACK = 0.02  # share by which aspects may differ
+
+
+def other_aspect(given_px: tuple[int, int], trained_px: tuple[int, int]) -> str | None:
+    """What is to be told of pictures (height, width) whose aspect is not the trained one; None where it is.
+
+    Pictures are squashed to the size of a training's, so that another size is the same picture, another aspect is not.
+    """
+    (height, width), (trained_height, trained_width) = given_px, trained_px
+    aspect, trained = width / height, trained_width / trained_height
+    if abs(aspect / trained - 1) <= SLACK:
+        return None
+    crop = (round(height * trained), height) if aspect > trained else (width, round(width / trained))
+    return (
+        f"pictures of {width} x {height} pixels have the aspect {aspect:.2f}, and the eyes were taught on "
+        f"{trained:.2f} ({trained_width} x {trained_height}), so that distances and angles would be told wrong. "
+        f"Crop them to {crop[0]} x {crop[1]}"
+    )
