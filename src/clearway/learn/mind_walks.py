@@ -18,10 +18,11 @@ from clearway.world.world import World
 
 
 class MindWalks:
-    """N walks under the network's policy, which begin where a way to the target is known.
+    """N walks under the network's policy, which begin in poses that were left before.
 
-    A walk is over at its target, where no way is known any more, and after `step_limit` steps on average, by chance. An
-    action of which nothing is known is replaced by a best one.
+    Where no way to the target is known, what was not tried yet is best, and the walk is over. Else it is over at its
+    target, where none is known any more, and after `step_limit` steps on average, by chance; an action of which nothing
+    is known is replaced by a best one.
 
     Args:
         world: scenes and targets.
@@ -43,6 +44,7 @@ class MindWalks:
     ) -> None:
         self.world, self.network, self.seen, self.teacher = world, network, seen, teacher
         self.learner, self.generator = learner, generator
+        self.pairs = torch.cat([teacher.pairs, self._lost()])
         self.target, self.history = self._begun(learner.mind_walks)
 
     @torch.no_grad()
@@ -53,7 +55,8 @@ class MindWalks:
         scene = self.world.target_scene[target]
         order = torch.argsort(scene, stable=True)
         history, target, action, log_pi, best = (part[order] for part in (history, target, action, log_pi, best))
-        worth = self.teacher.value(target, history[:, -1]) * self.learner.reward_scale
+        known, worth = self.teacher.has(target, history[:, -1]), self.teacher.value(target, history[:, -1])
+        worth = torch.where(known, worth, 0.0) * self.learner.reward_scale
         batch = Batch(
             history,
             target,
@@ -73,9 +76,10 @@ class MindWalks:
         rows = counted(self.world.target_scene[target], self.world.scene_count).tolist()
         scores, _ = self.network.judged(history, target, rows)
         action, here = sample_actions(scores, self._uniform(len(target))), history[:, -1]
-        best = self.teacher[target, here]
-        action = torch.where(self.seen[here, action] == UNKNOWN, best.int().argmax(1), action)
-        arrived = self.seen[here, action]
+        known, tried = self.teacher.has(target, here), self.seen[here] != UNKNOWN
+        best = torch.where(known[:, None], self.teacher[target, here], ~tried)
+        action = torch.where(tried.gather(1, action[:, None])[:, 0], action, best.int().argmax(1))
+        arrived = torch.where(known, self.seen[here, action], here)
         over = ~self.teacher.has(target, arrived) | (self._uniform(len(target)) < 1 / self.learner.step_limit)
         anew, begun = self._begun(len(target))
         onward = torch.cat([history[:, 1:], arrived[:, None]], 1)
@@ -83,11 +87,19 @@ class MindWalks:
         self.history = torch.where(over[:, None], begun, onward)
         return history, target, action, torch.log_softmax(scores, 1), best.to(scores.dtype)
 
+    def _lost(self) -> Tensor:
+        """(P, 2) targets and states that were left before, without a known way, where not all was tried."""
+        world = self.world
+        start = world.start_state
+        target = torch.arange(world.target_count, device=world.device).repeat_interleave(world.start_count)
+        tried = self.seen[start] != UNKNOWN
+        lost = ~self.teacher.has(target, start) & tried.any(1) & ~tried.all(1)
+        return torch.stack([target[lost], start[lost]], 1)
+
     def _begun(self, count: int) -> tuple[Tensor, Tensor]:
         """Targets (count,) and histories (count, K) of walks that begin."""
-        pairs = self.teacher.pairs
-        place = (self._uniform(count) * len(pairs)).long()
-        target, start = pairs[place].unbind(1)
+        place = (self._uniform(count) * len(self.pairs)).long()
+        target, start = self.pairs[place].unbind(1)
         return target, start[:, None].expand(-1, self.learner.history_length)
 
     def _uniform(self, count: int) -> Tensor:
