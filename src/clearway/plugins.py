@@ -23,7 +23,7 @@ BUILT_IN: dict[Kind, tuple[str, ...]] = {
     "rewards": ("collision-aware", "shortest", "bump", "clearance"),
     "agents": ("random", "shortest path"),
     "importers": ("thor-v1", "floor-plan", "images", "savn", "avd", "ai2thor", "mjcf", "miniworld"),
-    "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "recurrent", "default", "paper", "paper-a3c"),
+    "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "recurrent", "adapt", "default", "paper", "paper-a3c"),
 }
 """Names that are ours, which no other package can take."""
 

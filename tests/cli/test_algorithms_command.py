@@ -10,7 +10,7 @@ from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from helpers.small_eyes import seen_by_eyes
+from helpers.small_eyes import seen_by_eyes, ship, small_generalist
 
 SETTINGS = ("--frames", 400, "--threads", 1, "--set", "envs=10")
 
@@ -23,9 +23,12 @@ def seen(scene: Path, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
-def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, name):
+def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, name, monkeypatch):
     width = () if name == "q-learning" else ("width=16",)
-    scene = trained.scene if name != "recurrent" else seen(trained.scene, tmp_path)
+    scene = trained.scene if name not in ("recurrent", "adapt") else seen(trained.scene, tmp_path)
+    if name == "adapt":
+        ship(small_generalist(tmp_path / "eyes"), monkeypatch)
+        width = (*width, "tour_steps=10", "walk_steps=5")
     run = tmp_path / "run"
     words = ("train", scene, "--out", run, "--algorithm", name, *SETTINGS, "rollout_steps=8", *width)
     answer = clearway(*words)
@@ -89,3 +92,27 @@ def test_a_preset_s_settings_go_with_another_algorithm(clearway, trained, tmp_pa
     learner = json.loads((tmp_path / "run.json").read_text())["learner"]
     assert (learner["algorithm"], learner["clip_norm"], learner["envs"]) == ("a3c", 40.0, 7)
     assert not {"epochs", "hindsight", "optimiser"} & set(learner)
+
+
+def test_from_generalist_is_adapting_it(clearway, trained, tmp_path, monkeypatch):
+    scene = seen(trained.scene, tmp_path)
+    ship(small_generalist(tmp_path / "eyes"), monkeypatch)
+    small = ("--set", "envs=10", "rollout_steps=8", "width=16", "tour_steps=10", "walk_steps=5", "--frames", 100)
+    answer = clearway("train", scene, "--out", tmp_path / "run", "--from", "generalist", "--threads", 1, *small)
+    assert answer.code == 0, answer
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["learner"]["source"] == "generalist"
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (("--from", "runs/a"), "--from runs/a: expected generalist"),
+        (("--from", "generalist", "--algorithm", "bc"), "--algorithm bc: cannot be adapted"),
+        (("--from", "generalist", "--preset", "paper"), "--preset paper: cannot be adapted"),
+        (("--from", "generalist"), "those of another encoder. Encode them"),
+    ],
+)
+def test_what_cannot_be_adapted_is_refused_in_a_line(clearway, trained, tmp_path, words, told):
+    answer = clearway("train", trained.scene, "--out", tmp_path / "run", *words)
+    assert answer.code != 0 and told in answer.error
+    assert not (tmp_path / "run").exists()

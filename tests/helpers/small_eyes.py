@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import torch
 
+from clearway.agents.generalist import Generalist
+from clearway.mapping.settings import MappingSettings
 from clearway.perception import encode_scenes
-from clearway.perception.eyes import write_eyes
+from clearway.perception.eyes import find_record, from_record, write_eyes
 from clearway.perception.eyes_network import Eyes, EyesShape
 from clearway.scenes.scene import Scene
 
@@ -31,3 +34,13 @@ def seen_by_eyes(folder: Path, *scenes: Scene, seed: int = 0) -> list[Scene]:
     """The scenes with features of small eyes, which are written to a folder."""
     write_eyes(folder, small_eyes(seed), {})
     return encode_scenes([replace(scene, features=None, encoder=None) for scene in scenes], str(folder), threads=1)
+
+
+def small_generalist(folder: Path) -> Generalist:
+    """A generalist by the small eyes in a folder, on a small lattice; it walks, and knows little of where."""
+    return Generalist(from_record(find_record(str(folder))), MappingSettings(side=15))
+
+
+def ship(generalist: Generalist, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let this one be the shipped generalist."""
+    monkeypatch.setattr(Generalist, "shipped", classmethod(lambda cls: generalist))

@@ -7,6 +7,7 @@ import pytest
 from clearway.errors import RunError
 from clearway.learn.a2c import A2C
 from clearway.learn.a3c.config import A3C
+from clearway.learn.adapt import Adapt
 from clearway.learn.algorithms import ALGORITHMS, algorithm, carried_over
 from clearway.learn.bc import BC
 from clearway.learn.learner import Learner
@@ -18,7 +19,8 @@ from clearway.reward import COLLISION_AWARE
 
 
 def test_algorithms_are_found_by_name() -> None:
-    assert {"ppo": PPO, "a2c": A2C, "a3c": A3C, "bc": BC, "q-learning": QLearning, "recurrent": Recurrent} == ALGORITHMS
+    others = {"bc": BC, "q-learning": QLearning, "recurrent": Recurrent, "adapt": Adapt}
+    assert {"ppo": PPO, "a2c": A2C, "a3c": A3C} | others == ALGORITHMS
     assert algorithm("a3c") is A3C
     with pytest.raises(RunError, match=r"algorithm 'dqn': expected one of ppo, a2c, a3c, bc, q-learning"):
         algorithm("dqn")

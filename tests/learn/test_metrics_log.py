@@ -12,7 +12,7 @@ from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.reward import COLLISION_AWARE
 from clearway.world.world import make_world
-from helpers.small_eyes import seen_by_eyes
+from helpers.small_eyes import seen_by_eyes, ship, small_generalist
 from helpers.small_runs import small_learner, small_scenes, small_targets, small_trainer
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "metrics.md"
@@ -31,17 +31,22 @@ def test_a_row_holds_progress_episodes_and_the_update(row: dict[str, float]) -> 
 
 
 LABELS = {"ppo": "PPO", "a2c": "A2C", "a3c": "A3C", "bc": "BC", "q-learning": "Q-learning", "recurrent": "Recurrent"}
+LABELS |= {"adapt": "Adapt"}
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
-def test_the_document_explains_every_figure_of_an_algorithm_and_no_other(tmp_path: Path, name: str) -> None:
+def test_the_document_explains_every_figure_of_an_algorithm_and_no_other(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     training = DOCUMENT.read_text().split("\n## Training", 1)[1].split("\n## ", 1)[0]
     table = training.split("| key | of |", 1)[1].split("\n\n", 1)[0]
     cells = [line.split(" | ") for line in table.splitlines()[2:]]
     explained = {
         key for keys, of, *_ in cells if LABELS[name] in of.split(", ") for key in re.findall(r"`(\w+)`", keys)
     }
-    scenes = seen_by_eyes(tmp_path, *small_scenes()) if name == "recurrent" else small_scenes()
+    scenes = seen_by_eyes(tmp_path, *small_scenes()) if name in ("recurrent", "adapt") else small_scenes()
+    if name == "adapt":
+        ship(small_generalist(tmp_path), monkeypatch)
     world = make_world(scenes, small_targets())
     with closing(small_learner(ALGORITHMS[name]()).trainer(world, COLLISION_AWARE, 0)) as trainer:
         figures = trainer.update()

@@ -19,6 +19,7 @@ def test_the_paper_s_settings() -> None:
         "centre_features": False,
         "whiten_features": False,
         "feature_basis": 0,
+        "goals": "given",
         "discount": 0.99,
         "gae_lambda": 1.0,
         "hindsight": False,
@@ -83,6 +84,7 @@ def test_the_default_is_the_recipe() -> None:
         "balance": 0.0,
         "centre_features": True,
         "feature_basis": 0,
+        "goals": "given",
         "width": 512,
     }
     assert {name: asdict(DEFAULT)[name] for name in recipe} == recipe

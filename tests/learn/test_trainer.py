@@ -205,7 +205,7 @@ def test_hindsight_and_look_ahead_get_the_learner_s_settings(monkeypatch: pytest
     noted("better_policy")
     small_trainer(learner).update()
     assert given == {
-        "hindsight_batch": {"discount": 0.9, "reward_scale": 0.3, "trace_lambda": 0.8},
+        "hindsight_batch": {"discount": 0.9, "reward_scale": 0.3, "trace_lambda": 0.8, "told": None},
         "better_policy": {"discount": 0.9, "reward_scale": 0.3, "temperature": 0.07},
     }
 

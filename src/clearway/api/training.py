@@ -105,7 +105,8 @@ def train(
         targets: state ids by scene name, or state ids alone for a single scene; five seeded ones where there are none,
             in generated rooms and flats none that is held out. "held-out": such ones alone.
         reward: one of `clearway.reward.REWARDS` by its name, a `Reward`, or package.module:name.
-        algorithm: "ppo" (our recipe), "a2c", "a3c" (as published), "bc", "q-learning" or "recurrent", with its own
+        algorithm: "ppo" (our recipe), "a2c", "a3c" (as published), "bc", "q-learning", "recurrent" or "adapt" (adapts
+            the generalist to the scenes, which have features of its eyes), with its own
             defaults; a preset, such as "paper" (the published settings, synchronous); or settings, such as
             `PPO(envs=200)`.
         frames: training frames, instead of the algorithm's own.

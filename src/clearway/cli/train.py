@@ -38,8 +38,11 @@ class Train:
     zones: ZoneLevel = "pose"
     """Whether zones are those of poses or of whole cells."""
     algorithm: str | None = None
-    """ppo (our recipe, and the default), a2c, a3c, bc, q-learning or recurrent (for many rooms, seen by eyes), with
-    its own settings; or a preset, see there."""
+    """ppo (our recipe, and the default), a2c, a3c, bc, q-learning, recurrent (for many rooms, seen by eyes) or adapt
+    (see --from), with its own settings; or a preset, see there."""
+    source: Annotated[str | None, tyro.conf.arg(name="from")] = None
+    """generalist: adapt the agent that comes with clearway to these scenes, encoded by its eyes (--encoder clearway).
+    The same as --algorithm adapt."""
     preset: PresetName | None = None
     """Named settings: default is our recipe, PPO; paper is the published settings, synchronous; paper-a3c is the
     published algorithm. With --algorithm, its settings go with that algorithm as far as it has them."""
@@ -91,6 +94,17 @@ class Train:
         each = "" if solved == count else " --targets"
         say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{each}")
 
+    def _adapted(self) -> str | None:
+        """The algorithm that adapts what --from names."""
+        if self.source is None:
+            return None
+        if self.source != "generalist":
+            raise ClearwayError(f"--from {self.source[:80]}: expected generalist. To go on with a run: --resume")
+        if self.preset is not None or self.algorithm not in (None, "adapt"):
+            given = f"--preset {self.preset}" if self.preset else f"--algorithm {self.algorithm}"
+            raise ClearwayError(f"{given}: cannot be adapted from the generalist. Leave it out, or --from")
+        return "adapt"
+
     def _learner(self) -> Learner:
         """The algorithm with its settings, as the words have it."""
         from clearway.api.training import chosen_learner
@@ -99,7 +113,7 @@ class Train:
         from clearway.learn.presets import PRESETS
         from clearway.learn.settings import with_settings
 
-        learner = chosen_learner(self.algorithm or self.preset or "default")
+        learner = chosen_learner(self._adapted() or self.algorithm or self.preset or "default")
         if self.algorithm is not None and self.preset is not None:
             if self.algorithm in PRESETS:
                 raise ClearwayError(f"--algorithm {self.algorithm} is a preset itself. Leave --preset out")

@@ -10,6 +10,7 @@ from typing import TypeVar
 from clearway.errors import RunError
 from clearway.learn.a2c import A2C
 from clearway.learn.a3c.config import A3C
+from clearway.learn.adapt import Adapt
 from clearway.learn.bc import BC
 from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
@@ -17,7 +18,8 @@ from clearway.learn.q_learning import QLearning
 from clearway.learn.recurrent import Recurrent
 from clearway.plugins import find_plugin, load_plugin
 
-ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in (PPO, A2C, A3C, BC, QLearning, Recurrent)}
+OURS = (PPO, A2C, A3C, BC, QLearning, Recurrent, Adapt)
+ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in OURS}
 Kind = TypeVar("Kind", bound=Learner)
 
 

@@ -16,12 +16,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from clearway.learn.teacher import UNKNOWN
 from clearway.model.lookup import LookupNetwork
 from clearway.model.sums import counted
 from clearway.world.navigation import Navigation
 from clearway.world.world import World
-
-UNKNOWN = -1
 
 
 class Observed:

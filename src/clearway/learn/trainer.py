@@ -123,10 +123,7 @@ class Trainer:
             RunError: the loss or a gradient is not finite.
         """
         learner = self.learner
-        if self.updates and self.rotation.begins(self.updates):
-            self._seat(self.updates)
-            self.statistics.drop_open()
-            self.navigation.begin_staggered()
+        self._rotate()
         lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
         rollout = self.collector.collect()
@@ -136,7 +133,7 @@ class Trainer:
         if learner.hindsight:
             batch = self._with_hindsight(rollout, batch)
         kept = self.collector.kept if self.one_pass and len(batch) == rows else None
-        steps = self._learn(batch, kept, lr, settings)
+        steps = self.learn(batch, kept, lr, settings, self._shuffler(self.updates))
         self.frames += self.frames_per_update
         self.updates += 1
         self._rebalance(rollout)
@@ -152,6 +149,13 @@ class Trainer:
             result["own_goals"] = self.own_goals.count
         check_finite(result, self.frames)
         return result
+
+    def _rotate(self) -> None:
+        """Put the environments into other scenes where it is their turn."""
+        if self.updates and self.rotation.begins(self.updates):
+            self._seat(self.updates)
+            self.statistics.drop_open()
+            self.navigation.begin_staggered()
 
     def _seat(self, update: int) -> None:
         """Put the environments into the scenes of that update."""
@@ -239,10 +243,27 @@ class Trainer:
         )
         return batch if told is None else merged(batch, told)
 
-    def _learn(self, batch: Batch, kept: Activations | None, lr: float, settings: LossSettings) -> list[StepFigures]:
-        """Epochs of minibatches; `kept` are the activations of a single pass over the rollout as it is."""
+    def _shuffler(self, update: int) -> torch.Generator:
+        """Random numbers that deal an update's rows."""
+        return torch.Generator(self.world.device).manual_seed(self.seed * SHUFFLE_SALT + update)
+
+    def learn(
+        self,
+        batch: Batch,
+        kept: Activations | None,
+        lr: float,
+        settings: LossSettings,
+        generator: torch.Generator,
+    ) -> list[StepFigures]:
+        """Epochs of minibatches.
+
+        Args:
+            batch: rows to learn from.
+            kept: the activations of a single pass over the rollout as it is.
+            lr, settings: of this update.
+            generator: deals the rows.
+        """
         learner, world = self.learner, self.navigation.world
-        generator = torch.Generator(world.device).manual_seed(self.seed * SHUFFLE_SALT + self.updates)
         epochs = dealt_epochs(
             batch,
             world.state_count,

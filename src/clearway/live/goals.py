@@ -6,7 +6,7 @@ Goals and starts are those of `evaluation.goals`, an episode to each; a goal is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -78,7 +78,7 @@ def walk_to_goals(
     for scene in scenes:
         show(f"building {scene.name}")
         live = live_room(scene)
-        world = make_world([scene], {scene.name: wanted[scene.name]})
+        world = make_world([replace(scene, features=None, encoder=None)], {scene.name: wanted[scene.name]})
         height_px, width_px = scene.seen_by(RGB).shape[1:3]
         lens = live.lens(height_px, width_px, fast=taken_fast(scene.made_by.notes))
         with studio(live.model, lens) as camera:
