@@ -20,7 +20,12 @@ from clearway.mapping.room_map import RoomMap
 FORMAT_VERSION = 1
 HEADER = "clearway.map"
 MAX_BYTES, MAX_SIDE, MAX_PICTURES = 256 * 1024**2, 1025, 10_000
-DTYPES: Mapping[str, type[np.generic]] = {"room": np.float32, "shut": np.bool_, "taken": np.int64, "features": np.float16}
+DTYPES: Mapping[str, type[np.generic]] = {
+    "room": np.float32,
+    "shut": np.bool_,
+    "taken": np.int64,
+    "features": np.float16,
+}
 AGAIN = "Tour the room again"
 
 
@@ -28,7 +33,9 @@ def write_map(path: Path, known: RoomMap, eyes: str) -> None:
     """Write a map, with the identity of the eyes that made it. Raises OSError."""
     from safetensors.numpy import save
 
-    arrays: dict[str, np.ndarray] = {name: np.ascontiguousarray(getattr(known, name), dtype) for name, dtype in DTYPES.items()}
+    arrays: dict[str, np.ndarray] = {
+        name: np.ascontiguousarray(getattr(known, name), dtype) for name, dtype in DTYPES.items()
+    }
     header = {"format_version": FORMAT_VERSION, "eyes": eyes, "sha256": _sha256(arrays)}
     with written_whole(path) as part:
         part.write_bytes(save(arrays, {HEADER: json.dumps(header)}))
