@@ -158,7 +158,7 @@ def test_it_learns_to_say_that_it_has_arrived(tmp_path: Path):
     said = []
     while not trainer.finished:
         said.append(trainer.update()["arrival_loss"])
-    assert said[-1] < 0.1 * said[0]
+    assert said[-1] < 0.2 * said[0]
     agent = learner.agent(None, {**trainer.tensors(), **trainer.fixed_tensors()}, 0).on_poses(world)  # type: ignore[arg-type]
     table = run_episodes(world, agent, episodes_per_target=20, step_limit=200, seed=1)
     assert table.told_arrival is not None and table.false_arrivals is not None

@@ -87,9 +87,9 @@ def test_another_seed_gives_other_eyes(views: Views):
 
 def test_eyes_learn(tmp_path: Path):
     views = made(tmp_path / "views", rooms=2)
-    trainer = Pretrainer(PretrainRequest(views, replace(SETTINGS, pictures=16 * 60, learning_rate=5e-3)))
+    trainer = Pretrainer(PretrainRequest(views, replace(SETTINGS, pictures=16 * 120, learning_rate=1e-2)))
     lessons = trainer.lessons()
-    rows = [trainer.update(next(lessons)) for _ in range(60)]
+    rows = [trainer.update(next(lessons)) for _ in range(120)]
     for part in ("loss_stands", "loss_match"):
         early, late = (np.mean([row[part] for row in some]) for some in (rows[:10], rows[-10:]))
         assert late < 0.9 * early, part

@@ -11,6 +11,7 @@ from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import Perturbed, perturbations_asked, takes_seen
+from clearway.choices import GENERALIST
 from clearway.errors import ArgumentError
 from clearway.live.conditions import Perturbations
 from clearway.scenes.sensors import RGB
@@ -63,7 +64,7 @@ def evaluate_goals(
         ClearwayError: the run cannot be read, a scene is not one that the agent can walk in, or has too few poses; or,
             perturbed, no room that can be built again.
     """
-    from clearway.agents.generalist import GENERALIST, Generalist
+    from clearway.agents.generalist import Generalist
     from clearway.evaluation import goals as walked
     from clearway.evaluation.tours import Touring
     from clearway.learn import load
@@ -111,12 +112,12 @@ def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Gen
         ArgumentError: the file holds an agent for one scene.
         ClearwayError: it cannot be read.
     """
-    from clearway.agents.generalist import GENERALIST, Generalist
+    from clearway.agents.generalist import Generalist
     from clearway.api.evaluation import is_exported, load_agent
     from clearway.deploy.generalist import GeneralistAgent
     from clearway.deploy.navigator import open_agent
 
-    named = str(path) == GENERALIST and not path.exists()
+    named = is_generalist(path)
     if not named and not is_exported(path):
         return load_agent(path, checkpoint)
     if checkpoint is not None:
@@ -128,6 +129,11 @@ def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Gen
         problem = f"{path}: holds the agent for scene {agent.card.scene}, and goals are for agents of any room"
         raise ArgumentError(f"{problem}. Evaluate it without goals")
     return agent.generalist
+
+
+def is_generalist(path: Path) -> bool:
+    """Whether the agent that comes with clearway is meant, not a folder of this name."""
+    return str(path) == GENERALIST and not path.exists()
 
 
 def _check_sees(agent: object) -> None:
@@ -158,7 +164,7 @@ def _takes(
 
 def _named(agent: object) -> tuple[str, AgentMaker]:
     """What an agent is called, and what makes it for a world."""
-    from clearway.agents.generalist import GENERALIST, Generalist
+    from clearway.agents.generalist import Generalist
     from clearway.agents.named import named_maker
     from clearway.learn.load import TrainedAgent
 

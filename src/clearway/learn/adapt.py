@@ -57,11 +57,15 @@ class Adapt(PPO):
         """A trainer at its first frame.
 
         Raises:
-            RunError: the scenes' features are not those of the generalist's eyes.
+            RunError: the scenes' features are not those of the generalist's eyes, or it shall have goals of its own.
         """
         from clearway.agents.generalist import Generalist
         from clearway.learn.adapting import AdaptingTrainer
 
+        if self.goals != "given":
+            raise RunError(
+                f"adapt learns given targets alone, not goals={self.goals}. Leave goals out, or train by ppo"
+            )
         generalist = Generalist.shipped()
         eyes = generalist.encoder.record
         if world.features is None or world.encoder is None or world.encoder.identity != eyes.identity:

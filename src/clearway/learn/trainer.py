@@ -136,7 +136,10 @@ class Trainer:
         steps = self.learn(batch, kept, lr, settings, self._shuffler(self.updates))
         self.frames += self.frames_per_update
         self.updates += 1
-        self._rebalance(rollout)
+        if self.own_goals:
+            self.own_goals.see(rollout.history[:, :, -1])
+            self.own_goals.see(rollout.arrived)
+        self._rebalance()
         result = {
             **self._loss_figures(steps, explained),
             "hindsight_rows": len(batch) - rows,
@@ -314,13 +317,11 @@ class Trainer:
             del figures["clipped"]
         return figures
 
-    def _rebalance(self, rollout: Rollout) -> None:
-        """Draw targets more often that are reached less often, and poses that the rollout came by as own goals."""
+    def _rebalance(self) -> None:
+        """Draw targets more often that are reached less often, and own goals as far as there are any."""
         self.statistics.refresh_success()
         choice, learner = self.navigation.choice, self.learner
         if self.own_goals:
-            self.own_goals.see(rollout.history[:, :, -1])
-            self.own_goals.see(rollout.arrived)
             choice.reweigh(self.own_goals.weights(choice, 1 + learner.balance * (1 - self.statistics.recent_success)))
         elif learner.balance:
             choice.reweigh(balanced_weights(choice, self.statistics.recent_success, learner.balance))
