@@ -132,6 +132,8 @@ def test_a_run_goes_on_bit_for_bit_and_says_what_was_adapted(scenes: list[Scene]
 
 def test_scenes_that_its_eyes_have_not_seen_are_refused_with_the_remedy(scenes: list[Scene], tmp_path: Path):
     bare = make_world([replace(scene, features=None, encoder=None) for scene in scenes], TARGETS)
+    with pytest.raises(RunError, match="adapt learns given targets alone, not goals=seen"):
+        replace(LEARNER, goals="seen").trainer(bare, COLLISION_AWARE, 0)
     with pytest.raises(RunError, match=r"the scenes have none\. Encode them.*scenes encode FILE --encoder"):
         LEARNER.trainer(bare, COLLISION_AWARE, 0)
     others = make_world(seen_by_eyes(tmp_path / "other", *scenes, seed=1), TARGETS)

@@ -91,8 +91,8 @@ def checked_picture(picture: np.ndarray, card: Card | None = None) -> np.ndarray
     if max(picture.shape) > MAX_PICTURE_SIDE:
         problem = f"the picture is {picture.shape[1]} x {picture.shape[0]} pixels"
         raise DeployError(f"{problem}, expected at most {MAX_PICTURE_SIDE} a side. Make it smaller first")
-    if card is not None and (problem := aspect_problem(picture, card)):
-        raise DeployError(problem)
+    if card is not None and (aspect := aspect_problem(picture, card)):
+        raise DeployError(aspect)
     return picture
 
 
