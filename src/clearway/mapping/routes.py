@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -47,9 +46,10 @@ def ways_from(poses: Sequence[LatticePose], entering: np.ndarray) -> np.ndarray:
     cost = np.empty((len(poses), entering[0].size), np.float32)
     for row, pose in enumerate(poses):
         prices = np.append(entering[row].ravel(), np.float32(1))[price]
-        steps: Any = csr_array((prices, after, first), shape=(cost.shape[1], cost.shape[1]))
+        steps = csr_array((prices, after, first), shape=(cost.shape[1], cost.shape[1]))
         start = int(np.ravel_multi_index(pose.index, entering[row].shape))
-        cost[row] = np.minimum(dijkstra(steps, indices=start, limit=FAR), FAR)
+        found = dijkstra(steps, indices=start, limit=FAR)  # type: ignore[call-overload]  # stubs know no csr_array
+        cost[row] = np.minimum(found, FAR)
     return cost.reshape(entering.shape)
 
 
