@@ -72,20 +72,31 @@ def judge(eyes: Eyes, views: Views, seed: int = 0) -> Judgement:
     Raises:
         SceneError: a shard is damaged or gone.
     """
-    training = eyes.training
-    eyes.eval()
-    with torch.inference_mode():
-        found = [_in_room(eyes, shard, np.random.default_rng([seed, room])) for room, shard in enumerate(views.shards)]
-    eyes.train(training)
+    found = judge_rooms(eyes, views, seed)
     means = {name: float(np.nanmean([room[name] for room in found])) for name in found[0]}
     return Judgement(len(found), **means)
 
 
-def _in_room(eyes: Eyes, shard: Shard, rng: np.random.Generator) -> dict[str, float]:
+def judge_rooms(eyes: Eyes, views: Views, seed: int = 0, *, relight: bool = True) -> list[dict[str, float]]:
+    """The figures of each room, see `Judgement`; NaN where a room has nothing to tell one from.
+
+    relight: second takes are seen under another light and with noise; else as they were taken.
+    """
+    training = eyes.training
+    eyes.eval()
+    rngs = [np.random.default_rng([seed, room]) for room in range(len(views.shards))]
+    with torch.inference_mode():
+        found = [_in_room(eyes, shard, rng, relight) for shard, rng in zip(views.shards, rngs, strict=True)]
+    eyes.train(training)
+    return found
+
+
+def _in_room(eyes: Eyes, shard: Shard, rng: np.random.Generator, relight: bool) -> dict[str, float]:
     every = slice(None)
     table, depth, pictures = shard.table, shard.seen(DEPTH, every), shard.seen(RGB, every)
     levels = pictures.astype(np.float32)
-    levels[1::2] = relit(pictures[1::2], rng)
+    if relight:
+        levels[1::2] = relit(pictures[1::2], rng)
     pixels = torch.from_numpy(standardised(levels))
     tokens = torch.cat([eyes(pixels[first : first + BATCH]) for first in range(0, len(pixels), BATCH)])
     glance = eyes.glance(tokens)
