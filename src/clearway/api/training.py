@@ -12,18 +12,23 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_args
 
+from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
+from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
 from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
+from clearway.evaluation.takes import Takes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
+from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunRecord
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
+from clearway.live.conditions import Perturbations
 from clearway.markdown import table_lines
 from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
@@ -89,6 +94,8 @@ def train(
     out: str | os.PathLike[str] | None = None,
     resume: bool = False,
     zone_level: ZoneLevel = "pose",
+    perturb: Perturbed = (),
+    takes: int = TAKES,
     device: str = "cpu",
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
@@ -112,6 +119,9 @@ def train(
             scene files, not scenes in memory, where the folder is to be opened without naming them again.
         resume: go on with the run in `out` from its newest checkpoint.
         zone_level: whether zones are those of poses ("pose") or of whole cells ("cell").
+        perturb: what is perturbed in pictures of every pose that are seen beside the scene's own, one a step, as of
+            `evaluate_goals`; nothing by default. The scenes are rooms that can be built again; by ppo and a2c.
+        takes: pictures of each pose where they are perturbed.
         device: of torch, "cpu" or "cuda".
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
@@ -133,6 +143,7 @@ def train(
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
+    seen = _takes(loaded, perturbations_asked(perturb), as_whole("takes", takes, 1), number, learner, show_progress)
     request = RunRequest(
         scenes=loaded,
         targets=chosen,
@@ -143,6 +154,8 @@ def train(
         paths=by_name(pairs),
         device=as_word("device", device),
         feature_store=store,  # type: ignore[arg-type]
+        takes=None if seen is None else seen.seen[FEATURES],
+        takes_made=None if seen is None else {**seen.made, "seed": number},
     )
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
@@ -184,6 +197,18 @@ def chosen_learner(
         raise ArgumentError(f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}")
     given = settings if frames is None else {**settings, "frames": frames}
     return replace(learner, **as_settings(type(learner), given))
+
+
+def _takes(
+    scenes: Sequence[Scene], perturbations: Perturbations, count: int, seed: int, learner: Learner, show_progress: bool
+) -> Takes | None:
+    """Features of perturbed takes of the scenes' poses; None where nothing is perturbed."""
+    if perturbations == Perturbations():
+        return None
+    if not isinstance(learner, OnPolicy):  # before what takes long
+        problem = f"perturb: {learner.algorithm} learns from the scenes' own pictures alone"
+        raise ArgumentError(f"{problem}. Leave it out, or train by ppo or a2c")
+    return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=seed, show_progress=show_progress)
 
 
 def _is_known(learner: Learner) -> bool:

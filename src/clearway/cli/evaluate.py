@@ -100,7 +100,8 @@ class Evaluate:
         )
 
     def _at_goals(self, goals: int) -> None:
-        from clearway.api.goals import STEP_LIMIT, TAKES
+        from clearway.api.goals import STEP_LIMIT
+        from clearway.api.takes import TAKES
         from clearway.cli.goals import evaluate_at_goals
 
         given = {

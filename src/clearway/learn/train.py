@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -29,6 +30,7 @@ from clearway.learn.figures import Figures
 from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
+from clearway.learn.on_policy import OnPolicy
 from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.seeds import check_seed
@@ -84,9 +86,12 @@ class RunRequest:
         paths: file of each scene by name, where it has one.
         device: torch device, for example "cpu" or "cuda".
         feature_store: where features are kept, see `clearway.world.feature_store`.
+        takes: features of other pictures of each scene's poses, (S, K, F) float32; at every step one of them or of the
+            scene's own is seen, targets in the scene's own.
+        takes_made: how they were made, JSON values.
 
     Raises:
-        RunError: the seed is out of range.
+        RunError: the seed is out of range, or the algorithm learns from no takes.
     """
 
     scenes: Sequence[Scene]
@@ -98,9 +103,14 @@ class RunRequest:
     paths: Mapping[str, Path] | None = None
     device: str = "cpu"
     feature_store: FeatureStore = "memory"
+    takes: Sequence[np.ndarray] | None = None
+    takes_made: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
+        if self.takes is not None and not isinstance(self.learner, OnPolicy):
+            problem = f"{self.learner.algorithm} learns from the scenes' own pictures alone"
+            raise RunError(f"{problem}. Leave the perturbation out, or train by ppo or a2c")
 
     @property
     def paid(self) -> Reward:
@@ -110,8 +120,10 @@ class RunRequest:
     def trainer(self) -> Learning:
         """A trainer at its first frame."""
         device, reward = usable_device(self.device), self.paid  # before the scenes, which may take long
-        world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store).to(device)
-        return self.learner.trainer(world, reward, self.seed)
+        world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store)
+        if self.takes is not None:
+            world = world.with_takes(self.takes)
+        return self.learner.trainer(world.to(device), reward, self.seed)
 
 
 def train(

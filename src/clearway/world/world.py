@@ -49,6 +49,8 @@ class World:
         start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
         feature_store: where features are kept, see there.
         encoder: the record of what made the features; None where the scenes have none, or do not say.
+        sightings: pictures of a pose that features are kept of. Features are (S * sightings, F), a pose's one after the
+            other, that of the scene's own picture first.
     """
 
     scene_names: tuple[str, ...]
@@ -67,6 +69,7 @@ class World:
     start_count: Tensor
     feature_store: FeatureStore = "memory"
     encoder: EncoderRecord | None = None
+    sightings: int = 1
 
     @property
     def scene_count(self) -> int:
@@ -119,6 +122,17 @@ class World:
         found = target_tables(walked, targets).items()
         tables: dict[str, Any] = {name: torch.from_numpy(table).to(self.device) for name, table in found}
         return replace(self, **tables)
+
+    def with_takes(self, takes: Sequence[np.ndarray]) -> World:
+        """The same tables, with features of takes of each scene's poses, (S, K, F) float32, beside its own."""
+        assert self.features is not None and self.sightings == 1
+        taken = torch.from_numpy(np.concatenate(takes)).to(self.features)
+        rows = torch.cat([self.features[:, None], taken], 1).flatten(0, 1)
+        return replace(self, features=rows, sightings=1 + taken.shape[1])
+
+    def pose(self, sighting: Tensor) -> Tensor:
+        """States (...) int64 of rows of features (...) int64."""
+        return sighting if self.sightings == 1 else sighting // self.sightings
 
     def _walked(self, index: int) -> WalkedScene:
         first = int(self.scene_offset[index])
