@@ -208,6 +208,7 @@ def make_world(
             for index, scene in enumerate(scenes)
         ]
         found = target_tables(walked, targets)  # before features are read, which may take long
+    tables: dict[str, Any] = {name: torch.from_numpy(table) for name, table in found.items()}
     return World(
         scene_names=names,
         scene_offset=torch.from_numpy(offset),
@@ -219,7 +220,7 @@ def make_world(
         encoder=scenes[0].encoder if scenes else None,
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
         clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
-        **{name: torch.from_numpy(table) for name, table in found.items()},
+        **tables,
     )
 
 
