@@ -89,7 +89,7 @@ def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
-    first, watching, commands, imports, program = code_blocks(ROOT / "README.md")
+    first, watching, commands, imports, generalist, program = code_blocks(ROOT / "README.md")
     programs = [line.partition("#")[0].strip() for line in first.text.splitlines()]
     assert programs == ["scripts/demo", "scripts/test"]  # CI runs the second, and with it this test
     changes = {
@@ -115,11 +115,19 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
     done = run_block(Block("sh", shortened(watching.text, changes)), tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("http://127.0.0.1:")
+    changes = {
+        "clearway view --agent": f"{UNTIL_STOPPED}view --agent",
+        "--room 7                        #": "--room 7 || test $? = 124  #",
+        "--count 10": "--count 1 --goals 1 --step-limit 5",
+    }
+    done = run_block(Block("sh", shortened(generalist.text, changes)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("http://127.0.0.1:")
     changes = {"frames=600_000": "frames=4_000", "evaluate(run)": "evaluate(run, episodes=2)"}
     done = run_block(Block("python", shortened(program.text, changes)), tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1].split()[0] in ("True", "False")
-    made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx"]
+    made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx", "film.mp4"]
     made += [f"imported/{name}.h5" for name in ("dump", "hall", "office", "lab")]
     assert all((tmp_path / name).exists() for name in made)
 
