@@ -20,7 +20,7 @@ from clearway.cli.imports.command import ImportScenes
 from clearway.cli.main import Command, Scenes
 from clearway.cli.scenes import Inspect
 from clearway.errors import ClearwayError
-from clearway.perception import EncoderWarning
+from clearway.scenes.validate import SceneWarning
 
 COMMANDS = {
     "demo",
@@ -183,10 +183,10 @@ def test_warnings_are_shown_once_whatever_python_was_told(capsys):
         warnings.simplefilter("error")
         with showing_warnings():
             for _ in range(3):
-                warnings.warn("another encoder stands in", EncoderWarning, stacklevel=1)
+                warnings.warn("another encoder stands in", SceneWarning, stacklevel=1)
             warnings.warn("of no use to a user", DeprecationWarning, stacklevel=1)
-        with pytest.raises(EncoderWarning):  # outside, all is as before
-            warnings.warn("another encoder stands in", EncoderWarning, stacklevel=1)
+        with pytest.raises(SceneWarning):  # outside, all is as before
+            warnings.warn("another encoder stands in", SceneWarning, stacklevel=1)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err.count("another encoder stands in") == shown.err.count("─ warning ─") == 1

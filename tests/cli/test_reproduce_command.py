@@ -227,12 +227,12 @@ def test_features_of_rooms_depend_on_what_is_asked_for_not_on_what_is_there(
         found = setting.prepare(tmp_path, budget, encoder=encoder, learners=("default",))
         return {file.name: file.digest for file in found.files}
 
-    alone = digests("auto", "bathroom")
-    both = digests("auto", "bathroom", "kitchen")
+    alone = digests("random-resnet50", "bathroom")
+    both = digests("random-resnet50", "bathroom", "kitchen")
     assert both["bathroom"] != alone["bathroom"]
-    assert digests("auto", "bathroom") == alone
-    assert digests("auto", "bathroom", "kitchen") == both
-    assert digests("some/where/else", "bathroom") != alone
+    assert digests("random-resnet50", "bathroom") == alone
+    assert digests("random-resnet50", "bathroom", "kitchen") == both
+    assert digests("some/other/encoder", "bathroom") != alone
 
 
 def test_options_that_would_do_nothing_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:

@@ -12,15 +12,20 @@ import torch
 from torch.nn.functional import interpolate
 
 from clearway.deploy.card import card_from_json
-from clearway.deploy.from_run import load_run_in_scene, picture_encoder
+from clearway.deploy.export import export_onnx
+from clearway.deploy.from_run import RunAgent, load_run_in_scene, picture_encoder
 from clearway.deploy.onnx_file import OnnxAgent, read_onnx
 from clearway.deploy.onnx_graph import resize_weights
 from clearway.errors import DeployError, EncoderError, RunError
 from clearway.learn.load import run_world
+from clearway.learn.train import train
 from clearway.perception import depth_grid, encoder_from_record
 from clearway.scenes.sensors import RGB
+from clearway.scenes.thor_v1 import write_scene
 from helpers.agents import after_poses
-from helpers.made import with_depth
+from helpers.made import grid_scene, with_depth
+from helpers.small_eyes import seen_by_eyes
+from helpers.small_runs import small_learner, small_request
 
 CLOSE = {"rtol": 0, "atol": 1e-5}
 
@@ -46,6 +51,26 @@ def test_the_policy_alone_equals_the_network_in_pytorch(deployed, policy_file, r
     scale = agent.record.learner.reward_scale
     np.testing.assert_allclose(found[1] * scale, value[:, None].numpy(), **CLOSE)
     assert np.ptp(found[0], axis=1).max() > 0.02  # trained enough that the actions differ
+
+
+@pytest.mark.slow
+def test_an_agent_with_eyes_is_a_file_too(tmp_path) -> None:
+    scenes = seen_by_eyes(tmp_path / "eyes", grid_scene(0, width=4, depth=3, name="attic"))
+    write_scene(scenes[0], tmp_path / "attic.h5")
+    paths = {"attic": tmp_path / "attic.h5"}
+    learner = replace(small_learner(frames=400), centre_features=True)
+    request = small_request(scenes=scenes, paths=paths, targets={"attic": (5, 22)}, learner=learner)
+    train(request, tmp_path / "run")
+    chosen = load_run_in_scene(tmp_path / "run")
+    export_onnx(chosen, tmp_path / "agent.onnx")
+    in_torch, in_file = RunAgent(chosen), OnnxAgent(tmp_path / "agent.onnx")
+    pictures = scenes[0].observations[:]
+    (first, _), (second, _) = (
+        agent.act({RGB: pictures[7:9]}, agent.reset({RGB: pictures[[5, 22]]}, np.arange(2)))
+        for agent in (in_torch, in_file)
+    )
+    np.testing.assert_allclose(second.probabilities, first.probabilities, **CLOSE)
+    assert in_file.card.normalisation["pixels"]["height"] == 32
 
 
 @pytest.mark.parametrize("rows", [1, 3, 32])

@@ -16,7 +16,7 @@ from clearway.errors import ArgumentError, DeployError
 from clearway.evaluation.episodes import run_episodes
 from clearway.mapping.map_files import HEADER, read_map, write_map
 from clearway.mapping.room_map import RoomMap
-from clearway.perception.encoder import EncoderWarning
+from clearway.scenes.aspect import AspectWarning
 from clearway.scenes.sensors import RGB
 from clearway.world.world import make_world
 from helpers.agents import check_agent
@@ -162,7 +162,7 @@ def test_any_size_is_taken_and_another_aspect_is_refused(one_file) -> None:
 
 def test_scenes_of_another_aspect_are_walked_with_a_warning(one_file) -> None:
     square = grid_scene(3, picture_size=(24, 24))
-    with pytest.warns(EncoderWarning, match="scene grid: pictures of 24 x 24 pixels have the aspect 1.00"):
+    with pytest.warns(AspectWarning, match="scene grid: pictures of 24 x 24 pixels have the aspect 1.00"):
         one_file.generalist.seen([square])
     one_file.generalist.seen([SCENE])
 

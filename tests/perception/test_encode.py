@@ -11,7 +11,7 @@ import torch
 from transformers import ResNetConfig, ResNetModel
 
 from clearway.errors import EncoderError, SceneError
-from clearway.perception import EncoderWarning, encode, encode_scenes, encoder_from_record, random_resnet
+from clearway.perception import encode, encode_scenes, encoder_from_record, random_resnet
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes.scene import EncoderRecord, Scene
@@ -129,20 +129,18 @@ def test_a_folder_is_an_encoder(folder_model: str) -> None:
     assert np.allclose(encoder.encode(scenes[2].observations[:]), scenes[2].features, atol=1e-5)
 
 
-def test_auto_takes_the_trained_encoder_where_it_can(monkeypatch: pytest.MonkeyPatch, folder_model: str) -> None:
+def test_by_default_the_eyes_that_come_along_encode() -> None:
+    (scene,), (again,) = encode_scenes(rooms()[:1]), encode_scenes(rooms()[:1], "clearway")
+    assert (scene.encoder.name, scene.encoder.identity) == ("clearway", again.encoder.identity)
+    assert np.array_equal(scene.features, again.features)
+    encoder = encoder_from_record(scene.encoder)
+    assert encoder.feature_count == scene.features.shape[1] == 3200
+
+
+def test_the_trained_resnet_is_taken_by_its_name(monkeypatch: pytest.MonkeyPatch, folder_model: str) -> None:
     monkeypatch.setattr("clearway.perception.pretrained.RESNET50_MODEL", folder_model)
-    (scene,) = encode_scenes(rooms()[:1], "auto")
+    (scene,) = encode_scenes(rooms()[:1], "resnet50")
     assert scene.encoder.name == "resnet50"
-    assert "stands_in_for" not in scene.encoder.settings
-
-
-def test_auto_falls_back_with_a_warning_every_time() -> None:
-    for _ in range(2):
-        with pytest.warns(EncoderWarning, match="random-resnet50 stands in"):
-            (scene,) = encode_scenes(rooms()[:1])
-    assert scene.encoder.name == "random-resnet50"
-    assert scene.encoder.settings["stands_in_for"] == "resnet50"
-    assert encoder_from_record(scene.encoder).feature_count == 32
 
 
 def test_what_cannot_be_encoded_is_one_clear_error() -> None:

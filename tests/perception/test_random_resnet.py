@@ -91,7 +91,7 @@ def test_an_altered_record_is_refused() -> None:
 
 def test_notes_in_the_settings_do_not_matter() -> None:
     record = tiny_record()
-    assert from_record(replace(record, settings={**record.settings, "stands_in_for": "x"})).feature_count == 32
+    assert from_record(replace(record, settings={**record.settings, "noted": "x"})).feature_count == 32
 
 
 def forged(record: EncoderRecord, architecture: dict[str, object], arrays: dict[str, np.ndarray]) -> EncoderRecord:

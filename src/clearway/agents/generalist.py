@@ -19,9 +19,9 @@ from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
 from clearway.perception import eyes
 from clearway.perception.encode import encoded
-from clearway.perception.encoder import Encoder, EncoderWarning
+from clearway.perception.encoder import Encoder
 from clearway.perception.eyes import EyesEncoder
-from clearway.scenes.aspect import other_aspect
+from clearway.scenes.aspect import AspectWarning, other_aspect
 from clearway.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -87,14 +87,14 @@ class Generalist:
             SceneError: a step or a turn there is not as long as its own.
 
         Warns:
-            EncoderWarning: a scene's pictures have another aspect than those that the eyes were taught on.
+            AspectWarning: a scene's pictures have another aspect than those that the eyes were taught on.
         """
         for scene in scenes:
             check_steps(scene)
             if scene.observations is not None:
                 _, height, width, _ = scene.observations.shape
                 if problem := other_aspect((height, width), self.picture_px):
-                    warnings.warn(f"scene {scene.name}: {problem}", EncoderWarning, stacklevel=2)
+                    warnings.warn(f"scene {scene.name}: {problem}", AspectWarning, stacklevel=2)
         return [encoded(scene, self.encoder) for scene in scenes]
 
 

@@ -52,9 +52,6 @@ def generate(
         ArgumentError: an argument is of the wrong kind or out of range.
         ClearwayError: a file in the folder is damaged or not what is asked for, the disk is full, or rendering or the
             encoder cannot be had here.
-
-    Warns:
-        EncoderWarning: "auto" fell back to random weights.
     """
     from clearway.generation.cached import cached_requests
     from clearway.generation.files import NO_ENCODER, Seen, generate_scenes, scene_path

@@ -105,8 +105,9 @@ def encode_scenes(
 
     Args:
         scenes: with pictures; those to be trained together are encoded together.
-        encoder: "resnet50", "random-resnet50" (calibrated on the scenes), "auto" (the first if it can be had, else the
-            second), a plugin's or a Hugging Face model's name; or an encoder of your own (`OwnEncoder`).
+        encoder: "auto" or "clearway" (the eyes that come along), "resnet50", "random-resnet50" (calibrated on the
+            scenes), a folder of eyes, a plugin's or a Hugging Face model's name; or an encoder of your own
+            (`OwnEncoder`).
         encoder_seed: of "random-resnet50".
         workers: processes that share the encoding; None: this process alone. An encoder of your own takes none.
         show_progress: draw a progress bar, if standard error is a terminal.
@@ -114,9 +115,6 @@ def encode_scenes(
     Raises:
         ArgumentError: an argument is of the wrong kind or out of range.
         ClearwayError: a scene has no pictures, or the encoder cannot be had or used.
-
-    Warns:
-        EncoderWarning: "auto" fell back to random weights.
     """
     from clearway.perception import encode
 
@@ -169,9 +167,6 @@ def build_room(
     Raises:
         ArgumentError: there is no such room, or a number or path is none.
         ClearwayError: there is no such sensor, rendering is not possible here, or the encoder cannot be had.
-
-    Warns:
-        EncoderWarning: "auto" fell back to random weights.
     """
     from clearway.perception.encode import check_sees
     from clearway.rooms.library import cached_room_scene

@@ -41,7 +41,7 @@ class Reproduce:
     frames: int | None = None
     """Training frames of every learner; by default as the budget says."""
     encoder: str = "auto"
-    """For the default rooms: auto, random-resnet50, or a model's name or folder."""
+    """For the default rooms, as for clearway scenes build; the published figures were made with random-resnet50."""
     seeds: int | None = None
     """Agents of each kind; by default as the budget says."""
     learners: tuple[LearnerName, ...] = ("paper", "default")

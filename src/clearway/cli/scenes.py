@@ -32,8 +32,8 @@ class Build:
     sensors: tuple[SensorName, ...] = ("rgb",)
     """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), depth-grid (needs --sensors rgb
-    depth), one of another package (clearway plugins), or a Hugging Face model."""
+    """auto or clearway (the eyes that come along), resnet50 (microsoft/resnet-50), random-resnet50, depth-grid (needs
+    --sensors rgb depth), a folder of eyes, one of another package (clearway plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None

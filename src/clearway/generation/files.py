@@ -138,7 +138,7 @@ def check_kept(scene: Scene, path: Path, request: Request, seen: Seen) -> None:
 def find_record(encoder: str, seed: int, seen: Seen, workers: int | None = None) -> EncoderRecord:
     """The record of an encoder; "random-resnet50" is calibrated on the same four rooms whatever is generated.
 
-    So scenes of all splits can be trained and evaluated together. Raises and warns as `perception.encode.find_record`.
+    So scenes of all splits can be trained and evaluated together. Raises as `perception.encode.find_record`.
     """
     from clearway.perception import encode
 

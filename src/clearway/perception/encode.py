@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import numpy as np
 from clearway.errors import EncoderError, SceneError
 from clearway.perception import depth_grid, eyes, plugged, pretrained, random_resnet
 from clearway.perception.cache import Entry, cached, content_key, joint_key
-from clearway.perception.encoder import Encoder, EncoderWarning, sensor_of
+from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
 from clearway.plugins import find_plugin
@@ -41,10 +39,10 @@ def find_record(
     """The record of the encoder that a user asks for by name.
 
     Args:
-        name: a folder of eyes (`clearway pretrain`), or "clearway" for those that come along, "resnet50" (trained,
-            `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "auto" ("resnet50" if it
-            can be had, else "random-resnet50"), "depth-grid" (of depth, without a network), one of another package
-            (`clearway.plugins`), or a vision model on the Hugging Face hub or in a folder.
+        name: "clearway" or "auto" for the eyes that come along, a folder of eyes (`clearway pretrain`), "resnet50"
+            (trained on ImageNet, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "depth-grid" (of
+            depth, without a network), one of another package (`clearway.plugins`), or a vision model on the Hugging
+            Face hub or in a folder.
         scenes: what "random-resnet50" calibrates on, in any order; or what gives them, asked only if it is needed.
         seed: of "random-resnet50".
         shape, preprocessing: of "random-resnet50".
@@ -52,10 +50,9 @@ def find_record(
     Raises:
         EncoderError: there is no such encoder, it cannot be had, or there are no pictures to calibrate on.
         PluginError: another package's encoder cannot be used.
-
-    Warns:
-        EncoderWarning: "auto" fell back to random weights; the record's settings then hold "stands_in_for".
     """
+    if name == AUTO:
+        return eyes.find_record()
     if name == RANDOM:
         return _fitted(scenes, seed, shape, preprocessing)
     if name == depth_grid.NAME:
@@ -64,18 +61,8 @@ def find_record(
         return eyes.find_record(name)
     if name == TRAINED:
         return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
-    if name != AUTO:
-        plugin = find_plugin("encoders", name)
-        return plugged.make_encoder(plugin).record if plugin else pretrained.find_record(name)
-    try:
-        return pretrained.find_record(pretrained.RESNET50_MODEL, TRAINED)
-    except EncoderError as fault:
-        text = (
-            f"The trained encoder {TRAINED} cannot be had, so {RANDOM} stands in for it: random weights, calibrated "
-            f"on these scenes. Its features tell the states apart but mean less, and fit these scenes alone. ({fault})"
-        )
-        warnings.warn(text, EncoderWarning, stacklevel=2)
-    return _standing_in(_fitted(scenes, seed, shape, preprocessing))
+    plugin = find_plugin("encoders", name)
+    return plugged.make_encoder(plugin).record if plugin else pretrained.find_record(name)
 
 
 def check_sees(encoder: str, sensors: Sequence[str]) -> None:
@@ -96,7 +83,7 @@ def encoder_from_record(record: EncoderRecord) -> Encoder:
     if kind == depth_grid.KIND:
         return depth_grid.from_record(record)
     if kind == eyes.KIND:
-        return eyes.from_record(record)
+        return eyes.from_record(record).network
     if kind == pretrained.KIND:
         return pretrained.from_record(record)
     if kind == plugged.KIND:
@@ -259,7 +246,3 @@ def _fitted(
     settings = entry.note["settings"]
     assert isinstance(settings, dict)
     return EncoderRecord(RANDOM, str(entry.note["identity"]), settings, entry.arrays)
-
-
-def _standing_in(record: EncoderRecord) -> EncoderRecord:
-    return replace(record, settings={**record.settings, "stands_in_for": TRAINED})

@@ -26,10 +26,6 @@ IDENTITY_LETTERS = 12
 SENSOR = "sensor"  # the setting that names whose pictures an encoder takes, where they are not the colour camera's
 
 
-class EncoderWarning(UserWarning):
-    """Another encoder than the best one was used."""
-
-
 class Encoder(Protocol):
     """Turns pictures into frozen features."""
 

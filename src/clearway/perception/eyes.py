@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +18,13 @@ import numpy as np
 
 from clearway.errors import EncoderError
 from clearway.files import json_text, read_json, written_whole
-from clearway.perception.encoder import IDENTITY_LETTERS
-from clearway.perception.preprocess import Preprocessing, to_pixels
+from clearway.perception.encoder import IDENTITY_LETTERS, NetworkEncoder
+from clearway.perception.preprocess import Preprocessing
 from clearway.scenes.scene import EncoderRecord
 
 if TYPE_CHECKING:
+    import torch
+
     from clearway.perception.eyes_network import Eyes, EyesShape
 
 NAME, KIND = "clearway", "eyes"
@@ -57,7 +60,7 @@ class EyesCard:
 
 @dataclass(frozen=True)
 class EyesEncoder:
-    """The encoder: the description of a picture, then its tokens, row by row from the upper left.
+    """Eyes as an encoder.
 
     Attributes:
         record: what it is.
@@ -67,24 +70,27 @@ class EyesEncoder:
     record: EncoderRecord
     eyes: Eyes
 
+    @cached_property
+    def network(self) -> NetworkEncoder:
+        """It as a frozen network; features: the description of a picture, then its tokens, from the upper left."""
+        shape = self.eyes.shape
+        size = Preprocessing(shape.height_px, shape.width_px, MEAN, STD)
+        return NetworkEncoder(self.record, size, self.eyes, self._features_of, self.feature_count)
+
     @property
     def feature_count(self) -> int:
         """F."""
         return self.eyes.shape.feature_count
 
     def encode(self, pictures: np.ndarray) -> np.ndarray:
-        """Features (B, F) float32 of pictures (B, height, width, 3) uint8, which may have another size.
+        """Features (B, F) float32 of pictures (B, height, width, 3) uint8, of any size; see `NetworkEncoder.encode`."""
+        return self.network.encode(pictures)
 
-        Raises:
-            EncoderError: the pictures are of another shape or type.
-        """
+    def _features_of(self, pixels: torch.Tensor) -> torch.Tensor:
         import torch
 
-        with torch.inference_mode():
-            shape = self.eyes.shape
-            tokens = self.eyes(to_pixels(pictures, Preprocessing(shape.height_px, shape.width_px, MEAN, STD)))
-            features = torch.cat([self.eyes.glance(tokens).description, tokens.flatten(1)], dim=1)
-        return np.ascontiguousarray(features.numpy())
+        tokens = self.eyes(pixels)
+        return torch.cat([self.eyes.glance(tokens).description, tokens.flatten(1)], dim=1)
 
 
 def find_record(name: str = NAME) -> EncoderRecord:

@@ -46,7 +46,7 @@ def _cached(model: str) -> Path | None:
         return None
     except HFValidationError as fault:
         problem = f"encoder '{model}': is neither a folder nor a model's name on the Hugging Face hub"
-        raise EncoderError(f"{problem}. Use resnet50, random-resnet50 or auto, or check the name") from fault
+        raise EncoderError(f"{problem}. Use clearway, resnet50 or random-resnet50, or check the name") from fault
     return folder if any(folder.glob(CONFIG)) and any(folder.glob(WEIGHTS)) else None
 
 

@@ -5,6 +5,10 @@ from __future__ import annotations
 SLACK = 0.02  # share by which aspects may differ
 
 
+class AspectWarning(UserWarning):
+    """Pictures have another aspect than the eyes were taught on."""
+
+
 def other_aspect(given_px: tuple[int, int], trained_px: tuple[int, int]) -> str | None:
     """What is to be told of pictures (height, width) whose aspect is not the trained one; None where it is.
 

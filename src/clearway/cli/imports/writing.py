@@ -22,8 +22,8 @@ class Encoding:
     """How pictures become features."""
 
     encoder: str = "auto"
-    """resnet50, random-resnet50, auto (the first if it can be had, else the second), depth-grid (needs --sensors rgb
-    depth), one of another package (clearway plugins), or a Hugging Face model."""
+    """auto or clearway (the eyes that come along), resnet50 (microsoft/resnet-50), random-resnet50, depth-grid (needs
+    --sensors rgb depth), a folder of eyes, one of another package (clearway plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
     workers: int | None = None
