@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import clearway
 from clearway.agents.agent import FEATURES
 from clearway.api import takes as api_takes
 from clearway.api import training
-from clearway.errors import SceneError
 from clearway.evaluation.takes import Takes
 from helpers.made import corridor_scene
 from helpers.small_eyes import seen_by_eyes
@@ -25,18 +23,10 @@ def test_a_training_sees_so_many_takes_of_every_pose_under_all_perturbations(tmp
         asked.append((len(scenes), perturbations.to_json(), sees, encoder, takes, seed))
         return Takes(takes, {FEATURES: [np.repeat(one.features[:, None] * 0.5, takes, 1) for one in scenes]})
 
-    monkeypatch.setattr(api_takes, "takes_seen", taken)
-    monkeypatch.setattr("clearway.live.live_room.check_is_room", lambda scene: None)
+    monkeypatch.setattr(training, "takes_seen", taken)
     plain = clearway.train(scene, [8, 16], algorithm=clearway.Recurrent(**SMALL), seed=3)
     assert not asked
-    other = clearway.train(scene, [8, 16], algorithm=clearway.Recurrent(**SMALL, takes=2), seed=3)
+    other = clearway.train(scene, [8, 16], algorithm=clearway.Recurrent(**SMALL), perturb="all", takes=2, seed=3)
     everything = api_takes.perturbations_asked("all").to_json()
     assert asked == [(1, everything, (FEATURES,), None, 2, 3)]
     assert plain.figures["loss"] != other.figures["loss"]
-
-
-def test_a_scene_that_cannot_be_built_again_is_refused_before_anything_is_taken(tmp_path, monkeypatch):
-    scene = seen_by_eyes(tmp_path / "eyes", corridor_scene(5))[0]
-    monkeypatch.setattr(api_takes, "takes_seen", lambda *asked, **settings: pytest.fail("taken"))
-    with pytest.raises(SceneError, match="there is no room to walk in"):
-        training.train(scene, [8, 16], algorithm=clearway.Recurrent(**SMALL, takes=2))

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 import clearway
-from clearway.errors import ArgumentError
+from clearway.errors import ArgumentError, ClearwayError
 from clearway.learn.presets import DEFAULT, PAPER_A3C
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
@@ -132,6 +132,15 @@ def test_what_does_not_fit_is_told_in_one_line_that_is_also_a_value_error(corrid
         clearway.train(corridor, **arguments)
     assert isinstance(caught.value, ValueError)
     assert "\n" not in str(caught.value)
+
+
+def test_perturbed_pictures_are_of_rooms_and_for_algorithms_that_learn_by_them(corridor) -> None:
+    with pytest.raises(ClearwayError, match="perturb: q-learning learns from the scenes' own pictures alone"):
+        clearway.train(corridor, algorithm="q-learning", perturb="all", **{"frames": 800})
+    with pytest.raises(ArgumentError, match="there is none of that name"):
+        clearway.train(corridor, perturb="fog", **SMALL)
+    with pytest.raises(ClearwayError, match=r"encoder made-up: .* Encode the scene again"):
+        clearway.train(corridor, perturb="all", **SMALL)
 
 
 def test_a_reward_that_clips_needs_settings_that_do(corridor) -> None:

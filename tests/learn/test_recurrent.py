@@ -88,17 +88,16 @@ def test_the_agent_says_in_an_episode_what_the_network_said_in_training(world: W
     assert world.features is not None
     target, hidden, last = torch.tensor([1, 3]), torch.zeros(2, 16), torch.zeros(2, LAST_COUNT)
     state = agent.reset({FEATURES: world.features[world.target_state[target]].numpy()}, np.array([3, 4]))
-    own = torch.zeros(2, dtype=torch.int64)
     path = [torch.tensor(poses) for poses in ([0, 30], [4, 30], [8, 34], [8, 42])]  # the first arrives
     for seen, onward in zip(path, [*path[1:], path[-1]], strict=True):
         with torch.no_grad():
-            said = trainer.network(trainer.seen(target, seen, own), last, hidden)
+            said = trainer.network(trainer.seen(target, seen), last, hidden)
         decisions, state = agent.act({FEATURES: world.features[seen].numpy()}, state)
         np.testing.assert_allclose(decisions.probabilities, torch.softmax(said.scores, 1).numpy(), atol=1e-3)
         np.testing.assert_allclose(decisions.value, said.value.numpy(), atol=2e-3)
         np.testing.assert_array_equal(decisions.arrived, said.arrived.numpy() > 0)
         hidden = said.hidden
-        last = last_step(torch.from_numpy(decisions.action), trainer.seen.likeness((onward, own), (seen, own)))
+        last = last_step(torch.from_numpy(decisions.action), trainer.seen.likeness(onward, seen))
 
 
 def test_the_table_holds_what_the_eyes_compare(world: World):
@@ -108,8 +107,9 @@ def test_the_table_holds_what_the_eyes_compare(world: World):
     target, state, take = torch.tensor([0, 2, 4, 4]), torch.tensor([3, 19, 20, 43]), torch.tensor([0, 1, 1, 0])
     seen = torch.stack([world.features[s] * (0.5 if t else 1) for s, t in zip(state, take, strict=True)])
     told = trainer.pairs(seen, world.features[world.target_state[target]])
-    torch.testing.assert_close(trainer.seen(target, state, take), told, rtol=2e-3, atol=2e-3)
-    alike = trainer.seen.likeness((state, take), (state, torch.zeros_like(take)))
+    sighting = state * 2 + take
+    torch.testing.assert_close(trainer.seen(target, sighting), told, rtol=2e-3, atol=2e-3)
+    alike = trainer.seen.likeness(sighting, state * 2)
     torch.testing.assert_close(alike, torch.tensor([1.0, 0.5, 0.5, 1.0]), rtol=1e-3, atol=1e-3)
     rows = 2 * (3 * 20 + 2 * 40), 2 * (20 + 40)
     assert trainer.seen.bytes == rows[0] * 2 * trainer.pairs.count + rows[1] * 4 * 16
@@ -117,15 +117,15 @@ def test_the_table_holds_what_the_eyes_compare(world: World):
 
 def test_every_step_shows_one_of_the_takes_and_of_the_scenes_own_pictures(world: World):
     assert world.features is not None
-    own = trainer_of(world)
-    assert own.seen.takes == 1 and not own.take.any()
+    own = trainer_of(world).navigation
+    assert torch.equal(own.sighting, own.state)
     other = trainer_of(
         world.with_takes([world.features[:20, None].repeat(1, 2, 1), world.features[20:, None].repeat(1, 2, 1)])
     )
     shown = []
     for _ in range(3):
         other.update()
-        shown.append(other.take)
+        shown.append(other.navigation.sighting % 3)
     counts = torch.bincount(torch.cat(shown), minlength=3)
     assert len(counts) == 3 and (counts > 5).all()
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeGuard
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
-from clearway.api.takes import Perturbed, perturbations_asked, takes_seen
+from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
 from clearway.choices import GENERALIST
 from clearway.errors import ArgumentError
 from clearway.live.conditions import Perturbations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from clearway.perception.encoder import Encoder
     from clearway.scenes.scene import Scene
 
-GOALS, STEP_LIMIT, TAKES = 20, 500, 4
+GOALS, STEP_LIMIT = 20, 500
 
 
 def evaluate_goals(

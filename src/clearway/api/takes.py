@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from clearway.evaluation.takes import Takes
     from clearway.perception.encoder import Encoder
 
+TAKES = 4  # of each pose, where nobody says how many
+
 Perturbed: TypeAlias = str | Sequence[str] | Perturbations
 """What is perturbed: words, "geometry light=0.2" or ("geometry", "light=0.2"), or strengths."""
 

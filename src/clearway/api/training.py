@@ -12,11 +12,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_args
 
+from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
+from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
 from clearway.choices import FeatureStore, ZoneLevel
 from clearway.errors import ArgumentError
+from clearway.evaluation.takes import Takes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
@@ -24,6 +27,7 @@ from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunRecord
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
+from clearway.live.conditions import Perturbations
 from clearway.markdown import table_lines
 from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
@@ -32,7 +36,7 @@ from clearway.scenes.validate import SceneWarning
 from clearway.torch_threads import torch_threads
 
 if TYPE_CHECKING:
-    import numpy as np
+    pass
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
 
@@ -92,6 +96,8 @@ def train(
     out: str | os.PathLike[str] | None = None,
     resume: bool = False,
     zone_level: ZoneLevel = "pose",
+    perturb: Perturbed = (),
+    takes: int = TAKES,
     device: str = "cpu",
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
@@ -116,6 +122,10 @@ def train(
             scene files, not scenes in memory, where the folder is to be opened without naming them again.
         resume: go on with the run in `out` from its newest checkpoint.
         zone_level: whether zones are those of poses ("pose") or of whole cells ("cell").
+        perturb: what is perturbed in pictures of every pose that are seen beside the scene's own, one a step, as of
+            `evaluate_goals`; nothing by default. The scenes are rooms that can be built again; by
+            ppo, a2c and recurrent.
+        takes: pictures of each pose where they are perturbed.
         device: of torch, "cpu" or "cuda".
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
@@ -137,7 +147,7 @@ def train(
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
-    takes = _takes(loaded, learner, number, show_progress)
+    seen = _takes(loaded, perturbations_asked(perturb), as_whole("takes", takes, 1), number, learner, show_progress)
     request = RunRequest(
         scenes=loaded,
         targets=chosen,
@@ -148,7 +158,8 @@ def train(
         paths=by_name(pairs),
         device=as_word("device", device),
         feature_store=store,  # type: ignore[arg-type]
-        takes=takes,
+        takes=None if seen is None else seen.seen[FEATURES],
+        takes_made=None if seen is None else {**seen.made, "seed": number},
     )
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
@@ -160,23 +171,6 @@ def train(
             metrics=tuple(folder.metrics()),
             folder=None if out is None else path,
         )
-
-
-def _takes(scenes: Sequence[Scene], learner: Learner, seed: int, show_progress: bool) -> Sequence[np.ndarray] | None:
-    """Features of the perturbed pictures that a learner wants to see, (S, K, F) a scene; None: it wants none."""
-    if not learner.takes:
-        return None
-    from clearway.agents.agent import FEATURES
-    from clearway.api.takes import perturbations_asked, takes_seen
-    from clearway.live.live_room import check_is_room
-
-    for scene in scenes:  # before what takes long
-        check_is_room(scene)
-    everything = perturbations_asked("all")
-    taken = takes_seen(
-        scenes, everything, (FEATURES,), None, takes=learner.takes, seed=seed, show_progress=show_progress
-    )
-    return taken.seen[FEATURES]
 
 
 def chosen_learner(
@@ -207,6 +201,16 @@ def chosen_learner(
         raise ArgumentError(f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}")
     given = settings if frames is None else {**settings, "frames": frames}
     return replace(learner, **as_settings(type(learner), given))
+
+
+def _takes(
+    scenes: Sequence[Scene], perturbations: Perturbations, count: int, seed: int, learner: Learner, show_progress: bool
+) -> Takes | None:
+    """Features of perturbed takes of the scenes' poses; None where nothing is perturbed."""
+    if perturbations == Perturbations():
+        return None
+    learner.check_sees_takes()  # before what takes long
+    return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=seed, show_progress=show_progress)
 
 
 def _is_known(learner: Learner) -> bool:

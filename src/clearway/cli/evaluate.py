@@ -119,7 +119,8 @@ class Evaluate:
 
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
-        from clearway.api.goals import GOALS, STEP_LIMIT, TAKES
+        from clearway.api.goals import GOALS, STEP_LIMIT
+        from clearway.api.takes import TAKES
         from clearway.cli.goals import evaluate_at_goals
 
         self._check_goals_alone({"--light and the other flags of --live": self.room != Live()})

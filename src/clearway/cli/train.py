@@ -60,6 +60,12 @@ class Train:
     """Of parameters, environments, actions and the choice of targets."""
     threads: int | None = None
     """Threads of torch, or processes of a3c. Results repeat bit for bit at one number of threads, and a3c's with 1."""
+    perturb: tuple[str, ...] = ()
+    """Learn from perturbed pictures too: all, geometry, names, light=0.2, as of evaluate --goals. Every pose is seen in
+    one of --takes pictures or the scene's own, another at each step. In rooms that can be built again; by ppo, a2c,
+    recurrent."""
+    takes: int = 4
+    """Pictures of each pose with --perturb."""
     device: str = "cpu"
     """cpu or cuda."""
     feature_store: FeatureStore = "memory"
@@ -82,6 +88,8 @@ class Train:
             out=self.out,
             resume=self.resume,
             zone_level=self.zones,
+            perturb=self.perturb,
+            takes=self.takes,
             device=self.device,
             feature_store=self.feature_store,
             threads=self.threads,

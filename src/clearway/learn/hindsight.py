@@ -53,7 +53,7 @@ def find_segments(rollout: Rollout, navigation: Navigation, told: Tensor | None 
     member_state = world.target_state[members]
     hit = rollout.arrived[..., None] == member_state  # (T, N, J)
     hit &= valid & (rollout.target[..., None] != members)
-    elsewhere = rollout.history[:, :, -1, None] != member_state
+    elsewhere = world.pose(rollout.history[:, :, -1, None]) != member_state
     open_t = ~(rollout.reached | rollout.truncated)[..., None]
     used = torch.empty_like(hit)
     alive = torch.zeros_like(hit[0])
@@ -119,5 +119,6 @@ def hindsight_batch(
 
 def _reward(rollout: Rollout, rows: Segments, navigation: Navigation) -> Tensor:
     """(R,) the reward each step would have earned with the target passed by."""
-    here, action = rollout.history[rows.step, rows.env, -1], rollout.action[rows.step, rows.env]
+    here = navigation.world.pose(rollout.history[rows.step, rows.env, -1])
+    action = rollout.action[rows.step, rows.env]
     return navigation.earned(here, action, rows.hit)

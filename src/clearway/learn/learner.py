@@ -42,7 +42,6 @@ AT_LEAST_ZERO = {
     "ratio_clip",
     "value_weight",
     "feature_basis",
-    "takes",
 }
 ZERO_TO_ONE = {"discount", "gae_lambda", "step_size", "explore_start", "explore_end"}
 BELOW_ONE = {"settle"}
@@ -55,10 +54,12 @@ class Learner:
     Attributes:
         algorithm: its name.
         acts_on: the part of the trainer's tensors that an agent needs to act.
+        sees_takes: whether it learns from perturbed pictures of poses too.
     """
 
     algorithm: ClassVar[str]
     acts_on: ClassVar[str] = "network"
+    sees_takes: ClassVar[bool] = False
 
     frames: int = 3_000_000
     """Training frames over all environments; schedules end here."""
@@ -88,11 +89,6 @@ class Learner:
         return 1
 
     @property
-    def takes(self) -> int:
-        """Perturbed pictures of every pose that training shows besides the scenes' own; 0: none."""
-        return 0
-
-    @property
     def heads_by_scene(self) -> bool:
         """Whether the agent has a part of its own for every scene, so that it acts in its own scenes alone."""
         return True
@@ -100,6 +96,12 @@ class Learner:
     def head_count(self, scenes: int) -> int:
         """Heads of a network for so many scenes."""
         return scenes if self.heads_by_scene else 1
+
+    def check_sees_takes(self) -> None:
+        """Raise RunError where it learns from the scenes' own pictures alone."""
+        if not self.sees_takes:
+            problem = f"perturb: {self.algorithm} learns from the scenes' own pictures alone"
+            raise RunError(f"{problem}. Leave it out, or train by ppo, a2c or recurrent")
 
     def paid(self, reward: Reward) -> Reward:
         """The reward as training pays it: `clip_rewards` alone says whether it is clipped, where there is that setting.

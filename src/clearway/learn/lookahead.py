@@ -55,7 +55,7 @@ def better_policy(
     """Probabilities that the policy is to be drawn towards, (B, A).
 
     Args:
-        history, target: (B, K), (B,) int64, rows ordered by scene.
+        history, target: (B, K), (B,) int64, rows ordered by scene; histories as navigation has them.
         log_pi: (B, A) of the policy.
         value: (B,) of the rows.
         observed: known transitions.
@@ -64,17 +64,18 @@ def better_policy(
         discount, reward_scale, temperature: as in the learner's settings.
     """
     world = navigation.world
-    after = observed.next_state[history[:, -1]]  # (B, A)
+    here = world.pose(history[:, -1])
+    after = observed.next_state[here]  # (B, A)
     row, action = (after != UNKNOWN).nonzero(as_tuple=True)
     arrived = after[row, action]
     keys = target[row] * world.state_count + arrived
     pairs, pair_of = torch.unique(keys, return_inverse=True)  # ascending: ordered by target, so by scene
     state, goal = pairs % world.state_count, pairs // world.state_count
     rows_per_scene = counted(world.target_scene[goal], world.scene_count).tolist()
-    start_value = network.start_values(state, goal, rows_per_scene)  # (P,)
+    start_value = network.start_values(state * world.sightings, goal, rows_per_scene)  # (P,) by own pictures
     reached = state == world.target_state[goal]
     worth = discount * torch.where(reached, 0.0, start_value)
-    reward = navigation.earned(history[row, -1], action, reached[pair_of]) * reward_scale
+    reward = navigation.earned(here[row], action, reached[pair_of]) * reward_scale
     advantage = torch.zeros_like(log_pi)
     advantage[row, action] = reward + worth[pair_of] - value[row]
     return torch.softmax(log_pi + advantage / temperature, 1)

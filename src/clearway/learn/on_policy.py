@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from clearway.choices import Goals, MatmulPrecision
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class OnPolicy(OnFeatures, Learner):
     """A synchronous actor-critic: all environments walk a rollout, then the network learns from it."""
+
+    sees_takes: ClassVar[bool] = True
 
     # How much experience, and how it is gathered
     envs: int = 400

@@ -39,6 +39,7 @@ class Recurrent(Learner):
     """The settings."""
 
     algorithm: ClassVar[str] = "recurrent"
+    sees_takes: ClassVar[bool] = True
 
     frames: int = 12_000_000
     """Training frames over all environments; schedules end here."""
@@ -54,9 +55,6 @@ class Recurrent(Learner):
     """Of the network."""
     remembers: bool = True
     """False: forget at every step what came before the last one, to see what memory brings."""
-    takes: int = 0
-    """Perturbed pictures of every pose (camera, light, furniture), of which, and of the scene's own, each step shows
-    one; the rooms must be such as can be built again."""
     discount: float = 0.99
     gae_lambda: float = 0.95
     teacher_share: float = 0.5

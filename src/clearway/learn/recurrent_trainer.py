@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from clearway.learn.recurrent import Recurrent
 
 FIT_STREAM, SHUFFLE_STREAM = 13, 14
-STREAMS = {"actions": ACTION_STREAM, "teacher": 11, "who": 12, "takes": 15}
+STREAMS = {"actions": ACTION_STREAM, "teacher": 11, "who": 12}
 VALUE_WEIGHT = 1.0
 
 
@@ -115,7 +115,6 @@ class RecurrentTrainer:
         self.last = torch.zeros(count, LAST_COUNT, device=device)
         self.begins = torch.ones(count, dtype=torch.bool, device=device)
         self.navigation.begin_staggered()
-        self.take = self._drawn_take()
 
     @property
     def finished(self) -> bool:
@@ -236,10 +235,9 @@ class RecurrentTrainer:
 
         Episodes that are cut earn what their last pose is worth as well, by what is remembered (N, H).
         """
-        before = (self.navigation.state, self.take)
+        before = self.navigation.sighting
         step = self.navigation.step(action)
-        self.take = self._drawn_take()
-        last = last_step(action, self.seen.likeness((step.state, self.take), before))
+        last = last_step(action, self.seen.likeness(self.navigation.sighting, before))
         reward = step.reward
         cut, reached = (flag.nonzero()[:, 0] for flag in (step.truncated, step.reached))
         if len(cut):
@@ -254,12 +252,8 @@ class RecurrentTrainer:
 
     def _seen(self, index: Tensor | None = None) -> Tensor:
         """(B, D), what is seen beside the target in the environments in index (B,), all by default."""
-        rows = (self.navigation.target, self.navigation.state, self.take)
+        rows = (self.navigation.target, self.navigation.sighting)
         return self.seen(*(rows if index is None else (part[index] for part in rows)))
-
-    def _drawn_take(self) -> Tensor:
-        """(N,) int64, which picture of its pose every environment sees; 0 is the scene's own."""
-        return (self.streams["takes"].uniform() * self.seen.takes).long()
 
     def _shuffled(self, epoch: int) -> np.ndarray:
         return np.random.default_rng([self.seed, SHUFFLE_STREAM, self.updates, epoch]).permutation(self.learner.envs)
@@ -281,7 +275,7 @@ class RecurrentTrainer:
             "optimiser": self.optimiser.tensors(),
             "navigation": self.navigation.tensors(),
             "statistics": self.statistics.tensors(),
-            "memory": {"hidden": self.hidden, "last": self.last, "begins": self.begins, "take": self.take},
+            "memory": {"hidden": self.hidden, "last": self.last, "begins": self.begins},
             "drawn": {name: stream.drawn for name, stream in self.streams.items()},
         }
         return {name: tensor.detach() for name, tensor in joined(parts).items()}
@@ -295,7 +289,7 @@ class RecurrentTrainer:
         self.optimiser.load_tensors(part_of(tensors, "optimiser"))
         self.navigation.load_tensors(part_of(tensors, "navigation"))
         self.statistics.load_tensors(part_of(tensors, "statistics"))
-        for name in ("hidden", "last", "begins", "take"):
+        for name in ("hidden", "last", "begins"):
             setattr(self, name, tensors[f"memory.{name}"].to(here).clone())
         for name, stream in self.streams.items():
             stream.seek(tensors[f"drawn.{name}"].to(here).clone())

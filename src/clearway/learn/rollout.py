@@ -41,7 +41,7 @@ class Rollout:
     """T steps of N environments.
 
     Attributes:
-        history: (T, N, K) int64, what the agent knew before each step.
+        history: (T, N, K) int64, what the agent had seen before each step (`world.navigation`).
         target: (T, N) int64.
         action: (T, N) int64.
         arrived: (T, N) int64, the pose each step led to.

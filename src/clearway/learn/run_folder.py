@@ -62,7 +62,10 @@ class SceneRecord:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Everything that determines a run, and where it was made. The reward is as training paid it."""
+    """Everything that determines a run, and where it was made. The reward is as training paid it.
+
+    takes: how the perturbed pictures were made that were seen beside the scenes' own; None: there were none.
+    """
 
     learner: Learner
     reward: Reward
@@ -72,6 +75,7 @@ class RunRecord:
     versions: Mapping[str, str]
     hardware: Mapping[str, Any]
     command: tuple[str, ...]
+    takes: Mapping[str, Any] | None = None
 
     @property
     def targets(self) -> dict[str, tuple[int, ...]]:
@@ -97,7 +101,7 @@ class RunRecord:
 
         def essence(run: RunRecord) -> tuple:
             scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
-            return run.learner, run.reward.to_json(), run.seed, run.zone_level, scenes
+            return run.learner, run.reward.to_json(), run.seed, run.zone_level, scenes, run.takes
 
         return essence(self) == essence(other)
 
@@ -133,6 +137,7 @@ def record_of(request: RunRequest) -> RunRecord:
         versions=package_versions(),
         hardware=hardware(request.device) | {"feature_store": request.feature_store},
         command=tuple(sys.argv),
+        takes=request.takes_made,
     )
 
 
@@ -294,6 +299,7 @@ def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
         versions=content["versions"],
         hardware=content["hardware"],
         command=tuple(content["command"]),
+        takes=content.get("takes"),
     )
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -85,10 +85,12 @@ class RunRequest:
         paths: file of each scene by name, where it has one.
         device: torch device, for example "cpu" or "cuda".
         feature_store: where features are kept, see `clearway.world.feature_store`.
-        takes: features of so many other pictures of each scene's states as the learner wants, (S, K, F) a scene.
+        takes: features of other pictures of each scene's poses, (S, K, F) float32; at every step one of them or of the
+            scene's own is seen, targets in the scene's own.
+        takes_made: how they were made, JSON values.
 
     Raises:
-        RunError: the seed is out of range.
+        RunError: the seed is out of range, or the algorithm learns from no takes.
     """
 
     scenes: Sequence[Scene]
@@ -101,9 +103,12 @@ class RunRequest:
     device: str = "cpu"
     feature_store: FeatureStore = "memory"
     takes: Sequence[np.ndarray] | None = None
+    takes_made: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
+        if self.takes is not None:
+            self.learner.check_sees_takes()
 
     @property
     def paid(self) -> Reward:
@@ -116,8 +121,7 @@ class RunRequest:
         world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store)
         if self.takes is not None:
             world = world.with_takes(self.takes)
-        world = world.to(device)
-        return self.learner.trainer(world, reward, self.seed)
+        return self.learner.trainer(world.to(device), reward, self.seed)
 
 
 def train(

@@ -92,7 +92,7 @@ class Trainer:
         self.lookup = LookupNetwork(
             self.network,
             features,
-            world.target_state,
+            world.target_state * world.sightings,  # seen in the scene's own pictures
             factor_dtype(learner.matmul_precision, device),
             most_seen=self.env_count * (learner.history_length + learner.rollout_steps),
         )
@@ -196,7 +196,7 @@ class Trainer:
             tuple(count * learner.rollout_steps for count in rows_per_scene),
         )
         if learner.lookahead:
-            self.observed.add(batch.history[:, -1], action, as_rows(rollout.arrived))
+            self.observed.add(self.world.pose(batch.history[:, -1]), action, as_rows(rollout.arrived))
         if looks_ahead:
             batch = replace(batch, better=self._better(batch, log_pi, rollout.kept.value))
         return batch, explained
@@ -269,7 +269,7 @@ class Trainer:
         learner, world = self.learner, self.navigation.world
         epochs = dealt_epochs(
             batch,
-            world.state_count,
+            world.state_count * world.sightings,
             world.target_count,
             epochs=learner.epochs,
             parts=learner.minibatches,

@@ -2,7 +2,7 @@
 
 A comparison costs far more than the network that reads it, and there are fewer pairs than frames.
 
-Axis letters: M targets, S states, K takes of a pose (its own picture first), D numbers that tell of a pair, B rows.
+Axis letters: M targets, S states, D numbers that tell of a pair, B rows.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ BLOCK = 2048  # pairs that are compared at a time
 
 
 class PairTable:
-    """Rows for every take of every state of every target's scene, in half precision: 2 D bytes each.
+    """Rows for every sighting (row of features) in every target's scene, in half precision: 2 D bytes each.
 
     Args:
-        world: with features that the eyes made, and takes of them or none.
+        world: with features that the eyes made.
         pairs: compares; standardised by pairs of this world's from now on.
         chance: draws those.
     """
 
     @torch.no_grad()
     def __init__(self, world: World, pairs: SeenPairs, chance: Streams) -> None:
-        self._world, self.takes = world, 1 if world.takes is None else 1 + world.takes.shape[1]
-        offset = world.scene_offset
-        states = torch.diff(offset)[world.target_scene]
-        self._first, self._offset = offset[world.target_scene], states.cumsum(0) - states
+        self._world = world
+        offset = world.scene_offset * world.sightings
+        sightings = torch.diff(offset)[world.target_scene]
+        self._first, self._offset = offset[world.target_scene], sightings.cumsum(0) - sightings
         self._fit(pairs, chance)
-        shape = (int(states.sum()) * self.takes, pairs.count)
+        shape = (int(sightings.sum()), pairs.count)
         self._pairs = torch.empty(shape, dtype=torch.float16, device=world.device)
         width = pairs.eyes.shape.description_width
-        self._descriptions = torch.empty(world.state_count * self.takes, width, device=world.device)
+        self._descriptions = torch.empty(int(offset[-1]), width, device=world.device)
         done = 0
         for scene in torch.unique(world.target_scene).tolist():
             first, last = offset[scene : scene + 2].tolist()
-            seen = self._sighted(pairs, torch.arange(first * self.takes, last * self.takes, device=world.device))
-            self._descriptions[first * self.takes : last * self.takes] = seen.description
-            wanted = pairs.sight(self._features(world.target_state[world.target_scene == scene] * self.takes))
+            seen = self._sighted(pairs, torch.arange(first, last, device=world.device))
+            self._descriptions[first:last] = seen.description
+            wanted = pairs.sight(self._wanted(world.target_scene == scene))
             for target in range(len(wanted.tokens)):
                 for part in torch.arange(len(seen.tokens), device=world.device).split(BLOCK):
                     told = pairs.compared(seen.rows(part), wanted.rows(torch.full_like(part, target)))
@@ -55,27 +55,26 @@ class PairTable:
         """Of memory."""
         return sum(table.numel() * table.element_size() for table in (self._pairs, self._descriptions))
 
-    def __call__(self, target: Tensor, state: Tensor, take: Tensor) -> Tensor:
-        """(B, D) float32 of takes (B,) of states (B,) beside targets (B,), int64 all."""
-        return self._pairs[(self._offset[target] + state - self._first[target]) * self.takes + take].float()
+    def __call__(self, target: Tensor, sighting: Tensor) -> Tensor:
+        """(B, D) float32 of sightings (B,) beside targets (B,), int64 both."""
+        return self._pairs[self._offset[target] + sighting - self._first[target]].float()
 
-    def likeness(self, seen: tuple[Tensor, Tensor], before: tuple[Tensor, Tensor]) -> Tensor:
-        """(B,) of takes of states and those before, (state, take) each, (B,) int64."""
-        now, then = (self._descriptions[state * self.takes + take] for state, take in (seen, before))
-        return likeness(now, then)
+    def likeness(self, sighting: Tensor, before: Tensor) -> Tensor:
+        """(B,) of sightings and those before, (B,) int64."""
+        return likeness(self._descriptions[sighting], self._descriptions[before])
 
     def _sighted(self, pairs: SeenPairs, rows: Tensor) -> Sighted:
         parts = [pairs.sight(self._features(some)) for some in rows.split(BLOCK)]
         return Sighted(*(torch.cat(columns) for columns in zip(*parts, strict=True)))
 
-    def _features(self, row: Tensor) -> Tensor:
-        """(B, F) float32 of rows (B,), takes of states: state * K + take."""
+    def _features(self, sighting: Tensor) -> Tensor:
+        """(B, F) float32 of sightings (B,)."""
         assert self._world.features is not None
-        state, take = row // self.takes, row % self.takes
-        own = self._world.features[state].float()
-        if self._world.takes is None:
-            return own
-        return torch.where((take == 0)[:, None], own, self._world.takes[state, (take - 1).clamp_min(0)].float())
+        return self._world.features[sighting].float()
+
+    def _wanted(self, target: Tensor) -> Tensor:
+        """(B, F) float32 of targets (B,) int64, or (M,) bool; they are seen in the scenes' own pictures."""
+        return self._features(self._world.target_state[target] * self._world.sightings)
 
     def _fit(self, pairs: SeenPairs, chance: Streams) -> None:
         """Standardise what is seen by pairs of poses and targets drawn at random."""
@@ -83,5 +82,5 @@ class PairTable:
         target = (chance.uniform() * world.target_count).long()
         place = (chance.uniform() * world.start_count[target]).long()
         start = world.start_state[world.start_offset[target] + place]
-        take = (chance.uniform() * self.takes).long()
-        pairs.fit(self._features(start * self.takes + take), self._features(world.target_state[target] * self.takes))
+        take = (chance.uniform() * world.sightings).long()
+        pairs.fit(self._features(start * world.sightings + take), self._wanted(target))

@@ -6,6 +6,9 @@ An episode starts in a pose drawn uniformly from those that can reach the target
 pose K times. A blocked move leaves the agent where it is, and its repeated pose enters the history like any other. The
 episode ends in the exact target pose (`reached`), or is cut at the step limit (`truncated`); see Zhu et al., ICRA 2017.
 Where agents stop by themselves, it ends by the action `STOP`, in the target or elsewhere (`gave_up`).
+
+Histories hold what was seen: the pose, or, where a world has several pictures of each (`World.sightings`), the row of
+one of them, drawn at every step.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from clearway.world.streams import Streams
 from clearway.world.world import World
 
 HISTORY_LENGTH = 4
-START_STREAM, TARGET_STREAM = 1, 2
+START_STREAM, TARGET_STREAM, SIGHT_STREAM = 1, 2, 14
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,7 @@ class Navigation:
         self.reward_table = table.to(world.device, reward_dtype)
         seeds = seeds.to(world.device)
         self.start_stream, self.target_stream = Streams(seeds, START_STREAM), Streams(seeds, TARGET_STREAM)
+        self.sight_stream = Streams(seeds, SIGHT_STREAM)  # drawn from where poses have several pictures
         self.history = torch.zeros(count, history_length, dtype=torch.int64, device=world.device)
         self.target = torch.zeros(count, dtype=torch.int64, device=world.device)
         self.elapsed = torch.zeros(count, dtype=torch.int64, device=world.device)
@@ -146,6 +150,11 @@ class Navigation:
     @property
     def state(self) -> Tensor:
         """(N,) int64, where every agent is."""
+        return self.world.pose(self.sighting)
+
+    @property
+    def sighting(self) -> Tensor:
+        """(N,) int64, what every agent sees: rows of features."""
         return self.history[:, -1]
 
     def reset(self, index: Tensor | None = None, target: Tensor | None = None, start: Tensor | None = None) -> None:
@@ -163,7 +172,7 @@ class Navigation:
         if start is None:
             start = self._draw_start(self.start_stream.at(index), target)
         self.target[index] = target
-        self.history[index] = start[:, None]
+        self.history[index] = self._seen(start, index)[:, None]
         self.elapsed[index] = 0
 
     def begin_staggered(self) -> None:
@@ -188,7 +197,7 @@ class Navigation:
         target = self.choice.draw(self.target_stream.uniform(ended))
         start = self._draw_start(self.start_stream.uniform(ended), target)
         self.target = torch.where(ended, target, self.target)
-        self.history = torch.where(ended[:, None], start[:, None], self.history)
+        self.history = torch.where(ended[:, None], self._seen(start)[:, None], self.history)
         self.elapsed = torch.where(ended, 0, self.elapsed)
 
     def reseed(self, seeds: Tensor, index: Tensor) -> None:
@@ -207,7 +216,7 @@ class Navigation:
             stopped = action == STOP
             reached, gave_up = reached & stopped, stopped & ~reached
         zone = self.world.zone[arrived]
-        self.history = torch.cat([self.history[:, 1:], arrived[:, None]], 1)
+        self.history = torch.cat([self.history[:, 1:], self._seen(arrived)[:, None]], 1)
         self.elapsed += 1
         limit_met = torch.zeros_like(reached) if self.step_limit is None else self.elapsed >= self.step_limit
         reward = self.earned(here, action, reached)
@@ -217,6 +226,14 @@ class Navigation:
     def earned(self, state: Tensor, action: Tensor, reached: Tensor) -> Tensor:
         """What actions (B,) earn in states (B,) int64, both, where they reach the target or not, (B,) bool."""
         return self.reward_table[reached.long(), state, action]
+
+    def _seen(self, state: Tensor, index: Tensor | None = None) -> Tensor:
+        """What is seen in states (B,) int64 of the environments in index (B,), all by default: rows of features."""
+        count = self.world.sightings
+        if count == 1:
+            return state
+        uniform = self.sight_stream.uniform() if index is None else self.sight_stream.at(index)
+        return state * count + (uniform * count).long()
 
     def _draw_start(self, uniform: Tensor, target: Tensor) -> Tensor:
         rank = (uniform * self.world.start_count[target]).long()
@@ -230,6 +247,7 @@ class Navigation:
             "elapsed": self.elapsed,
             "starts_drawn": self.start_stream.drawn,
             "targets_drawn": self.target_stream.drawn,
+            "sights_drawn": self.sight_stream.drawn,
         }
 
     def load_tensors(self, tensors: dict[str, Tensor]) -> None:
@@ -240,3 +258,5 @@ class Navigation:
         self.elapsed = tensors["elapsed"].to(here).clone()
         self.start_stream.seek(tensors["starts_drawn"].to(here).clone())
         self.target_stream.seek(tensors["targets_drawn"].to(here).clone())
+        if "sights_drawn" in tensors:  # not in checkpoints of before
+            self.sight_stream.seek(tensors["sights_drawn"].to(here).clone())

@@ -51,7 +51,8 @@ class World:
         start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
         feature_store: where features are kept, see there.
         encoder: the record of what made the features; None where the scenes have none, or do not say.
-        takes: (S, K, F) float16, features of K other pictures of every state; None: none.
+        sightings: pictures of a pose that features are kept of. Features are (S * sightings, F), a pose's one after the
+            other, that of the scene's own picture first.
     """
 
     scene_names: tuple[str, ...]
@@ -71,7 +72,7 @@ class World:
     start_count: Tensor
     feature_store: FeatureStore = "memory"
     encoder: EncoderRecord | None = None
-    takes: Tensor | None = None
+    sightings: int = 1
 
     @property
     def scene_count(self) -> int:
@@ -126,10 +127,15 @@ class World:
         return replace(self, **tables)
 
     def with_takes(self, takes: Sequence[np.ndarray]) -> World:
-        """The same tables, shared, with features of other pictures: of each scene in turn (S of the scene, K, F)."""
-        joined = torch.cat([torch.from_numpy(np.asarray(part, np.float16)) for part in takes]).to(self.device)
-        assert self.features is not None and joined.shape == (self.state_count, joined.shape[1], self.features.shape[1])
-        return replace(self, takes=joined)
+        """The same tables, with features of takes of each scene's poses, (S, K, F) float32, beside its own."""
+        assert self.features is not None and self.sightings == 1
+        taken = torch.from_numpy(np.concatenate(takes)).to(self.features)
+        rows = torch.cat([self.features[:, None], taken], 1).flatten(0, 1)
+        return replace(self, features=rows, sightings=1 + taken.shape[1])
+
+    def pose(self, sighting: Tensor) -> Tensor:
+        """States (...) int64 of rows of features (...) int64."""
+        return sighting if self.sightings == 1 else sighting // self.sightings
 
     def _walked(self, index: int) -> WalkedScene:
         first = int(self.scene_offset[index])
