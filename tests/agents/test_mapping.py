@@ -17,7 +17,7 @@ from helpers.made import grid_scene
 from helpers.perfect_sight import PerfectSight, seen_perfectly
 from helpers.small_eyes import seen_by_eyes, small_eyes
 
-SETTINGS = MappingSettings(side=31)
+SETTINGS = MappingSettings(side_m=15.0)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def test_it_keeps_the_protocol(tmp_path, kind):
     seen = seen_by_eyes(tmp_path / "eyes", grid_scene(2))[0]
     features = seen.features.astype(np.float32)
     sight = EyesSight(small_eyes().eval())
-    settings = MappingSettings(side=15)
+    settings = MappingSettings(side_m=7.0)
     explorer = Explorer(sight, 4, settings=settings)
     agent = {"explorer": explorer, "plain": MappingAgent(sight, settings=settings)}.get(kind)
     if agent is None:

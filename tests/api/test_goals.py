@@ -14,6 +14,7 @@ from clearway.live import live_room
 from clearway.live.conditions import Perturbations
 from clearway.perception import encoder_from_record, eyes
 from clearway.perception.eyes import write_eyes
+from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import RGB
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views import grid
@@ -161,6 +162,22 @@ def test_it_looks_around_first_where_it_may(shipped):
     assert list(toured.scenes) == ["grid", "corridor"] and toured.average.episodes == 10
     alone, *_ = evaluate_goals("generalist", scenes[1:], goals=5, step_limit=30, tour=40)
     assert alone.scenes["corridor"] == toured.scenes["corridor"]
+
+
+def test_it_walks_by_steps_of_other_lengths_but_by_one_at_a_time(shipped):
+    scene = grid_scene(3)
+    for step_m in (0.25, 0.6):
+        told, *_ = evaluate_goals("generalist", [stretched(scene, step_m / scene.cell_size_m)], goals=3, step_limit=9)
+        assert told.average.episodes == 3
+    with pytest.raises(SceneError, match=r"b: moves of 0.25 m, and in grid they are of 0.5 m\. Walk in each by"):
+        evaluate_goals("generalist", [scene, replace(stretched(scene, 0.5), name="b")], goals=3)
+    with pytest.raises(SceneError, match=r"moves of 0.1 m, and the generalist walks by 0.2 to 1 m\. Build or import"):
+        evaluate_goals("generalist", [stretched(scene, 0.2)], goals=3)
+
+
+def stretched(scene: Scene, by: float) -> Scene:
+    """The scene with cells of another size."""
+    return replace(scene, locations_m=scene.locations_m * by, cell_size_m=scene.cell_size_m * by)
 
 
 def test_a_tour_is_nothing_for_an_agent_without_a_map(run):

@@ -127,7 +127,7 @@ def test_what_it_tells(one_file) -> None:
     navigator = clearway.Navigator(one_file.path)
     card = navigator.card
     assert (card.scene, card.kind, card.picture_size) == ("any room", "generalist", (48, 64))
-    assert card.observation["vertical_fov_deg"] == 60 and card.settings["side"] == 21
+    assert card.observation["vertical_fov_deg"] == 60 and card.settings["side_m"] == 10.0
     assert card_from_json(card.to_json(), "here") == card
     navigator.set_target(PICTURES[3])
     assert navigator.arrived is None

@@ -38,7 +38,7 @@ def seen_by_eyes(folder: Path, *scenes: Scene, seed: int = 0) -> list[Scene]:
 
 def small_generalist(folder: Path) -> Generalist:
     """A generalist by the small eyes in a folder, on a small lattice; it walks, and knows little of where."""
-    return replace(Generalist.by_eyes(from_record(find_record(str(folder)))), settings=MappingSettings(side=15))
+    return replace(Generalist.by_eyes(from_record(find_record(str(folder)))), settings=MappingSettings(side_m=7.0))
 
 
 def ship(generalist: Generalist, monkeypatch: pytest.MonkeyPatch) -> None:

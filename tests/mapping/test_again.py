@@ -9,7 +9,7 @@ from clearway.scenes.actions import Action
 from helpers.made import corridor_scene
 from helpers.perfect_sight import PerfectSight, seen_perfectly
 
-SETTINGS = MappingSettings(side=31)
+SETTINGS = MappingSettings(side_m=15.0)
 
 
 class Undecided(PerfectSight):

@@ -10,7 +10,7 @@ from clearway.scenes.actions import BLOCKED
 from helpers.made import grid_scene
 from helpers.perfect_sight import PerfectSight, seen_perfectly
 
-SETTINGS = MappingSettings(side=31)
+SETTINGS = MappingSettings(side_m=15.0)
 
 
 @pytest.mark.parametrize("seed", range(3))

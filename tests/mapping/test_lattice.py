@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from clearway.mapping.beliefs import SEEN, LatticePose, add_sighting, add_standing, likeliest
-from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
+from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT, lattice_of
 from clearway.perception.around import PLACES_M
 from clearway.perception.whereabouts import ELSEWHERE, WHEREABOUTS, bin_of
 
 SIDE = 21
+HALF = lattice_of(0.5)
 
 
 def told(ahead_m: float, right_m: float, turn_deg: float) -> np.ndarray:
@@ -42,7 +43,7 @@ def test_a_turn_to_the_right_makes_right_ahead():
 def test_what_is_seen_is_where_the_pose_and_the_bin_say(heading):
     pose = LatticePose(heading, 10, 9)
     belief = np.zeros((HEADINGS, SIDE, SIDE), np.float32)
-    add_sighting(belief, pose, told(1.5, -1.0, 90.0), 2.0)
+    add_sighting(belief, pose, told(1.5, -1.0, 90.0), 2.0, HALF)
     place = np.array(pose.cell) + 3 * AHEAD[heading] - 2 * RIGHT[heading]
     assert likeliest(belief) == LatticePose((heading + 1) % HEADINGS, *place.tolist())
     assert belief.max() == belief.sum() == 2.0
@@ -50,12 +51,12 @@ def test_what_is_seen_is_where_the_pose_and_the_bin_say(heading):
 
 def test_what_lies_beyond_the_edge_is_left_out():
     belief = np.zeros((HEADINGS, SIDE, SIDE), np.float32)
-    add_sighting(belief, LatticePose(2, 0, 20), told(1.0, 0.0, 0.0), 1.0)
+    add_sighting(belief, LatticePose(2, 0, 20), told(1.0, 0.0, 0.0), 1.0, HALF)
     assert not belief.any()
-    add_sighting(belief, LatticePose(0, 0, 20), told(1.0, 0.0, 0.0), 1.0)
+    add_sighting(belief, LatticePose(0, 0, 20), told(1.0, 0.0, 0.0), 1.0, HALF)
     assert likeliest(belief) == LatticePose(0, 2, 20) and belief.sum() == 1
     room = np.zeros((SIDE, SIDE), np.float32)
-    add_standing(room, LatticePose(3, 3, 0), np.ones(len(PLACES_M), np.float32), 1.0)
+    add_standing(room, LatticePose(3, 3, 0), np.ones(len(PLACES_M), np.float32), 1.0, HALF)
     assert room.sum() == 8
 
 
@@ -64,10 +65,10 @@ def test_what_is_not_seen_counts_less_where_a_wall_may_be_between():
     room = np.full((side, side), -1.0, np.float32)
     room[12, 10] = 4.0
     belief = np.zeros((HEADINGS, side, side), np.float32)
-    add_sighting(belief, pose, np.full(ELSEWHERE, -4.0, np.float32), 1.0, room)
+    add_sighting(belief, pose, np.full(ELSEWHERE, -4.0, np.float32), 1.0, HALF, room)
     assert -2.3 < belief[0, 12, 10] < -1.5 and -0.1 < belief[0, 13, 10] < 0
     belief[:] = 0
-    add_sighting(belief, pose, np.full(ELSEWHERE, 4.0, np.float32), 1.0, room)
+    add_sighting(belief, pose, np.full(ELSEWHERE, 4.0, np.float32), 1.0, HALF, room)
     assert belief[0, 12, 10] == belief[0, 13, 10] == 4.0
 
 
@@ -78,5 +79,20 @@ def test_eyes_are_never_as_sure_of_a_cell_as_who_tried_it():
     for place in ((0.5, 0.0), (1.0, 0.5)):
         evidence[PLACES_M.index(place)] = 3.0
     for _ in range(5):
-        add_standing(room, LatticePose(0, 10, 10), evidence, 1.0)
+        add_standing(room, LatticePose(0, 10, 10), evidence, 1.0, HALF)
     assert room[11, 10] == -10.0 and room[12, 11] == SEEN and room.sum() == SEEN - 10
+
+
+def test_by_shorter_steps_a_bin_is_of_more_poses_and_a_place_tells_of_the_cells_around_it():
+    quarter = lattice_of(0.25)
+    belief = np.zeros((HEADINGS, 2 * SIDE, 2 * SIDE), np.float32)
+    add_sighting(belief, LatticePose(0, 10, 10), told(1.0, 0.0, 0.0), 1.0, quarter)
+    halves = np.array([0.5, 1.0, 0.5])
+    np.testing.assert_array_equal(belief[0, 13:16, 9:12], np.outer(halves, halves))
+    assert belief.sum() == 4
+    room = np.zeros((2 * SIDE, 2 * SIDE), np.float32)
+    evidence = np.zeros(len(PLACES_M), np.float32)
+    evidence[PLACES_M.index((1.0, 0.5))] = 2.0
+    add_standing(room, LatticePose(0, 10, 10), evidence, 1.0, quarter)
+    assert (room[14, 12], room[13, 12], room[14, 11], room[13, 11], room[12, 12]) == (2.0, 1.0, 1.0, 0.5, 0.0)
+    assert len(quarter.around[0]) == 13 * 17 and np.array_equal(HALF.shares, np.eye(63))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from clearway.agents.agent import State
@@ -13,7 +12,7 @@ from clearway.agents.exploring import Explorer, map_of
 from clearway.agents.mapping import MappingAgent
 from clearway.choices import GENERALIST
 from clearway.errors import SceneError
-from clearway.mapping.lattice import HEADINGS, STEP_M
+from clearway.mapping.lattice import HEADINGS
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
@@ -28,6 +27,9 @@ if TYPE_CHECKING:
     from clearway.world.world import World
 
 __all__ = ["GENERALIST", "Generalist"]
+
+STEPS_M = 0.2, 1.0
+"""The shortest and the longest move that it can walk by."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,27 @@ class Generalist:
         shape: Any = self.encoder.record.settings["shape"]
         return int(shape["height_px"]), int(shape["width_px"])
 
+    def stepping(self, scenes: Sequence[Scene]) -> Generalist:
+        """The same, walking by moves as long as those of the scenes.
+
+        Raises:
+            SceneError: moves are too long or too short, differ between scenes, or turns are no quarters.
+        """
+        step_m, shortest_m, longest_m = scenes[0].cell_size_m, *STEPS_M
+        for scene in scenes:
+            remedy = "Build or import the scene with these, or train an agent of its own"
+            if scene.turn_deg != 360 / HEADINGS:
+                problem = f"turns of {scene.turn_deg:g} degrees, and the {GENERALIST} walks by quarter turns"
+                raise SceneError(scene.name, problem, remedy)
+            if not shortest_m <= scene.cell_size_m <= longest_m:
+                allowed = f"{shortest_m:g} to {longest_m:g} m"
+                problem = f"moves of {scene.cell_size_m:g} m, and the {GENERALIST} walks by {allowed}"
+                raise SceneError(scene.name, problem, remedy)
+            if scene.cell_size_m != step_m:
+                problem = f"moves of {scene.cell_size_m:g} m, and in {scenes[0].name} they are of {step_m:g} m"
+                raise SceneError(scene.name, problem, "Walk in each by itself")
+        return replace(self, settings=replace(self.settings, step_m=step_m))
+
     def on_poses(self, world: World) -> MappingAgent:
         """The agent on the grid: it goes by features of its eyes, in any world."""
         return MappingAgent(self.sight, settings=self.settings)
@@ -84,24 +107,13 @@ class Generalist:
 
         Raises:
             EncoderError: a scene has no pictures.
-            SceneError: a step or a turn there is not as long as its own.
 
         Warns:
             AspectWarning: a scene's pictures have another aspect than those that the eyes were taught on.
         """
         for scene in scenes:
-            check_steps(scene)
             if scene.observations is not None:
                 _, height, width, _ = scene.observations.shape
                 if problem := other_aspect((height, width), self.picture_px):
                     warnings.warn(f"scene {scene.name}: {problem}", AspectWarning, stacklevel=2)
         return [encoded(scene, self.encoder) for scene in scenes]
-
-
-def check_steps(scene: Scene) -> None:
-    """Raise SceneError where a move is not a step of the generalist's lattice, or a turn no quarter."""
-    if math.isclose(scene.cell_size_m, STEP_M) and scene.turn_deg == 360 / HEADINGS:
-        return
-    found = f"{scene.cell_size_m:g} m and turns of {scene.turn_deg:g} degrees"
-    problem = f"moves of {found}, and the {GENERALIST} walks by moves of {STEP_M:g} m and quarter turns"
-    raise SceneError(scene.name, problem, "Build or import the scene with these, or train an agent of its own")

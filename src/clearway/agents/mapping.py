@@ -60,7 +60,14 @@ class MappingAgent:
         towards = self._sight.whereabouts(seen, state["target"])
         for row, pose in enumerate(poses):
             if not state["been"][row][pose.index]:
-                add_sighting(goal[row], pose, towards[row], self._settings.target_weight, after["room"][row])
+                add_sighting(
+                    goal[row],
+                    pose,
+                    towards[row],
+                    self._settings.target_weight,
+                    self._settings.lattice,
+                    after["room"][row],
+                )
         np.clip(goal, self._settings.least_evidence, self._settings.most_evidence, out=goal)
         likely = probabilities(np.where(state["been"], NEVER, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])

@@ -87,6 +87,8 @@ def evaluate_goals(
     if tour_steps and not isinstance(agent, Generalist):
         problem = f"tour={tour_steps}: {_named(agent)[0]} keeps no map, and would have nothing of a tour"
         raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
+    if isinstance(agent, Generalist):
+        agent = agent.stepping(found)
     if perturbed := perturbations != Perturbations():
         _check_sees(agent)
         for scene in found:  # before what takes long

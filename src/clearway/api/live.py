@@ -58,7 +58,7 @@ def evaluate_live(
         ClearwayError: a scene has no room that can be built again, no pictures, too few poses, or other steps and turns
             than the agent.
     """
-    from clearway.agents.generalist import GENERALIST, Generalist, check_steps
+    from clearway.agents.generalist import GENERALIST, Generalist
     from clearway.live.goals import LiveTouring, walk_to_goals
     from clearway.live.live_room import MODEL_SOURCE
     from clearway.torch_threads import torch_threads
@@ -78,8 +78,7 @@ def evaluate_live(
         problem = f"{agent!s:.80}: off the grid, {GENERALIST} alone walks to goals drawn anew"
         raise ArgumentError(f"{problem}. Evaluate a run at its targets: clearway evaluate RUN --live, without --goals")
     found = load_scenes(scenes)
-    for scene in found:
-        check_steps(scene)
+    agent = agent.stepping(found)
     settings = [Condition(label_of(perturbations), perturbations)]
     if sweep:
         fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)

@@ -79,7 +79,7 @@ class Video:
         if (self.room is None) == (self.scene is None):
             raise ClearwayError("the generalist walks in a scene. Give --scene FILE or --room SEED")
         found = load_scene(self.scene) if self.scene is not None else chosen_room(int(self.room or 0))
-        generalist = Generalist.shipped()
+        generalist = Generalist.shipped().stepping([found])
         (scene,) = generalist.seen([found])
         make = generalist.on_poses
         world, trajectory = episode_in(scene, make, self.target, step_limit=self.most_steps, seed=self.seed)

@@ -1,6 +1,6 @@
 """Beliefs over the poses of a lattice, as logarithms, and what changes them.
 
-Axes: 4 headings, G rows, G columns; W = 2 * FARTHEST + 1.
+Axes: 4 headings, G rows, G columns; W cells along a side of the window around a pose, see `Lattice`.
 """
 
 from __future__ import annotations
@@ -9,14 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.mapping.lattice import AHEAD, HEADINGS, places_around, window_bins
-from clearway.perception.whereabouts import FARTHEST
+from clearway.mapping.lattice import AHEAD, HEADINGS, Lattice
 
 NEVER = -60.0
 SEEN = 4.0  # log-odds at most of a cell that was seen, not tried
 VISIBLE = 0.9  # probability that something would be seen in a cell that is surely free: others may be behind a wall
 HALF_SURE = 2.0  # log-odds of a cell at which that is half as much
-_WINDOW, _AROUND = window_bins(), places_around()
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,12 @@ def likeliest(belief: np.ndarray) -> LatticePose:
 
 
 def add_sighting(
-    belief: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float, room: np.ndarray | None = None
+    belief: np.ndarray,
+    pose: LatticePose,
+    evidence: np.ndarray,
+    weight: float,
+    lattice: Lattice,
+    room: np.ndarray | None = None,
 ) -> None:
     """Add evidence (ELSEWHERE,) of where something is, seen from a pose, to a belief (4, G, G) about it.
 
@@ -62,27 +65,28 @@ def add_sighting(
     can stand in the cells, it is log(v exp(evidence) + 1 - v), where v is the probability that the pose would be seen.
     """
     side = belief.shape[-1]
-    rows, here_rows = _within(pose.row, side)
-    columns, here_columns = _within(pose.column, side)
-    seen = evidence[_WINDOW[pose.heading][:, here_rows, here_columns]]
+    rows, here_rows = _within(pose.row, side, lattice.reach)
+    columns, here_columns = _within(pose.column, side, lattice.reach)
+    seen = evidence[lattice.window[pose.heading][..., here_rows, here_columns]].mean(axis=0)
     if room is not None:
         visible = VISIBLE / (1 + np.exp(-2 * (room[rows, columns] - HALF_SURE)))
         seen = np.where(seen > 0, seen, np.log(visible * np.exp(seen) + 1 - visible))
     belief[:, rows, columns] += weight * seen
 
 
-def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float) -> None:
+def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float, lattice: Lattice) -> None:
     """Add evidence (63,) of where a body could stand, seen from a pose, to log-odds (G, G) of cells not tried yet."""
     side = len(room)
-    rows, columns = (_AROUND[pose.heading] + np.array(pose.cell)).T
+    rows, columns = (lattice.around[pose.heading] + np.array(pose.cell)).T
     inside = (rows >= 0) & (rows < side) & (columns >= 0) & (columns < side)
     cells = rows[inside], columns[inside]
     before = room[cells]
-    seen = np.clip(before + weight * evidence[inside], -SEEN, SEEN)
+    told = lattice.shares @ evidence
+    seen = np.clip(before + weight * told[inside], -SEEN, SEEN)
     room[cells] = np.where(np.abs(before) > SEEN, before, seen)
 
 
-def _within(middle: int, side: int) -> tuple[slice, slice]:
+def _within(middle: int, side: int, reach: int) -> tuple[slice, slice]:
     """The part of a window around a place that lies in the lattice, in the lattice and in the window."""
-    first, last = max(0, middle - FARTHEST), min(side, middle + FARTHEST + 1)
-    return slice(first, last), slice(first - middle + FARTHEST, last - middle + FARTHEST)
+    first, last = max(0, middle - reach), min(side, middle + reach + 1)
+    return slice(first, last), slice(first - middle + reach, last - middle + reach)

@@ -11,12 +11,12 @@ import numpy as np
 
 from clearway.mapping.again import Repeats, marks_of
 from clearway.mapping.beliefs import NEVER, LatticePose, add_sighting, add_standing, likeliest
-from clearway.mapping.lattice import AHEAD, HEADINGS, STEP_M
+from clearway.mapping.lattice import AHEAD, HEADINGS, nearest_bins
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.routes import shifted
 from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
-from clearway.perception.whereabouts import ELSEWHERE, bin_of
+from clearway.perception.whereabouts import ELSEWHERE
 from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
@@ -31,12 +31,11 @@ STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}
 QUARTERS = {Action.TURN_RIGHT: 1, Action.TURN_LEFT: -1}
 
 
-def _bin_ahead(ahead_m: float) -> int:
-    return int(bin_of(np.array([ahead_m]), np.zeros(1), np.zeros(1))[0])
+def _bins_ahead(ahead_m: float) -> np.ndarray:
+    return nearest_bins(np.array(ahead_m), np.zeros(()), np.zeros(()))
 
 
-STAYED = _bin_ahead(0.0)
-MOVED = {action: _bin_ahead(steps * STEP_M) for action, steps in STEPS.items()}
+(STAYED,) = _bins_ahead(0.0).tolist()
 
 
 class Follower:
@@ -50,6 +49,7 @@ class Follower:
 
     def __init__(self, sight: Sight, settings: MappingSettings, known: RoomMap | None = None) -> None:
         self._sight, self._settings, self._known = sight, settings, known
+        self._moved_bins = {action: _bins_ahead(steps * settings.step_m) for action, steps in STEPS.items()}
         if known is not None:
             self._described = sight.description(known.features.astype(np.float32))
             self._marks = marks_of(known.features)
@@ -103,7 +103,7 @@ class Follower:
         poses = [likeliest(belief) for belief in here]
         for row, (pose, stands) in enumerate(zip(poses, self._sight.stands(seen), strict=True)):
             if not after["been"][row][pose.index]:
-                add_standing(room[row], pose, stands, self._settings.standing_weight)
+                add_standing(room[row], pose, stands, self._settings.standing_weight, self._settings.lattice)
             room[row][pose.cell] = SURE
             if mark[row][pose.index] not in (0, marks[row]) and repeats[row] == Repeats.UNKNOWN:
                 repeats[row] = Repeats.NEVER
@@ -122,7 +122,7 @@ class Follower:
         told = self._sight.whereabouts(kept, np.repeat(seen, count, axis=0)).reshape(len(seen), count, ELSEWHERE)
         for row, numbers in enumerate(nearest):
             for place, number in enumerate(numbers):
-                add_sighting(belief[row], known.pose(int(number)), told[row, place], weight)
+                add_sighting(belief[row], known.pose(int(number)), told[row, place], weight, self._settings.lattice)
 
     def _walked(self, seen: np.ndarray, state: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]) -> None:
         """Move the beliefs of the own poses by the last actions; moves may have been blocked."""
@@ -136,7 +136,8 @@ class Follower:
             moving.tolist(), self._sight.whereabouts(before, now), same.tolist(), strict=True
         ):
             done, otherwise = Action(int(action[row])), IF_NOT_SAME[Repeats(int(after["repeats"][row]))]
-            moved = float(evidence[MOVED[done]] - evidence[STAYED]) + (IF_SAME if stayed else otherwise)
+            moved = float(evidence[self._moved_bins[done]].mean() - evidence[STAYED])
+            moved += IF_SAME if stayed else otherwise
             self._moved(done, moved, {name: values[row] for name, values in after.items()})
         for row in np.flatnonzero(np.isin(action, list(QUARTERS))).tolist():
             after["here"][row] = np.roll(after["here"][row], QUARTERS[Action(int(action[row]))], axis=0)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from clearway.mapping.lattice import Lattice, lattice_of
+
 
 @dataclass(frozen=True)
 class MappingSettings:
     """How an agent with a map weighs what it is told.
 
     Attributes:
-        side: G, cells along a side of its lattice.
+        step_m: how long a move is: between neighbouring cells of its lattice.
+        side_m: of the lattice, which is as wide to all sides of where a walk begins.
         collision_cost: steps that a blocked move costs.
         usual_room: log-odds that a body can stand in a cell of which nothing was seen.
         standing_weight, target_weight, place_weight: of what eyes tell of cells, of the target, of the own pose. What
@@ -22,7 +25,8 @@ class MappingSettings:
         arrived: probability of being at the target at which the agent says so.
     """
 
-    side: int = 49
+    step_m: float = 0.5
+    side_m: float = 24.0
     collision_cost: float = 16.0
     usual_room: float = -1.0
     standing_weight: float = 0.4
@@ -33,3 +37,13 @@ class MappingSettings:
     nearby: float = 2.0
     compared: int = 8
     arrived: float = 0.5
+
+    @property
+    def lattice(self) -> Lattice:
+        """Of its steps."""
+        return lattice_of(self.step_m)
+
+    @property
+    def side(self) -> int:
+        """G, cells along a side of its lattice."""
+        return 2 * round(self.side_m / 2 / self.step_m) + 1

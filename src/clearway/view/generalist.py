@@ -91,8 +91,9 @@ def generalist_stage(scenes: Sequence[Scene], tour: int = 0) -> Stage:
 
     Raises:
         EncoderError: a scene has no pictures, or the eyes are damaged.
+        SceneError: it cannot walk by the scenes' moves.
     """
-    generalist = Generalist.shipped()
+    generalist = Generalist.shipped().stepping(scenes)
     shown = StageGeneralist(generalist, tuple(generalist.seen(scenes)), tour)
     shown.make_ready()
     return Stage(shown.scenes, {scene.name: default_targets(scene) for scene in shown.scenes}, (shown,))
