@@ -1,7 +1,7 @@
 """The generalist in rooms that it has never entered, beside the same agent to which collisions cost nothing.
 
     python benchmarks/generalist.py rooms-test                          # no tour; collision cost 16 and 0
-    python benchmarks/generalist.py rooms-test --tour 500
+    python benchmarks/generalist.py rooms-test --tour 500               # and who goes by the tour's nearest pictures
     python benchmarks/generalist.py rooms-test --perturb all
     python benchmarks/generalist.py rooms-test --json record.json       # figures of every scene
 
@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from retrieval import Retrieving
 
 import clearway
 from clearway.agents.generalist import Generalist
@@ -27,7 +28,7 @@ from clearway.learn.provenance import hardware, package_versions
 
 SHOWN = ("success", "success_4x", "spl", "collisions", "steps", "false_arrivals", "missed_arrivals")
 COUNTS = ("collisions", "steps")
-CARELESS = "collisions cost nothing"
+CARELESS, RETRIEVAL = "collisions cost nothing", "nearest picture of the tour"
 
 
 def column(evaluation: GoalEvaluation, name: str) -> np.ndarray:
@@ -61,17 +62,18 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--tour", type=int, default=0, help="steps")
     parser.add_argument("--perturb", nargs="+", default=["none"])
-    parser.add_argument("--alone", action="store_true", help="without the agent to which collisions cost nothing")
+    parser.add_argument("--alone", action="store_true", help="without the other agents")
     parser.add_argument("--json", type=Path, help="where the record is written")
     args = parser.parse_args()
     generalist = Generalist.shipped()
-    careless = replace(generalist, settings=replace(generalist.settings, collision_cost=0.0))
+    rivals = {CARELESS: replace(generalist, settings=replace(generalist.settings, collision_cost=0.0))}
+    if args.tour:
+        rivals[RETRIEVAL] = Retrieving(generalist.encoder, generalist.sight, generalist.settings)
     asked = {"goals": args.goals, "seed": args.seed, "tour": args.tour, "perturb": args.perturb}
     found: dict[str, GoalEvaluation] = {}
-    for name, agent in (("generalist", generalist), (CARELESS, careless)):
-        if name == "generalist" or not args.alone:
-            own, *others = clearway.evaluate_goals(agent, args.scenes, **asked)
-            found |= {name: own} | {other.agent: other for other in others}
+    for name, agent in {"generalist": generalist, **({} if args.alone else rivals)}.items():
+        own, *others = clearway.evaluate_goals(agent, args.scenes, **asked)
+        found |= {name: own} | {other.agent: other for other in others}
     print("| " + " | ".join(("agent", *SHOWN)) + " |\n|" + "---|" * (len(SHOWN) + 1))
     for name, evaluation in found.items():
         print("| " + " | ".join((name, *(shown(figure, column(evaluation, figure)) for figure in SHOWN))) + " |")
