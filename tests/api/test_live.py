@@ -62,9 +62,9 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
     monkeypatch.setattr(Generalist, "shipped", classmethod(lambda kind: agent))
     with pytest.raises(SceneError, match=r"grid: there is no room to walk in: the scene comes from test"):
         evaluate_live("generalist", grid_scene(1), goals=2)
-    long = replace(corridor_scene(5), cell_size_m=0.25)
+    long = replace(corridor_scene(5), cell_size_m=1.5)
     for walk in (evaluate_live, clearway.evaluate_goals):
-        with pytest.raises(SceneError, match=r"corridor: moves of 0\.25 m and turns of 90 degrees, and the generalist"):
+        with pytest.raises(SceneError, match=r"corridor: moves of 1\.5 m, and the generalist walks by 0\.2 to 1 m"):
             walk("generalist", long, goals=2)
     built = replace(corridor_scene(5), made_by=Provenance("room", room="bathroom", seed=0), observations=None)
     with pytest.raises(SceneError, match="corridor: has no pictures"):
@@ -73,3 +73,6 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
         evaluate_live("runs/x", corridor_scene(5))
     with pytest.raises(ArgumentError, match="sweep sets the perturbations itself"):
         evaluate_live("generalist", corridor_scene(5), perturb="all", sweep=(1.0,))
+    for sweep in ((-1.0,), ("x",), (1.0, float("inf")), (1e6,)):
+        with pytest.raises(ArgumentError, match="expected shares of the full strengths above 0"):
+            evaluate_live("generalist", corridor_scene(5), sweep=sweep)

@@ -113,6 +113,10 @@ def test_generated_rooms_of_a_split_are_walked_in(clearway, run, asked):
         (("--rooms", "validation", "--goals", 0), ("--goals 0",)),
         (("--rooms", "validation", "--episodes", 3), ("--episodes: not with --rooms", "Leave one of the two out")),
         (("--kind", "flat"), ("--kind: goes with --rooms alone",)),
+        (("--kind", "flat", "--goals", 2), ("--kind: goes with --rooms alone",)),
+        (("--rooms", "validation", "--perturb", "fog"), ("--perturb 'fog': there is none of that name",)),
+        (("--rooms", "validation", "--selection", "argmax"), ("--selection: not with --rooms",)),
+        (("--rooms", "validation", "--light", 0.2, "--live"), ("--live: not with --rooms",)),
         (("--count", 2), ("--count: goes with --rooms alone",)),
     ],
 )
@@ -124,6 +128,14 @@ def test_rooms_that_cannot_be_made_are_one_line(clearway, run, monkeypatch, word
 def test_rooms_and_scene_files_are_not_mixed(clearway, run):
     words = ("evaluate", run / "run", run / "grid.h5", "--rooms", "validation")
     assert clearway(*words).refusal("--rooms", "grid.h5 is given too")
+
+
+def test_the_generalist_walks_to_goals_where_nothing_is_said_of_them(clearway, run):
+    found = clearway("evaluate", "generalist", run / "grid.h5", "--step-limit", 2, "--json").json
+    assert found["agent"] == "generalist" and found["average"]["episodes"] == 20
+    refused = clearway("evaluate", "generalist", run / "grid.h5", "--light", 0.3)
+    assert refused.refusal("--light: not with generalist, which walks once to each goal")
+    assert clearway("evaluate", "nobody", "--rooms", "validation").refusal("nobody: no run here")
 
 
 def test_the_generalist_walks_off_the_grid(clearway, tmp_path):

@@ -15,11 +15,13 @@ from clearway.generation.files import Seen, generate_scenes, notes_of, request_o
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
 from clearway.live.live_room import live_room
+from clearway.perception.eyes import write_eyes
 from clearway.scenes.floor_plans import GENERATED, floor_plan_scene, plan_of
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.sensors import Readings, depth
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made_files import Made
+from helpers.small_eyes import small_eyes
 
 REQUESTS = [Request("room", "train", 0, number) for number in (3, 7)]
 SEEN = Seen(size_px=(24, 32))
@@ -136,8 +138,16 @@ def with_depth() -> Scene:
 
 def test_features_go_on_with_the_encoder_of_the_files_that_are_there(tmp_path) -> None:
     there = {REQUESTS[0]: stand_in(REQUESTS[0], record=RECORD)}
-    for asked in ("auto", "random-resnet50"):
-        assert files._record_of(there, tmp_path, asked, 0) is RECORD
+    assert files._record_of(there, tmp_path, "random-resnet50", 0) is RECORD
+    eyes = replace(RECORD, name="clearway")
+    for asked in ("auto", "clearway"):
+        assert files._record_of({REQUESTS[0]: stand_in(REQUESTS[0], record=eyes)}, tmp_path, asked, 0) is eyes
+    folder = tmp_path / "own"
+    write_eyes(folder, small_eyes().eval(), {})
+    own = replace(RECORD, name="own")
+    assert files._record_of({REQUESTS[0]: stand_in(REQUESTS[0], record=own)}, tmp_path, str(folder), 0) is own
+    with pytest.raises(SceneError, match="asked for auto"):
+        files._record_of(there, tmp_path, "auto", 0)
     assert files._record_of({}, tmp_path, "auto", 0) is None
     with pytest.raises(SceneError, match="has no features, asked for auto"):
         files._record_of({REQUESTS[0]: stand_in(REQUESTS[0])}, tmp_path, "auto", 0)
@@ -145,7 +155,7 @@ def test_features_go_on_with_the_encoder_of_the_files_that_are_there(tmp_path) -
         files._record_of(there, tmp_path, "random-resnet50", 1)
     both = {**there, REQUESTS[1]: stand_in(REQUESTS[1], record=replace(RECORD, identity="def"))}
     with pytest.raises(SceneError, match=r"000007-bathroom.h5: has .*\(def\), asked for those of the other files"):
-        files._record_of(both, tmp_path, "auto", 0)
+        files._record_of(both, tmp_path, "random-resnet50", 0)
 
 
 def test_a_scene_gives_its_request_back() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from clearway.errors import RunError
+from clearway.errors import RunError, SceneError
 from clearway.learn.adapt import Adapt
 from clearway.learn.adapting import AdaptingTrainer
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
@@ -136,6 +136,11 @@ def test_scenes_that_its_eyes_have_not_seen_are_refused_with_the_remedy(scenes: 
         replace(LEARNER, goals="seen").trainer(bare, COLLISION_AWARE, 0)
     with pytest.raises(RunError, match=r"the scenes have none\. Encode them.*scenes encode FILE --encoder"):
         LEARNER.trainer(bare, COLLISION_AWARE, 0)
+    long = [replace(scene, cell_size_m=3.0) for scene in scenes]
+    with pytest.raises(SceneError, match=r"moves of 3 m, and the generalist walks by 0\.2 to 1 m"):
+        LEARNER.trainer(make_world(long, TARGETS), COLLISION_AWARE, 0)
+    with pytest.raises(RunError, match="adapt learns from the scenes' own pictures alone"):
+        LEARNER.check_sees_takes()
     others = make_world(seen_by_eyes(tmp_path / "other", *scenes, seed=1), TARGETS)
     with pytest.raises(RunError, match="have those of another encoder"):
         LEARNER.trainer(others, COLLISION_AWARE, 0)

@@ -97,6 +97,14 @@ def test_poses_are_counted_whatever_was_seen_of_them() -> None:
     assert torch.equal(known[known >= 0], world.next_state[known >= 0])
 
 
+def test_own_goals_are_poses_whatever_was_seen_of_them() -> None:
+    trainer = Trainer(with_takes(0.5), small_learner(goals="seen"), COLLISION_AWARE, seed=5)
+    for _ in range(3):
+        figures = trainer.update()
+    assert trainer.own_goals is not None and figures["own_goals"] > 0
+    assert trainer.own_goals.known.sum() <= trainer.world.state_count
+
+
 def test_takes_that_look_alike_teach_the_same() -> None:
     """Up to rounding, in one pass over all rows: hindsight, look-ahead and rewards go by poses."""
     learner = small_learner(epochs=1, minibatches=1, matmul_precision="highest", lookahead=0.1)

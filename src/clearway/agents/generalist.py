@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -24,12 +25,13 @@ from clearway.scenes.aspect import AspectWarning, other_aspect
 from clearway.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from clearway.world.world import World
+    from clearway.world.world import Steps, World
 
 __all__ = ["GENERALIST", "Generalist"]
 
 STEPS_M = 0.2, 1.0
 """The shortest and the longest move that it can walk by."""
+SLACK = 1e-3  # share by which moves may differ
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Generalist:
         shape: Any = self.encoder.record.settings["shape"]
         return int(shape["height_px"]), int(shape["width_px"])
 
-    def stepping(self, scenes: Sequence[Scene]) -> Generalist:
+    def stepping(self, scenes: Sequence[Scene | Steps]) -> Generalist:
         """The same, walking by moves as long as those of the scenes.
 
         Raises:
@@ -80,7 +82,7 @@ class Generalist:
                 allowed = f"{shortest_m:g} to {longest_m:g} m"
                 problem = f"moves of {scene.cell_size_m:g} m, and the {GENERALIST} walks by {allowed}"
                 raise SceneError(scene.name, problem, remedy)
-            if scene.cell_size_m != step_m:
+            if not math.isclose(scene.cell_size_m, step_m, rel_tol=SLACK):
                 problem = f"moves of {scene.cell_size_m:g} m, and in {scenes[0].name} they are of {step_m:g} m"
                 raise SceneError(scene.name, problem, "Walk in each by itself")
         return replace(self, settings=replace(self.settings, step_m=step_m))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from clearway.scenes.scene import Scene
 
 GOALS, STEP_LIMIT = 20, 500
+MOST_TOUR_STEPS = 10_000
 
 
 def evaluate_goals(
@@ -79,7 +80,7 @@ def evaluate_goals(
         "seed": as_seed("seed", seed),
     }
     perturbations, takes = perturbations_asked(perturb), as_whole("takes", takes, 1)
-    tour_steps = as_whole("tour", tour, 0)
+    tour_steps = as_whole("tour", tour, 0, MOST_TOUR_STEPS)
     found = load_scenes(scenes)
     if isinstance(agent, str | os.PathLike):
         path = as_path("agent", agent)

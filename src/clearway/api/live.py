@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from functools import partial
+from numbers import Real
 from typing import TYPE_CHECKING
 
 from clearway.api.arguments import as_path, as_seed, as_whole
-from clearway.api.goals import GOALS, STEP_LIMIT, is_generalist
+from clearway.api.goals import GOALS, MOST_TOUR_STEPS, STEP_LIMIT, is_generalist
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.errors import ArgumentError
@@ -68,8 +70,13 @@ def evaluate_live(
         "step_limit": as_whole("step_limit", step_limit, 1),
         "seed": as_seed("seed", seed),
     }
-    steps = as_whole("tour", tour, 0)
+    steps = as_whole("tour", tour, 0, MOST_TOUR_STEPS)
     perturbations = perturbations_asked(perturb)
+    for strength in sweep:
+        above_zero = isinstance(strength, Real) and 0 < strength < math.inf
+        if not above_zero or REFERENCE.scaled(float(strength)).too_strong:
+            problem = f"sweep={sweep!r:.80}: expected shares of the full strengths above 0"
+            raise ArgumentError(f"{problem}. Give such numbers, smaller ones")
     if sweep and perturbations != Perturbations():
         raise ArgumentError("sweep sets the perturbations itself. Leave perturb out")
     if isinstance(agent, str | os.PathLike) and is_generalist(as_path("agent", agent)):

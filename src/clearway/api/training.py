@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
@@ -34,9 +34,6 @@ from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
 from clearway.torch_threads import torch_threads
-
-if TYPE_CHECKING:
-    pass
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
 
@@ -97,7 +94,7 @@ def train(
     resume: bool = False,
     zone_level: ZoneLevel = "pose",
     perturb: Perturbed = (),
-    takes: int = TAKES,
+    takes: int | None = None,
     device: str = "cpu",
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
@@ -125,7 +122,7 @@ def train(
         perturb: what is perturbed in pictures of every pose that are seen beside the scene's own, one a step, as of
             `evaluate_goals`; nothing by default. The scenes are rooms that can be built again; by
             ppo, a2c and recurrent.
-        takes: pictures of each pose where they are perturbed.
+        takes: pictures of each pose where they are perturbed; None: 4.
         device: of torch, "cpu" or "cuda".
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
@@ -147,7 +144,7 @@ def train(
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
-    seen = _takes(loaded, perturbations_asked(perturb), as_whole("takes", takes, 1), number, learner, show_progress)
+    seen = _takes(loaded, perturbations_asked(perturb), takes, number, learner, show_progress)
     request = RunRequest(
         scenes=loaded,
         targets=chosen,
@@ -204,11 +201,19 @@ def chosen_learner(
 
 
 def _takes(
-    scenes: Sequence[Scene], perturbations: Perturbations, count: int, seed: int, learner: Learner, show_progress: bool
+    scenes: Sequence[Scene],
+    perturbations: Perturbations,
+    takes: int | None,
+    seed: int,
+    learner: Learner,
+    show_progress: bool,
 ) -> Takes | None:
     """Features of perturbed takes of the scenes' poses; None where nothing is perturbed."""
     if perturbations == Perturbations():
+        if takes is not None:
+            raise ArgumentError(f"takes={takes}: where nothing is perturbed a pose has one picture. Give perturb, too")
         return None
+    count = TAKES if takes is None else as_whole("takes", takes, 1)
     learner.check_sees_takes()  # before what takes long
     return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=seed, show_progress=show_progress)
 

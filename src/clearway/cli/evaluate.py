@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import HELD_OUT, PlanKind, SplitName
+from clearway.choices import GENERALIST, HELD_OUT, PlanKind, SplitName
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, say, say_held_out, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
@@ -79,15 +79,15 @@ class Evaluate:
 
     def run(self) -> None:
         """Evaluate, print, and leave evaluation.json and evaluation.md in the run folder, or live.json and live.md."""
+        if self.rooms is None and (self.kind is not None or self.count is not None):
+            option = "--kind" if self.kind is not None else "--count"
+            raise ClearwayError(f"{option}: goes with --rooms alone. Add --rooms validation, or another split")
         if self.room.live and (self.goals is not None or self._is_generalist()):
             self._at_goals_live()
             return
-        if self.goals is not None or self.rooms is not None:
+        if self.goals is not None or self.rooms is not None or self._is_generalist():
             self._at_goals()
             return
-        if self.kind is not None or self.count is not None:
-            option = "--kind" if self.kind is not None else "--count"
-            raise ClearwayError(f"{option}: goes with --rooms alone. Add --rooms validation, or another split")
         if self.perturb or self.takes is not None:
             option = "--perturb" if self.perturb else "--takes"
             raise ClearwayError(f"{option}: goes with --goals alone. Add it; --live has a flag for each perturbation")
@@ -119,22 +119,22 @@ class Evaluate:
 
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
-        from clearway.api.goals import GOALS, STEP_LIMIT
-        from clearway.api.takes import TAKES
+        from clearway.api.goals import GOALS, STEP_LIMIT, goal_agent
+        from clearway.api.takes import TAKES, perturbations_asked
         from clearway.cli.goals import evaluate_at_goals
 
-        self._check_goals_alone({"--light and the other flags of --live": self.room != Live()})
+        self._check_goals_alone(self.room.given())
         if self.takes is not None and not self.perturb:
             raise ClearwayError("--takes: without --perturb a pose has one picture. Add --perturb")
         goals = as_whole("goals", _or(self.goals, GOALS), 1)
+        agent, perturbations = goal_agent(self.folder, self.checkpoint), perturbations_asked(self.perturb)
         evaluate_at_goals(
-            self.folder,
-            self.checkpoint,
-            self._scenes_of_goals(),
+            agent,
+            self._scenes_of_goals(),  # made last, which may take long
             goals=goals,
             step_limit=_or(self.step_limit, STEP_LIMIT),
             seed=self.seed,
-            perturb=self.perturb,
+            perturb=perturbations,
             takes=_or(self.takes, TAKES),
             tour=self.tour,
             json=self.json,
@@ -187,7 +187,7 @@ class Evaluate:
             "--episodes": self.episodes,
         }
         if asked := [option for option, value in given.items() if value]:
-            option = "--rooms" if self.goals is None and self.rooms is not None else "--goals"
+            option = "--goals" if self.goals is not None else "--rooms" if self.rooms is not None else GENERALIST
             raise ClearwayError(
                 f"{asked[0]}: not with {option}, which walks once to each goal. Leave one of the two out"
             )

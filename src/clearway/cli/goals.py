@@ -13,8 +13,11 @@ from clearway.cli.live import Live, status_line
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
+    from clearway.agents.generalist import Generalist
     from clearway.choices import PlanKind, SplitName
     from clearway.evaluation.goals import GoalEvaluation
+    from clearway.learn.load import TrainedAgent
+    from clearway.live.conditions import Perturbations
 
 NUMBERS = ("collisions", "steps")  # figures that are no shares
 SETTING_WIDTH = 16
@@ -27,25 +30,24 @@ LIVE_HEADINGS = {
 
 
 def evaluate_at_goals(
-    agent: Path,
-    checkpoint: Path | None,
+    agent: TrainedAgent | Generalist,
     files: Sequence[Path],
     *,
     goals: int,
     step_limit: int,
     seed: int,
-    perturb: Sequence[str],
+    perturb: Perturbations,
     takes: int,
     tour: int,
     json: bool,
 ) -> None:
     """Walk to goals drawn in some scene files, and print what came of it."""
-    from clearway.api.goals import evaluate_goals, goal_agent
+    from clearway.api.goals import evaluate_goals
 
     if not files:
         raise ClearwayError("--goals: no scenes. Name scene files behind the run, or give --rooms validation")
     found = evaluate_goals(
-        goal_agent(agent, checkpoint),
+        agent,
         scene_files(files),
         goals=goals,
         step_limit=step_limit,

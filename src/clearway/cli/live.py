@@ -37,6 +37,14 @@ class Live:
     """Of a sweep, shares of its full perturbations."""
     perturbations: Perturbations = field(default_factory=Perturbations)
 
+    def given(self) -> dict[str, bool]:
+        """Which flags are not as by default."""
+        usual = Live()
+        flags = {f"--{name}": getattr(self, name) != getattr(usual, name) for name in vars(usual)}
+        changed = self.perturbations.to_json().items() - usual.perturbations.to_json().items()
+        del flags["--perturbations"]
+        return flags | {f"--{name.replace('_', '-')}": True for name, _ in sorted(changed)}
+
     def check(self) -> None:
         """Check the flags; without --live they must be as they are by default."""
         if not self.live:

@@ -64,8 +64,8 @@ class Train:
     """Learn from perturbed pictures too: all, geometry, names, light=0.2, as of evaluate --goals. Every pose is seen in
     one of --takes pictures or the scene's own, another at each step. In rooms that can be built again; by ppo, a2c,
     recurrent."""
-    takes: int = 4
-    """Pictures of each pose with --perturb."""
+    takes: int | None = None
+    """With --perturb: pictures of each pose; by default 4."""
     device: str = "cpu"
     """cpu or cuda."""
     feature_store: FeatureStore = "memory"

@@ -192,18 +192,19 @@ def _remedied(path: Path) -> Iterator[None]:
 
 def _record_of(there: dict[Request, Scene], folder: Path, encoder: str, encoder_seed: int) -> EncoderRecord | None:
     """What the scenes that are there were encoded with, None of none. Raises SceneError where it is not as asked."""
-    from clearway.perception.encode import AUTO, RANDOM, TRAINED
+    from clearway.perception import eyes
+    from clearway.perception.encode import AUTO, RANDOM
 
-    named = {AUTO: (TRAINED, RANDOM), NO_ENCODER: (NO_ENCODER,)}.get(encoder, (encoder,))
+    wanted = eyes.NAME if encoder == AUTO else Path(encoder).name if eyes.is_eyes(Path(encoder)) else encoder
     first = next((scene.encoder for scene in there.values() if scene.encoder is not None), None)
     for request, scene in there.items():
         record = scene.encoder
         found = NO_ENCODER if record is None else record.name
         seeded = record is None or found != RANDOM or record.settings.get("seed") == encoder_seed
         alike = record is None or first is None or record.identity == first.identity
-        if found not in named or not seeded or not alike:
+        if found != wanted or not seeded or not alike:
             shown = "no features" if record is None else f"features of {found} ({record.identity})"
-            asked = "those of the other files" if found in named and seeded else encoder
+            asked = "those of the other files" if found == wanted and seeded else encoder
             raise SceneError(scene_path(request, folder), f"has {shown}, asked for {asked}", OTHER_FOLDER)
     return first
 

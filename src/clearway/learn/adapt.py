@@ -34,6 +34,7 @@ class Adapt(PPO):
     """
 
     algorithm: ClassVar[str] = "adapt"
+    sees_takes: ClassVar[bool] = False
 
     frames: int = 40_000
     """The generalist's and all environments' steps; schedules end here."""
@@ -58,6 +59,7 @@ class Adapt(PPO):
 
         Raises:
             RunError: the scenes' features are not those of the generalist's eyes, or it shall have goals of its own.
+            SceneError: it cannot walk by the scenes' moves.
         """
         from clearway.agents.generalist import Generalist
         from clearway.learn.adapting import AdaptingTrainer
@@ -66,7 +68,7 @@ class Adapt(PPO):
             raise RunError(
                 f"adapt learns given targets alone, not goals={self.goals}. Leave goals out, or train by ppo"
             )
-        generalist = Generalist.shipped()
+        generalist = Generalist.shipped().stepping(world.steps)
         eyes = generalist.encoder.record
         if world.features is None or world.encoder is None or world.encoder.identity != eyes.identity:
             seen = "have none" if world.features is None else "have those of another encoder"

@@ -109,6 +109,8 @@ class RunRequest:
         check_seed(self.seed)
         if self.takes is not None:
             self.learner.check_sees_takes()
+            if self.feature_store == "mapped":
+                raise RunError("perturb: features of perturbed pictures are kept in memory. Leave feature_store out")
 
     @property
     def paid(self) -> Reward:

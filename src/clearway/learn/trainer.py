@@ -137,7 +137,7 @@ class Trainer:
         self.frames += self.frames_per_update
         self.updates += 1
         if self.own_goals:
-            self.own_goals.see(rollout.history[:, :, -1])
+            self.own_goals.see(self.world.pose(rollout.history[:, :, -1]))
             self.own_goals.see(rollout.arrived)
         self._rebalance()
         result = {

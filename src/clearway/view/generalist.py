@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import ClassVar
 
 from clearway.agents.agent import State
 from clearway.agents.generalist import GENERALIST, Generalist
@@ -36,8 +37,8 @@ class StageGeneralist:
     _toured: dict[str, Tour] = field(default_factory=dict)
     _touring: threading.Lock = field(default_factory=threading.Lock)
 
-    tells_values = False
-    zone_level: ZoneLevel = "pose"
+    tells_values: ClassVar[bool] = False
+    zone_level: ClassVar[ZoneLevel] = "pose"
 
     @property
     def name(self) -> str:

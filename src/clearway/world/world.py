@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -28,6 +28,20 @@ from clearway.scenes.targets import possible_targets
 from clearway.world.feature_store import joined_features
 from clearway.world.targets import NO_TARGETS, WalkedScene, target_tables
 from clearway.zones import scene_zones
+
+
+class Steps(NamedTuple):
+    """How a scene is walked in.
+
+    Attributes:
+        name: of the scene.
+        cell_size_m: length of a move.
+        turn_deg: angle of a turn.
+    """
+
+    name: str
+    cell_size_m: float
+    turn_deg: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +63,7 @@ class World:
         start_state: (K,) int64, for target after target all states from which it can be reached, itself excluded.
         start_steps: (K,) int64, the shortest-path distance of each of those starts.
         start_offset, start_count: (M,) int64, where a target's starts lie in `start_state`.
+        steps: how long the moves and turns of each scene are.
         feature_store: where features are kept, see there.
         encoder: the record of what made the features; None where the scenes have none, or do not say.
         sightings: pictures of a pose that features are kept of. Features are (S * sightings, F), a pose's one after the
@@ -70,6 +85,7 @@ class World:
     start_steps: Tensor
     start_offset: Tensor
     start_count: Tensor
+    steps: tuple[Steps, ...] = ()
     feature_store: FeatureStore = "memory"
     encoder: EncoderRecord | None = None
     sightings: int = 1
@@ -211,6 +227,7 @@ def make_world(
             for index, scene in enumerate(scenes)
         ]
         found = target_tables(walked, targets)  # before features are read, which may take long
+    tables: dict[str, Any] = {name: torch.from_numpy(table) for name, table in found.items()}
     return World(
         scene_names=names,
         scene_offset=torch.from_numpy(offset),
@@ -219,11 +236,12 @@ def make_world(
         largest_part=torch.tensor(largest),
         features=joined_features(scenes, feature_store),
         may_be_target=torch.from_numpy(np.concatenate([_may_be_target(scene) for scene in scenes])),
+        steps=tuple(Steps(scene.name, scene.cell_size_m, scene.turn_deg) for scene in scenes),
         feature_store=feature_store,
         encoder=scenes[0].encoder if scenes else None,
         zone=torch.from_numpy(np.concatenate([scene_zones(s, zone_level) for s in scenes]).astype(np.int64)),
         clearance_m=torch.from_numpy(np.concatenate([scene_clearance_m(scene) for scene in scenes])),
-        **{name: torch.from_numpy(table) for name, table in found.items()},
+        **tables,
     )
 
 
