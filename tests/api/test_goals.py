@@ -19,7 +19,7 @@ from clearway.scenes.sensors import RGB
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views import grid
 from helpers.agents import Spy
-from helpers.made import corridor_scene, grid_scene
+from helpers.made import corridor_scene, grid_scene, scene_of_cells
 from helpers.small_eyes import seen_by_eyes, small_eyes
 
 SMALL = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
@@ -162,6 +162,14 @@ def test_it_looks_around_first_where_it_may(shipped):
     assert list(toured.scenes) == ["grid", "corridor"] and toured.average.episodes == 10
     alone, *_ = evaluate_goals("generalist", scenes[1:], goals=5, step_limit=30, tour=40)
     assert alone.scenes["corridor"] == toured.scenes["corridor"]
+
+
+def test_a_tour_of_a_room_without_ways_out_is_one_line(shipped):
+    cell = scene_of_cells(np.zeros((1, 2), int))
+    told, *_ = evaluate_goals("generalist", cell, goals=2, step_limit=9)
+    assert told.average.success == 1
+    with pytest.raises(SceneError, match=r"cells: every move is blocked .* Leave the tour out, or"):
+        evaluate_goals("generalist", cell, goals=2, tour=10)
 
 
 def test_it_walks_by_steps_of_other_lengths_but_by_one_at_a_time(shipped):

@@ -12,6 +12,7 @@ from clearway.live import goals
 from clearway.live.conditions import REFERENCE, Perturbations
 from clearway.perception import eyes
 from clearway.perception.eyes import write_eyes
+from clearway.scenes.aspect import AspectWarning
 from clearway.scenes.scene import Provenance
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_eyes import small_eyes
@@ -56,6 +57,13 @@ def test_a_sweep_walks_every_setting(agent, walkable):
     labels = [one.perturbed["label"] for one in found]
     assert len(labels) == 10 and labels[0] == "none" and labels[-1] == "all, strength 1"
     assert found[-1].perturbed["perturbations"] == REFERENCE.to_json()
+
+
+def test_pictures_of_another_aspect_are_warned_of(agent, walkable):
+    pictures = walkable.observations[:]
+    other = replace(walkable, observations=pictures[:, : pictures.shape[1] // 2])
+    with pytest.warns(AspectWarning, match=r"scene walkable: pictures of .* have the aspect"):
+        evaluate_live(agent, other, goals=2, step_limit=1)
 
 
 def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):

@@ -87,6 +87,14 @@ class Generalist:
                 raise SceneError(scene.name, problem, "Walk in each by itself")
         return replace(self, settings=replace(self.settings, step_m=step_m))
 
+    def warn_of_aspect(self, scenes: Sequence[Scene]) -> None:
+        """Warn (AspectWarning) where pictures have another aspect than those that the eyes were taught on."""
+        for scene in scenes:
+            if scene.observations is not None:
+                _, height, width, _ = scene.observations.shape
+                if problem := other_aspect((height, width), self.picture_px):
+                    warnings.warn(f"scene {scene.name}: {problem}", AspectWarning, stacklevel=3)
+
     def on_poses(self, world: World) -> MappingAgent:
         """The agent on the grid: it goes by features of its eyes, in any world."""
         return MappingAgent(self.sight, settings=self.settings)
@@ -113,9 +121,5 @@ class Generalist:
         Warns:
             AspectWarning: a scene's pictures have another aspect than those that the eyes were taught on.
         """
-        for scene in scenes:
-            if scene.observations is not None:
-                _, height, width, _ = scene.observations.shape
-                if problem := other_aspect((height, width), self.picture_px):
-                    warnings.warn(f"scene {scene.name}: {problem}", AspectWarning, stacklevel=2)
+        self.warn_of_aspect(scenes)
         return [encoded(scene, self.encoder) for scene in scenes]

@@ -86,6 +86,7 @@ def evaluate_live(
         raise ArgumentError(f"{problem}. Evaluate a run at its targets: clearway evaluate RUN --live, without --goals")
     found = load_scenes(scenes)
     agent = agent.stepping(found)
+    agent.warn_of_aspect(found)
     settings = [Condition(label_of(perturbations), perturbations)]
     if sweep:
         fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)

@@ -10,14 +10,17 @@ import numpy as np
 import torch
 
 from clearway.agents.agent import Agent, State
+from clearway.errors import SceneError
 from clearway.evaluation.sight import Sight
 from clearway.evaluation.takes import Takes
 from clearway.reward import COLLISION_AWARE
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import Scene
 from clearway.world.navigation import Navigation
 from clearway.world.world import World
 
 TOUR_STREAM = 15
+MOVES = [Action.MOVE_FORWARD, Action.MOVE_BACKWARD]
 
 
 @dataclass(frozen=True)
@@ -63,13 +66,13 @@ def walk_tour(world: World, touring: Touring, scene: Scene, seed: int, takes: Ta
         takes: what is seen instead of the scene's own pictures.
 
     Raises:
+        SceneError: there is nowhere to go in the scene.
         AgentError: the explorer sees what is not there.
     """
     explorer = touring.explorer(touring.steps)
     sight = Sight(world, explorer, [scene], takes)
-    seeds = torch.tensor([zlib.crc32(scene.name.encode()) + (seed << 32) + TOUR_STREAM])
-    largest = np.flatnonzero(scene.components == 0)
-    start = int(np.random.default_rng([seed, TOUR_STREAM, zlib.crc32(scene.name.encode())]).choice(largest))
+    start, own = tour_begin(scene, seed)
+    seeds = torch.tensor([own])
     env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
     env.reset(target=torch.zeros(1, dtype=torch.int64), start=torch.tensor([start]))
     state = explorer.reset({}, seeds.numpy())
@@ -80,4 +83,19 @@ def walk_tour(world: World, touring: Touring, scene: Scene, seed: int, takes: Ta
         decisions, state = explorer.act(seen, state)
         happened = env.step(torch.from_numpy(decisions.action.astype(np.int64)))
         collisions += int(happened.blocked)
-    return Tour(state, start, collisions, len(been) / len(largest))
+    return Tour(state, start, collisions, len(been) / np.count_nonzero(scene.components == 0))
+
+
+def tour_begin(scene: Scene, seed: int) -> tuple[int, int]:
+    """The state in which a tour of a scene begins, drawn among those of its largest part, and the seed of its chances.
+
+    Raises:
+        SceneError: no move leads anywhere there.
+    """
+    largest = np.flatnonzero(scene.components == 0)
+    if (scene.graph[largest][:, MOVES] == BLOCKED).all():
+        problem = "every move is blocked in its largest part, so that a tour would see one cell"
+        raise SceneError(scene.name, problem, "Leave the tour out, or check the scene: clearway scenes inspect")
+    name = zlib.crc32(scene.name.encode())
+    start = int(np.random.default_rng([seed, TOUR_STREAM, name]).choice(largest))
+    return start, name + (seed << 32) + TOUR_STREAM

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 
 from clearway.agents.agent import Agent, State
-from clearway.evaluation.tours import TOUR_STREAM
+from clearway.evaluation.tours import tour_begin
 from clearway.live.conditions import Perturbations, as_it_was_built
 from clearway.live.draws import Draws
 from clearway.live.episodes import Walking, shown
@@ -45,10 +43,11 @@ def walk_live_tour(
         perturbations: how strong they are.
         steps: of the tour.
         seed: of the start and of all chances.
+
+    Raises:
+        SceneError: there is nowhere to go in the room.
     """
-    name = zlib.crc32(live.scene.name.encode())
-    start = int(np.random.default_rng([seed, TOUR_STREAM, name]).choice(np.flatnonzero(live.scene.components == 0)))
-    own = name + (seed << 32) + TOUR_STREAM
+    start, own = tour_begin(live.scene, seed)
     walker = Walking(live, start, start, Draws(own, as_it_was_built(perturbations)))
     state = explorer.reset({}, torch.tensor([own]).numpy())
     for _ in range(steps):
