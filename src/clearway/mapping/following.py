@@ -137,17 +137,17 @@ class Follower:
     def sight_in_map(self, belief: np.ndarray, seen: np.ndarray, weight: float) -> None:
         """Add to beliefs (B, 4, G, G) where pictures with features (B, F) were taken, by those of the tour."""
         assert self._known is not None, "there was a tour"
-        add_places(belief, seen, [self._toured] * len(seen), self._sight, self._settings.compared, weight)
+        add_places(list(belief), seen, [self._toured] * len(seen), self._sight, self._settings.compared, weight)
 
     def _sight_again(self, belief: np.ndarray, seen: np.ndarray, after: Mapping[str, np.ndarray]) -> None:
         """Add to beliefs (B, 4, G, G) where pictures (B, F) were taken, by those kept, where pictures do not repeat."""
         count = after["count"] - LATEST
         asked = np.flatnonzero((count > 0) & (after["repeats"] < UNKNOWN)).tolist()
         if asked:
-            kept = [
-                Pictures.of(*(after[name][row, : count[row]] for name in ("taken", "features")), self._sight)
-                for row in asked
-            ]
+            kept = []
+            for row in asked:
+                taken, features = (after[name][row, : count[row]] for name in ("taken", "features"))
+                kept.append(Pictures.of(taken, features, self._sight))
             own, settings = [belief[row] for row in asked], self._settings
             add_places(own, seen[asked], kept, self._sight, settings.compared, settings.place_weight)
 
