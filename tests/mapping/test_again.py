@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.mapping.again import Repeats, marks_of
+from clearway.mapping.again import ALWAYS, NEVER, marks_of
 from clearway.mapping.following import STAYED, Follower
 from clearway.mapping.settings import MappingSettings
 from clearway.scenes.actions import Action
@@ -42,14 +42,26 @@ def test_marks_tell_pictures_apart_and_know_them_again():
     assert marks_of(features.astype(np.float16)).tolist() == marks.tolist()
 
 
-def test_a_picture_seen_again_says_that_they_repeat_and_then_another_one_is_a_move():
-    round_about = [Action.TURN_RIGHT] * 4
-    found = walked([*round_about, Action.MOVE_FORWARD, Action.MOVE_FORWARD], noise=False)
-    assert [repeats for _, repeats in found] == [Repeats.UNKNOWN] * 4 + [Repeats.ALWAYS] * 3
+def test_pictures_that_came_again_say_that_they_repeat_and_then_another_one_is_a_move():
+    about = [Action.TURN_RIGHT] * 6 + [Action.TURN_LEFT] * 2
+    found = walked([*about, *[Action.MOVE_FORWARD] * 2], noise=False)
+    assert [repeats for _, repeats in found] == [0, 0, 0, 0, 1, 2] + [ALWAYS] * 5
     assert np.abs(found[-1][0] - found[0][0]).sum() == 2
 
 
 def test_where_a_pose_shows_another_picture_they_never_repeat_and_eyes_decide():
     found = walked([Action.TURN_RIGHT] * 4 + [Action.MOVE_FORWARD] * 2, noise=True)
-    assert [repeats for _, repeats in found] == [Repeats.UNKNOWN] * 4 + [Repeats.NEVER] * 3
+    assert [repeats for _, repeats in found] == [0] * 4 + [NEVER] * 3
     assert np.abs(found[-1][0] - found[0][0]).sum() == 0, "these eyes hold every move for blocked"
+
+
+def test_a_pose_that_shows_another_picture_says_so_even_where_they_came_again_before():
+    scene = seen_perfectly(corridor_scene(6))
+    follower = Follower(PerfectSight(scene), SETTINGS)
+    state, found = follower.begin(1), []
+    for step in range(9):
+        noise = 0.001 if step == 8 else 0.0
+        _, after = follower.follow(scene.features[[0]] + np.float32(noise), state)
+        found.append(int(after["repeats"][0]))
+        state = {**state, **after, "action": np.array([int(Action.MOVE_FORWARD)])}
+    assert found[:4] == [0, 1, 2, ALWAYS] and found[-1] == NEVER

@@ -3,8 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.following import SURE, Follower
+from clearway.mapping.beliefs import NEVER
+from clearway.mapping.following import SURE, Follower, been_now
 from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
+from clearway.mapping.routes import shifted
 from clearway.mapping.settings import MappingSettings
 from clearway.scenes.actions import BLOCKED
 from helpers.made import grid_scene
@@ -35,6 +37,47 @@ def test_it_knows_where_it_is_and_which_moves_were_blocked(seed):
     _, after = follower.follow(scene.features[here], state)
     assert blocked and {tuple(edge) for edge in np.argwhere(after["shut"][0]).tolist()} == blocked
     assert (after["room"][0] == SURE).sum() == len(visited(after["room"][0]))
+
+
+def errs_and_goes_on(seed: int, *, pictures: int) -> tuple[list[bool], dict[str, np.ndarray]]:
+    """Whether a follower's pose is right at each step of a walk, in the middle of which its belief slips by a cell."""
+    scene = seen_perfectly(grid_scene(seed, width=7, depth=6, obstacle_share=0.2))
+    follower = Follower(PerfectSight(scene), SETTINGS, pictures=pictures)
+    rng = np.random.default_rng(seed)
+    state, here = follower.begin(1), rng.integers(scene.state_count, size=1)
+    start, right = int(here[0]), []
+    for step in range(90):
+        seen = scene.features[here].copy()
+        seen[:, 3] += 0.01 * step
+        poses, after = follower.follow(seen, state)
+        right.append(poses[0].index == lattice_index(scene, start, int(here[0])))
+        action = rng.integers(4, size=1)
+        following = scene.graph[here, action]
+        here = np.where(following == BLOCKED, here, following)
+        state = {**state, **after, "been": been_now(state["been"], poses), "action": action}
+        if step == 60:
+            slipped = shifted(state["here"], AHEAD[0], NEVER)
+            state["here"] = np.logaddexp(slipped, state["here"] - 8)
+    return right, state
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_finds_itself_again_by_pictures_that_it_has_taken(seed):
+    right, _ = errs_and_goes_on(seed, pictures=64)
+    assert all(right[:61]) and all(right[-15:])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_without_pictures_taken_an_error_stays(seed):
+    right, _ = errs_and_goes_on(seed, pictures=0)
+    assert all(right[:61]) and not any(right[-15:])
+
+
+def test_it_keeps_one_picture_a_pose_and_so_many_at_most():
+    _, state = errs_and_goes_on(0, pictures=12)
+    taken, features = state["taken"][0], state["features"][0]
+    assert state["count"][0] == 12 == len({tuple(pose) for pose in taken.tolist()}) and features.all(axis=1).any()
+    assert tuple(taken[0]) == (0, 15, 15)
 
 
 def visited(room: np.ndarray) -> np.ndarray:

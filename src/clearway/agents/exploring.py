@@ -37,34 +37,22 @@ class Explorer:
         encoder: Encoder | None = None,
         settings: MappingSettings | None = None,
     ) -> None:
-        self._sight, self._settings, self._pictures = sight, settings or MappingSettings(), pictures
-        self._follower = Follower(sight, self._settings)
+        self._settings = settings or MappingSettings()
+        self._follower = Follower(sight, self._settings, pictures=pictures)
         self._features = Encoded(encoder)
         self.sees: tuple[str, ...] = (self._features.sees,)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
         """Begin B tours; targets are of no interest. See `Agent.reset`."""
-        count, kept = len(seed), self._pictures
-        return {
-            **self._follower.begin(count),
-            "count": np.zeros(count, np.int64),
-            "taken": np.zeros((count, kept, 3), np.int64),
-            "features": np.zeros((count, kept, self._sight.feature_count), np.float16),
-        }
+        return self._follower.begin(len(seed))
 
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """The next steps to where it has not been; see `Agent.act`."""
         seen = self._features(observation)
         poses, after = self._follower.follow(seen, state)
-        count, taken, features = (state[name].copy() for name in ("count", "taken", "features"))
-        for row, pose in enumerate(poses):
-            if count[row] < self._pictures and not state["been"][row][pose.index]:
-                taken[row, count[row]], features[row, count[row]] = pose.index, seen[row]
-                count[row] += 1
         been = been_now(state["been"], poses)
         action = search_steps(poses, _unlike(been), been, after["room"], after["shut"], self._settings)
-        kept = {"count": count, "taken": taken, "features": features}
-        return Decisions(action), {**after, **kept, "been": been, "action": action}
+        return Decisions(action), {**after, "been": been, "action": action}
 
 
 def _unlike(been: np.ndarray) -> np.ndarray:

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.mapping.beliefs import LatticePose
-
 
 @dataclass(frozen=True, eq=False)
 class RoomMap:
@@ -24,8 +22,3 @@ class RoomMap:
     shut: np.ndarray
     taken: np.ndarray
     features: np.ndarray
-
-    def pose(self, number: int) -> LatticePose:
-        """Of a picture."""
-        heading, row, column = self.taken[number].tolist()
-        return LatticePose(heading, row, column)
