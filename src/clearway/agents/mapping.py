@@ -60,8 +60,9 @@ class MappingAgent:
         towards = self._sight.whereabouts(seen, state["target"])
         for row, pose in enumerate(poses):
             if not state["been"][row][pose.index]:
-                add_sighting(goal[row], pose, towards[row], self._settings.target_weight, after["room"][row])
-        np.clip(goal, self._settings.least_evidence, self._settings.most_evidence, out=goal)
+                room, weight = after["room"][row], self._settings.target_weight
+                add_sighting(goal[row], pose, towards[row], weight, room, self._settings.surest)
+        np.maximum(goal, self._settings.least_evidence, out=goal)
         likely = probabilities(np.where(state["been"], NEVER, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
         been = been_now(state["been"], poses)  # an episode that goes on has not arrived
