@@ -19,6 +19,7 @@ DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body 
 NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
 IN_VIEW, VIEW_ALONG, VIEW_ACROSS = 0.1, 7, 3  # likewise, of what is within so many cells: eyes compare these well
+TRUST = 0.5  # share of the evidence for a pose by which ways are chosen; arriving goes by all of it
 DECEIVED = 0.2  # probability that what looked like the target was something else
 IF_DECEIVED = 3.0  # evidence, at most, in that case
 
@@ -74,6 +75,7 @@ def _likely(evidence: np.ndarray, left: np.ndarray, room: np.ndarray) -> np.ndar
     What was likely where it turned out not to be is lost: eyes that were wrong there are no surer of what is left.
     Then it is mostly the mass of the other case that counts, in which what looked like the target was something else.
     """
+    evidence = np.where(evidence > 0, TRUST * evidence, evidence)
     told = probabilities(evidence, room)
     deceived = probabilities(np.where(left, np.minimum(evidence, IF_DECEIVED), NEVER), room)
     return np.where(left, (1 - DECEIVED) * told + DECEIVED * deceived, 0)

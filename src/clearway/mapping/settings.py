@@ -14,7 +14,7 @@ class MappingSettings:
         collision_cost: steps that a blocked move costs.
         usual_room: log-odds that a body can stand in a cell of which nothing was seen.
         standing_weight, target_weight, place_weight: of what eyes tell of cells, of the target, of the own pose. What
-            they tell in neighbouring poses is not independent, so that these are below 1.
+            they tell in neighbouring poses is not independent; of the target that is what `surest` is for.
         least_evidence: that the target is in a pose, nats, however often the eyes do not see it there.
         surest: so many times the evidence of one look is the most that many make of it: weak looks, however many, are
             not a strong one.
@@ -27,10 +27,10 @@ class MappingSettings:
     collision_cost: float = 16.0
     usual_room: float = -1.0
     standing_weight: float = 0.4
-    target_weight: float = 0.6
+    target_weight: float = 1.0
     place_weight: float = 0.6
-    least_evidence: float = -3.0
+    least_evidence: float = -5.0
     surest: float = 2.0
-    nearby: float = 2.0
+    nearby: float = 4.0
     compared: int = 8
     arrived: float = 0.5
