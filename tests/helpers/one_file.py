@@ -26,7 +26,7 @@ class OneFile:
     def generalist(self) -> Generalist:
         write_eyes(self.folder / "eyes", small_eyes(), {})
         encoder = eyes.from_record(eyes.find_record(str(self.folder / "eyes")))
-        return Generalist(encoder, Generalist.by_eyes(encoder).sight, MappingSettings(side_m=10.0, arrived=0.02))
+        return Generalist(encoder, Generalist.by_eyes(encoder).sight, MappingSettings(side_m=10.0, arrived=0.002))
 
     @cached_property
     def path(self) -> Path:

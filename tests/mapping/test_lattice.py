@@ -72,6 +72,20 @@ def test_what_is_not_seen_counts_less_where_a_wall_may_be_between():
     assert belief[0, 12, 10] == belief[0, 13, 10] == 4.0
 
 
+def test_many_weak_looks_are_not_a_strong_one():
+    pose, belief = LatticePose(0, 10, 10), np.zeros((HEADINGS, SIDE, SIDE), np.float32)
+    weak, strong = (told(1.0, 0.0, 0.0) * strength for strength in (2.0, 6.0))
+    for _ in range(50):
+        add_sighting(belief, pose, weak, 0.5, HALF, surest=1.5)
+    assert belief[0, 12, 10] == belief.max() == 3.0
+    for _ in range(50):
+        add_sighting(belief, pose, strong, 0.5, HALF, surest=1.5)
+    add_sighting(belief, pose, weak, 0.5, HALF, surest=1.5)
+    assert belief[0, 12, 10] == 9.0
+    add_sighting(belief, pose, -weak, 0.5, HALF, surest=1.5)
+    assert belief[0, 12, 10] == 8.0
+
+
 def test_eyes_are_never_as_sure_of_a_cell_as_who_tried_it():
     room = np.zeros((SIDE, SIDE), np.float32)
     room[11, 10] = -10.0

@@ -53,7 +53,7 @@ def test_where_nothing_is_left_to_search_it_begins_anew():
     evidence, shut = np.zeros((1, 4, SIDE, SIDE), np.float32), np.zeros((1, 4, SIDE, SIDE), bool)
     done = np.ones(evidence.shape, bool)
     evidence[0][END.index] = 5.0
-    action = search_steps([START], evidence, done, room[None], shut, MappingSettings())
+    action = search_steps([START], evidence, done, room[None], shut, MappingSettings(nearby=2.0))
     assert action.tolist() == [Action.MOVE_FORWARD]
 
 
@@ -65,3 +65,35 @@ def test_what_is_known_of_cells_counts_with_what_was_seen():
     found = probabilities(evidence, room)
     assert np.isclose(found.sum(), 1) and np.unravel_index(found.argmax(), found.shape) == (0, 2, 1, 1)
     np.testing.assert_allclose(found[0, 2, 1, 1] / found[0, 2, 0, 0], np.exp(3.0), rtol=1e-6)
+
+
+def first_of(evidence: np.ndarray, done: np.ndarray, start: LatticePose) -> Action:
+    """The first action in a room that is free."""
+    room, shut = np.full(evidence.shape[1:], SURE, np.float32), np.zeros((1, *evidence.shape), bool)
+    found = search_steps([start], evidence[None], done[None], room[None], shut, MappingSettings(nearby=2.0))
+    return Action(int(found[0]))
+
+
+def test_what_was_likely_and_is_not_there_makes_the_rest_of_it_unlikely():
+    side = 41
+    evidence, done = np.zeros((4, side, side), np.float32), np.zeros((4, side, side), bool)
+    start = LatticePose(0, 12, 12)
+    evidence[:, 12, :] = -30.0
+    evidence[:, :12] = 0.0
+    evidence[:, 13:] = -30.0  # nothing ahead but a place that looked much like the target, and what is beside it
+    evidence[0, 34, 12], evidence[0, 35, 12] = 80.0, 50.0
+    done[start.index] = True
+    assert first_of(evidence, done, start) == Action.MOVE_FORWARD
+    done[0, 34, 12] = True
+    assert first_of(evidence, done, start) == Action.MOVE_BACKWARD
+
+
+def test_it_goes_where_much_of_what_is_left_is_in_view():
+    side = 25
+    evidence, done = np.full((4, side, side), -30.0, np.float32), np.zeros((4, side, side), bool)
+    start = LatticePose(0, 12, 12)
+    done[start.index] = True
+    evidence[0, 16, 12] = evidence[0, 8, 12] = 0.0
+    evidence[0, 19, 11:14] = 0.0  # in view of the one ahead
+    assert first_of(evidence, done, start) == Action.MOVE_FORWARD
+    assert first_of(evidence[:, ::-1].copy(), done, start) == Action.MOVE_BACKWARD

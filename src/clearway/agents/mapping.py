@@ -67,8 +67,9 @@ class MappingAgent:
                     self._settings.target_weight,
                     self._settings.lattice,
                     after["room"][row],
+                    self._settings.surest,
                 )
-        np.clip(goal, self._settings.least_evidence, self._settings.most_evidence, out=goal)
+        np.maximum(goal, self._settings.least_evidence, out=goal)
         likely = probabilities(np.where(state["been"], NEVER, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
         been = been_now(state["been"], poses)  # an episode that goes on has not arrived

@@ -58,11 +58,15 @@ def add_sighting(
     weight: float,
     lattice: Lattice,
     room: np.ndarray | None = None,
+    surest: float | None = None,
 ) -> None:
     """Add evidence (ELSEWHERE,) of where something is, seen from a pose, to a belief (4, G, G) about it.
 
     What is behind a wall is not seen, so that evidence against a pose is weak there: given log-odds (G, G) that a body
     can stand in the cells, it is log(v exp(evidence) + 1 - v), where v is the probability that the pose would be seen.
+
+    What is alike in a wrong place is alike in many looks, so that they are not independent: evidence for a pose raises
+    what is held of it to `surest` times itself at most, however often it comes; None: without end.
     """
     side = belief.shape[-1]
     rows, here_rows = _within(pose.row, side, lattice.reach)
@@ -71,7 +75,11 @@ def add_sighting(
     if room is not None:
         visible = VISIBLE / (1 + np.exp(-2 * (room[rows, columns] - HALF_SURE)))
         seen = np.where(seen > 0, seen, np.log(visible * np.exp(seen) + 1 - visible))
-    belief[:, rows, columns] += weight * seen
+    before = belief[:, rows, columns]
+    after = before + weight * seen
+    if surest is not None:
+        after = np.where(seen > 0, np.maximum(before, np.minimum(after, surest * seen)), after)
+    belief[:, rows, columns] = after
 
 
 def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float, lattice: Lattice) -> None:

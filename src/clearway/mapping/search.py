@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import uniform_filter
 
 from clearway.mapping.beliefs import NEVER, LatticePose, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS
@@ -17,6 +18,10 @@ from clearway.mapping.settings import MappingSettings
 DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body can hardly stand
 NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
+IN_VIEW, VIEW_ALONG, VIEW_ACROSS = 0.1, 7, 3  # likewise, of what is within so many cells: eyes compare these well
+TRUST = 0.5  # share of the evidence for a pose by which ways are chosen; arriving goes by all of it
+DECEIVED = 0.2  # probability that what looked like the target was something else
+IF_DECEIVED = 3.0  # evidence, at most, in that case
 
 
 def probabilities(evidence: np.ndarray, room: np.ndarray) -> np.ndarray:
@@ -49,8 +54,7 @@ def search_steps(
     within = cost < FAR
     left = within & ~done
     left = np.where(left.any(axis=(1, 2, 3), keepdims=True), left, within)
-    likely = probabilities(np.where(left, evidence, NEVER + evidence.min()), room)
-    worth = np.where(left, _spread(likely), 0) / (cost + settings.nearby)
+    worth = np.where(left, _spread(_likely(evidence, left, room)), 0) / (cost + settings.nearby)
     ends = [likeliest(values) for values in worth]
     found = [first_action(poses[row], end, cost[row], price[row]) for row, end in enumerate(ends)]
     return np.array(found, np.int64)
@@ -65,8 +69,29 @@ def _entering(room: np.ndarray, shut: np.ndarray, collision_cost: float) -> np.n
     return np.where(closed, FAR, price[:, None]).astype(np.float32)
 
 
+def _likely(evidence: np.ndarray, left: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """Mass (B, 4, G, G) of the poses that are left (bool).
+
+    What was likely where it turned out not to be is lost: eyes that were wrong there are no surer of what is left.
+    Then it is mostly the mass of the other case that counts, in which what looked like the target was something else.
+    """
+    evidence = np.where(evidence > 0, TRUST * evidence, evidence)
+    told = probabilities(evidence, room)
+    deceived = probabilities(np.where(left, np.minimum(evidence, IF_DECEIVED), NEVER), room)
+    return np.where(left, (1 - DECEIVED) * told + DECEIVED * deceived, 0)
+
+
 def _spread(mass: np.ndarray) -> np.ndarray:
-    """Mass (B, 4, G, G) with some of what is beside every pose: who goes there sees it."""
+    """Mass (B, 4, G, G) with some of what is beside every pose and in view of it: who goes there sees it."""
     around = sum(shifted(mass, step, 0.0) for step in AHEAD)
     turned = mass[:, [3, 0, 1, 2]] + mass[:, [1, 2, 3, 0]]
-    return mass + BESIDE * (around + turned)
+    return mass + BESIDE * (around + turned) + IN_VIEW * _in_view(mass)
+
+
+def _in_view(mass: np.ndarray) -> np.ndarray:
+    """(B, 4, G, G), the mass around each pose in those that see much of what it sees: before and behind it."""
+    found = np.empty_like(mass)
+    for heading in range(HEADINGS):
+        lengths = (VIEW_ALONG, VIEW_ACROSS) if AHEAD[heading, 0] else (VIEW_ACROSS, VIEW_ALONG)
+        found[:, heading] = uniform_filter(mass[:, heading], (0, *lengths), mode="constant")
+    return np.maximum(found, 0) * (VIEW_ALONG * VIEW_ACROSS)

@@ -17,9 +17,10 @@ class MappingSettings:
         collision_cost: steps that a blocked move costs.
         usual_room: log-odds that a body can stand in a cell of which nothing was seen.
         standing_weight, target_weight, place_weight: of what eyes tell of cells, of the target, of the own pose. What
-            they tell in neighbouring poses is not independent, so that these are below 1.
-        least_evidence, most_evidence: that the target is in a pose, nats; eyes are never surer, however often they
-            look.
+            they tell in neighbouring poses is not independent; of the target that is what `surest` is for.
+        least_evidence: that the target is in a pose, nats, however often the eyes do not see it there.
+        surest: so many times the evidence of one look is the most that many make of it: weak looks, however many, are
+            not a strong one.
         nearby: steps that are added to every way, so that what is near is not everything.
         compared: pictures of a tour that a picture is compared with.
         arrived: probability of being at the target at which the agent says so.
@@ -30,11 +31,11 @@ class MappingSettings:
     collision_cost: float = 16.0
     usual_room: float = -1.0
     standing_weight: float = 0.4
-    target_weight: float = 0.4
+    target_weight: float = 1.0
     place_weight: float = 0.6
-    least_evidence: float = -3.0
-    most_evidence: float = 100.0
-    nearby: float = 2.0
+    least_evidence: float = -5.0
+    surest: float = 2.0
+    nearby: float = 4.0
     compared: int = 8
     arrived: float = 0.5
 
