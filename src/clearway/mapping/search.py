@@ -39,6 +39,7 @@ def search_steps(
     room: np.ndarray,
     shut: np.ndarray,
     settings: MappingSettings,
+    in_view: float = IN_VIEW,
 ) -> np.ndarray:
     """The next actions (B,) int64.
 
@@ -48,13 +49,14 @@ def search_steps(
         done: (B, 4, G, G) bool, poses in which it is not; where no other can be reached, the search begins anew.
         room, shut: see `Follower.begin`.
         settings: what ways cost.
+        in_view: share of what is likely in view of a pose that counts as its own: 0 where poses are to be come to.
     """
     price = _entering(room, shut, settings.collision_cost)
     cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
     left = np.where(left.any(axis=(1, 2, 3), keepdims=True), left, within)
-    worth = np.where(left, _spread(_likely(evidence, left, room)), 0) / (cost + settings.nearby)
+    worth = np.where(left, _spread(_likely(evidence, left, room), in_view), 0) / (cost + settings.nearby)
     ends = [likeliest(values) for values in worth]
     found = [first_action(poses[row], end, cost[row], price[row]) for row, end in enumerate(ends)]
     return np.array(found, np.int64)
@@ -81,11 +83,12 @@ def _likely(evidence: np.ndarray, left: np.ndarray, room: np.ndarray) -> np.ndar
     return np.where(left, (1 - DECEIVED) * told + DECEIVED * deceived, 0)
 
 
-def _spread(mass: np.ndarray) -> np.ndarray:
+def _spread(mass: np.ndarray, in_view: float) -> np.ndarray:
     """Mass (B, 4, G, G) with some of what is beside every pose and in view of it: who goes there sees it."""
     around = sum(shifted(mass, step, 0.0) for step in AHEAD)
     turned = mass[:, [3, 0, 1, 2]] + mass[:, [1, 2, 3, 0]]
-    return mass + BESIDE * (around + turned) + IN_VIEW * _in_view(mass)
+    beside = mass + BESIDE * (around + turned)
+    return beside + in_view * _in_view(mass) if in_view else beside
 
 
 def _in_view(mass: np.ndarray) -> np.ndarray:
