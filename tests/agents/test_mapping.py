@@ -11,6 +11,7 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.tours import Touring, walk_tour
 from clearway.mapping.eyes_sight import EyesSight
 from clearway.mapping.settings import MappingSettings
+from clearway.perception.whereabouts import ELSEWHERE
 from clearway.world.world import make_world
 from helpers.agents import check_agent
 from helpers.made import grid_scene
@@ -52,14 +53,35 @@ def test_who_sees_no_obstacles_bumps_into_them(scene, world):
     assert bumps > 1 > clears
 
 
-def test_after_a_tour_it_walks_almost_the_shortest_paths(scene, world):
-    sight = PerfectSight(scene)
+def toured(scene, world, sight, steps=400):
     touring = Touring(
         lambda steps: Explorer(sight, steps, settings=SETTINGS),
         lambda state: MappingAgent(sight, known=map_of(state), settings=SETTINGS),
-        300,
+        steps,
     )
-    tour = walk_tour(world, touring, scene, seed=0)
+    return touring, walk_tour(world, touring, scene, seed=0)
+
+
+def test_a_tour_comes_near_every_pose_before_it_comes_to_all():
+    hall = seen_perfectly(grid_scene(1, width=14, depth=14, obstacle_share=0.25))
+    targets = make_world([hall], {hall.name: [5, 9]})
+    taken = [map_of(toured(hall, targets, PerfectSight(hall), steps)[1].state).taken for steps in (120, 1000)]
+    apart = np.abs(taken[1][:, None] - taken[0]).astype(float)
+    apart[..., 0][apart[..., 0] > 0] = np.inf  # another heading shows something else
+    assert len(taken[0]) < 120 and len(taken[1]) > 500
+    assert (apart.max(axis=2).min(axis=1) > 2).mean() < 0.15  # cells
+
+
+def test_a_target_whose_very_picture_a_tour_has_taken_needs_no_eyes(scene, world):
+    _, tour = toured(scene, world, PerfectSight(scene))
+    blind = PerfectSight(scene)
+    blind.whereabouts = lambda first, second: np.zeros((len(first), ELSEWHERE), np.float32)
+    table = walked(world, MappingAgent(blind, known=map_of(tour.state), settings=SETTINGS))
+    assert metrics.success(table).mean() == 1 and metrics.spl(table).mean() > 0.9
+
+
+def test_after_a_tour_it_walks_almost_the_shortest_paths(scene, world):
+    touring, tour = toured(scene, world, PerfectSight(scene))
     assert tour.poses == 1
     table = walked(world, touring.after(tour.state))
     assert metrics.success(table).mean() == 1 and metrics.spl(table).mean() > 0.9

@@ -10,6 +10,7 @@ import numpy as np
 from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.encoded import Encoded
 from clearway.mapping.following import Follower, been_now
+from clearway.mapping.lattice import AHEAD
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.routes import shifted
 from clearway.mapping.search import search_steps
@@ -17,7 +18,8 @@ from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
 from clearway.perception.encoder import Encoder
 
-LITTLE_NEWS = -2.0  # evidence that a pose shows something new, next to one with the same heading that was come to
+LITTLE_NEWS = (-4.0, -3.0, -1.5)
+"""Evidence that a pose shows something new, one, two and three cells from one with its heading that was come to."""
 
 
 class Explorer:
@@ -56,12 +58,13 @@ class Explorer:
 
 
 def _unlike(been: np.ndarray) -> np.ndarray:
-    """(B, 4, G, G) float32, evidence that a pose shows something new: beside a pose that was come to, little."""
-    around = been.copy()
-    for rows in (-1, 0, 1):
-        for columns in (-1, 0, 1):
-            around |= shifted(been, np.array((rows, columns)), False)
-    return np.where(around, LITTLE_NEWS, 0.0).astype(np.float32)
+    """(B, 4, G, G) float32, evidence that a pose shows something new: near a pose that was come to, little."""
+    news, reached = np.zeros(been.shape, np.float32), been
+    for little in LITTLE_NEWS:
+        columns = reached | shifted(reached, AHEAD[0], False) | shifted(reached, AHEAD[2], False)
+        reached = columns | shifted(columns, AHEAD[1], False) | shifted(columns, AHEAD[3], False)
+        news = np.where(reached & (news == 0), little, news)
+    return news.astype(np.float32)
 
 
 def map_of(state: State, row: int = 0) -> RoomMap:

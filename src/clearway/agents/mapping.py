@@ -51,6 +51,7 @@ class MappingAgent:
         goal = np.zeros(state["here"].shape, np.float32)
         if self._has_toured:
             self._follower.sight_in_map(goal, features, self._settings.target_weight)
+            self._follower.recognise(goal, features)
         return {"target": features, "goal": goal, **state}
 
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:

@@ -34,6 +34,8 @@ KEPT, LATEST = 64, 2
 """Pictures that are kept of a walk, and how many of the last ones say nothing of the pose: they share its errors."""
 RECOGNISED = 20.0
 """Evidence for a pose whose picture was seen before, to the bit."""
+CERTAIN = 100.0
+"""Evidence for a pose of which a tour has taken the very picture: more than eyes could bring together."""
 CHANGED = ("here", "room", "shut", "been", "mark", "repeats", "count", "taken", "features")
 STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}
 QUARTERS = {Action.TURN_RIGHT: 1, Action.TURN_LEFT: -1}
@@ -137,6 +139,13 @@ class Follower:
         """Add to beliefs (B, 4, G, G) where pictures with features (B, F) were taken, by those of the tour."""
         assert self._known is not None, "there was a tour"
         add_places(list(belief), seen, [self._toured] * len(seen), self._sight, self._settings, weight)
+
+    def recognise(self, belief: np.ndarray, seen: np.ndarray) -> None:
+        """Add to beliefs (B, 4, G, G) where pictures with features (B, F) were taken, if a tour took the very same."""
+        known = self._known
+        assert known is not None, "there was a tour"
+        rows, numbers = np.nonzero(marks_of(seen)[:, None] == self._marks)
+        belief[rows, *known.taken[numbers].T] += CERTAIN
 
     def _sight_again(self, belief: np.ndarray, seen: np.ndarray, after: Mapping[str, np.ndarray]) -> None:
         """Add to beliefs (B, 4, G, G) where pictures (B, F) were taken, by those kept, where pictures do not repeat."""
