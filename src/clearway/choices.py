@@ -1,5 +1,6 @@
-"""Names that a user chooses from, in a module without imports so that the command line reads them cheaply."""
+"""Names that a user chooses from, in a module with few imports so that the command line reads them cheaply."""
 
+import os
 from typing import Literal
 
 ZoneLevel = Literal["pose", "cell"]
@@ -46,3 +47,8 @@ SplitName = Literal["train", "validation", "test"]
 
 GENERALIST = "generalist"
 """In place of a run folder: the agent that comes with clearway, see `clearway.agents.generalist`."""
+
+
+def is_generalist(source: str | os.PathLike[str]) -> bool:
+    """Whether the agent that comes with clearway is meant, not a file or folder of this name."""
+    return os.fspath(source) == GENERALIST and not os.path.exists(source)

@@ -12,7 +12,7 @@ from helpers.serving import TOKEN, grey
 from helpers.sums import Sums
 
 HEADERS = {"Authorization": f"Bearer {TOKEN}"}
-SERVICE = Service(Sums(), Limits(sessions=5000, body_bytes=20_000))
+SERVICE = Service(Sums(), Limits(sessions=5000, body_bytes=20_000, idle_s=86_400.0))  # longer than any run of the tests
 APP = protected(make_app(SERVICE), SERVICE, TOKEN)
 SCHEMA = schemathesis.openapi.from_asgi("/openapi.json", APP, headers=HEADERS)
 KNOWN = SERVICE.sessions.open("sampled", 0)

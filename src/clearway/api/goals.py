@@ -11,7 +11,7 @@ from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
-from clearway.choices import GENERALIST
+from clearway.choices import GENERALIST, is_generalist
 from clearway.errors import ArgumentError
 from clearway.live.conditions import Perturbations
 from clearway.scenes.sensors import RGB
@@ -132,11 +132,6 @@ def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Gen
         problem = f"{path}: holds the agent for scene {agent.card.scene}, and goals are for agents of any room"
         raise ArgumentError(f"{problem}. Evaluate it without goals")
     return agent.generalist
-
-
-def is_generalist(path: Path) -> bool:
-    """Whether the agent that comes with clearway is meant, not a folder of this name."""
-    return str(path) == GENERALIST and not path.exists()
 
 
 def _check_sees(agent: object) -> None:

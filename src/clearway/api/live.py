@@ -9,10 +9,11 @@ from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING
 
-from clearway.api.arguments import as_path, as_seed, as_whole
-from clearway.api.goals import GOALS, MOST_TOUR_STEPS, STEP_LIMIT, is_generalist
+from clearway.api.arguments import as_seed, as_whole
+from clearway.api.goals import GOALS, MOST_TOUR_STEPS, STEP_LIMIT
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import Perturbed, perturbations_asked
+from clearway.choices import is_generalist
 from clearway.errors import ArgumentError
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built, label_of, sweep_settings
 
@@ -79,7 +80,7 @@ def evaluate_live(
             raise ArgumentError(f"{problem}. Give such numbers, smaller ones")
     if sweep and perturbations != Perturbations():
         raise ArgumentError("sweep sets the perturbations itself. Leave perturb out")
-    if isinstance(agent, str | os.PathLike) and is_generalist(as_path("agent", agent)):
+    if isinstance(agent, str | os.PathLike) and is_generalist(agent):
         agent = Generalist.shipped()
     if not isinstance(agent, Generalist):
         problem = f"{agent!s:.80}: off the grid, {GENERALIST} alone walks to goals drawn anew"

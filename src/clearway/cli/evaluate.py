@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import GENERALIST, HELD_OUT, PlanKind, SplitName
+from clearway.choices import GENERALIST, HELD_OUT, PlanKind, SplitName, is_generalist
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, say, say_held_out, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
@@ -82,10 +82,10 @@ class Evaluate:
         if self.rooms is None and (self.kind is not None or self.count is not None):
             option = "--kind" if self.kind is not None else "--count"
             raise ClearwayError(f"{option}: goes with --rooms alone. Add --rooms validation, or another split")
-        if self.room.live and (self.goals is not None or self._is_generalist()):
+        if self.room.live and (self.goals is not None or is_generalist(self.folder)):
             self._at_goals_live()
             return
-        if self.goals is not None or self.rooms is not None or self._is_generalist():
+        if self.goals is not None or self.rooms is not None or is_generalist(self.folder):
             self._at_goals()
             return
         if self.perturb or self.takes is not None:
@@ -191,11 +191,6 @@ class Evaluate:
             raise ClearwayError(
                 f"{asked[0]}: not with {option}, which walks once to each goal. Leave one of the two out"
             )
-
-    def _is_generalist(self) -> bool:
-        from clearway.api.goals import is_generalist
-
-        return is_generalist(self.folder)
 
     def _check_file(self) -> None:
         """Raise ClearwayError where an exported agent is given with what a run folder alone can do."""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from clearway.choices import GENERALIST
+from clearway.choices import GENERALIST, is_generalist
 from clearway.cli.arguments import check_ending, scene_files
 from clearway.cli.console import say
 from clearway.errors import ClearwayError, EncoderError
@@ -42,7 +42,7 @@ class ExportAgent:
         from clearway.deploy.from_run import load_run_in_scene
 
         check_ending(".onnx", out=self.out)
-        if str(self.folder) == GENERALIST and not self.folder.exists():
+        if is_generalist(self.folder):
             self._generalist()
             return
         files = scene_files(self.scenes) if self.scenes else None

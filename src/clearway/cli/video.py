@@ -45,7 +45,7 @@ class Video:
 
     def run(self) -> None:
         """Walk the episode and write the film."""
-        from clearway.api.goals import is_generalist
+        from clearway.choices import is_generalist
         from clearway.evaluation.single import single_episode
         from clearway.learn.load import load_agent, run_scenes
         from clearway.viz.video import frames, walked, write_video

@@ -50,7 +50,7 @@ class ViewRuns:
         _show(self._stage(), self.port, self.episode, self.open)
 
     def _stage(self) -> Stage:
-        from clearway.api.goals import is_generalist
+        from clearway.choices import is_generalist
 
         first = self.folders[:1]
         if self.agent or any(map(is_generalist, first)):

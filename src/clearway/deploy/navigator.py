@@ -12,7 +12,7 @@ import numpy as np
 
 from clearway.agents.agent import Agent, Decisions, State
 from clearway.agents.selection import Argmax
-from clearway.choices import GENERALIST
+from clearway.choices import GENERALIST, is_generalist
 from clearway.deploy.agent import DeployedAgent, KeepsMaps, as_observation
 from clearway.deploy.card import ANY_ROOM, Card
 from clearway.errors import DeployError
@@ -49,7 +49,7 @@ def open_agent(source: str | Path, scene: str | None = None) -> DeployedAgent:
         ClearwayError: it cannot be read, was changed, is for another scene, or its encoder cannot be had.
     """
     path = Path(source)
-    if str(source) == GENERALIST and not path.exists():
+    if is_generalist(source):
         from clearway.agents.generalist import Generalist
         from clearway.deploy.generalist import GeneralistAgent
 
