@@ -63,14 +63,14 @@ def test_an_agent_with_eyes_is_a_file_too(tmp_path) -> None:
     train(request, tmp_path / "run")
     chosen = load_run_in_scene(tmp_path / "run")
     export_onnx(chosen, tmp_path / "agent.onnx")
-    in_torch, in_file = RunAgent(chosen), OnnxAgent(tmp_path / "agent.onnx")
+    in_torch, in_file = RunAgent(chosen), OnnxAgent(read_onnx(tmp_path / "agent.onnx"))
     pictures = scenes[0].observations[:]
     (first, _), (second, _) = (
         agent.act({RGB: pictures[7:9]}, agent.reset({RGB: pictures[[5, 22]]}, np.arange(2)))
         for agent in (in_torch, in_file)
     )
     np.testing.assert_allclose(second.probabilities, first.probabilities, **CLOSE)
-    assert in_file.card.normalisation["pixels"]["height"] == 32
+    assert in_file.card.normalisation["pixels"]["height"] == 48
 
 
 @pytest.mark.parametrize("rows", [1, 3, 32])
