@@ -10,6 +10,7 @@ import numpy as np
 from clearway.agents.agent import FEATURES, Decisions, Observation, State
 from clearway.agents.exploring import map_of
 from clearway.agents.generalist import Generalist
+from clearway.mapping.beliefs import LatticePose
 from clearway.mapping.following import SURE
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.routes import FAR, first_action, ways_from
@@ -38,10 +39,14 @@ class Retrieval:
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """The next steps of shortest ways on the map."""
         here = self._nearest(observation[FEATURES])
-        poses, ends = ([self._known.pose(int(number)) for number in numbers] for numbers in (here, state["target"]))
+        poses, ends = ([self._pose(number) for number in numbers] for numbers in (here, state["target"]))
         costs = ways_from(poses, self._price.repeat(len(poses), axis=0))
         action = [first_action(*way, self._price[0]) for way in zip(poses, ends, costs, strict=True)]
         return Decisions(np.array(action, np.int64), arrived=here == state["target"]), state
+
+    def _pose(self, number: int) -> LatticePose:
+        """Of a picture."""
+        return LatticePose(*self._known.taken[number].tolist())
 
     def _nearest(self, features: np.ndarray) -> np.ndarray:
         """(B,) numbers of the tour's pictures that are most alike."""
