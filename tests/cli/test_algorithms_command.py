@@ -113,5 +113,5 @@ def test_from_generalist_is_adapting_it(clearway, trained, tmp_path, monkeypatch
     ],
 )
 def test_what_cannot_be_adapted_is_refused_in_a_line(clearway, trained, tmp_path, words, told):
-    clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(told)
+    assert clearway("train", trained.scene, "--out", tmp_path / "run", *words).refusal(told)
     assert not (tmp_path / "run").exists()

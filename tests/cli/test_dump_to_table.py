@@ -203,5 +203,5 @@ def test_a_film_shows_actions_as_they_are_asked_for(clearway, trained, tmp_path,
 
     monkeypatch.setattr(single, "single_episode", noted)
     out = tmp_path / "film.gif"
-    clearway("video", trained.run, "--out", out, "--selection", selection, "--seed", 7).refusal("enough")
+    assert clearway("video", trained.run, "--out", out, "--selection", selection, "--seed", 7).refusal("enough")
     assert (asked["selection"], asked["seed"]) == (selection, 7)

@@ -157,7 +157,7 @@ def test_a_checkpoint_is_the_first_run_s_own(clearway, runs):
     """That of --against is its newest."""
     own, other = (newest_checkpoint(RunFolder(run).checkpoints) for run in (runs.bold, runs.wary))
     words = ("evaluate", runs.bold, "--live", "--episodes", 1, "--step-limit", 1, "--checkpoint")
-    clearway(*words, other).refusal(str(other), "not a checkpoint of")
+    assert clearway(*words, other).refusal(str(other), "not a checkpoint of")
     assert clearway(*words, own, "--against", runs.wary).code == 0
 
 
@@ -191,7 +191,7 @@ def test_a_run_in_a_mujoco_model_walks_there(clearway, run_in_model, tmp_path):
     assert result["agents"]["shortest"]["rearranged"] == 0
     assert 0 <= result["agents"]["shortest"]["min_clearance_m"] < 1
     assert (tmp_path / "live-hall.png").read_bytes()[:4] == b"\x89PNG"
-    clearway(*short, "--new-obstacle").refusal("hall: nothing can be moved in a MuJoCo model", "Leave out")
+    assert clearway(*short, "--new-obstacle").refusal("hall: nothing can be moved in a MuJoCo model", "Leave out")
     sweep = clearway(*short, "--sweep", "--strengths", 1, "--json")
     assert "the sweep leaves out move_furniture and new_obstacle" in sweep.err
     labels = [found["setting"] for found in sweep.json["results"]]
@@ -201,5 +201,7 @@ def test_a_run_in_a_mujoco_model_walks_there(clearway, run_in_model, tmp_path):
 def test_a_model_that_is_gone_is_one_line(clearway, run_in_model, tmp_path):
     model = run_in_model.parent / "hall.xml"
     model.rename(tmp_path / "hall.xml")
-    clearway("evaluate", run_in_model, "--live").refusal("hall: its MuJoCo model", "hall.xml is missing", "Put it back")
+    assert clearway("evaluate", run_in_model, "--live").refusal(
+        "hall: its MuJoCo model", "hall.xml is missing", "Put it back"
+    )
     (tmp_path / "hall.xml").rename(model)

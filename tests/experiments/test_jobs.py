@@ -129,8 +129,10 @@ def test_a_killed_command_leaves_no_worker_that_keeps_its_runs_locked(tmp_path: 
         wait_until(lambda: any(tmp_path.glob("out/runs/*/metrics.jsonl")), process)
         process.kill()
         process.communicate(timeout=120)  # until no worker has standard error open any more
-    for metrics in tmp_path.glob("out/runs/*/metrics.jsonl"):
-        with RunFolder(metrics.parent).held():
+    runs = [metrics.parent for metrics in tmp_path.glob("out/runs/*/metrics.jsonl")]
+    assert runs
+    for run in runs:
+        with RunFolder(run).held():  # raises where somebody holds it
             pass
 
 

@@ -48,7 +48,7 @@ def ways_from(poses: Sequence[LatticePose], entering: np.ndarray) -> np.ndarray:
         prices = np.append(entering[row].ravel(), np.float32(1))[price]
         steps = csr_array((prices, after, first), shape=(cost.shape[1], cost.shape[1]))
         start = int(np.ravel_multi_index(pose.index, entering[row].shape))
-        found = dijkstra(steps, indices=start, limit=FAR)  # type: ignore[call-overload]  # stubs know no csr_array
+        (found,) = dijkstra(steps, indices=[start], limit=FAR)
         cost[row] = np.minimum(found, FAR)
     return cost.reshape(entering.shape)
 
