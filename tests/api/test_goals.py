@@ -174,6 +174,10 @@ def test_a_tour_of_a_room_without_ways_out_is_one_line(shipped):
 
 def test_it_walks_by_steps_of_other_lengths_but_by_one_at_a_time(shipped):
     scene = grid_scene(3)
+    about, exact = (
+        evaluate_goals("generalist", stretched(scene, by), goals=3, step_limit=9)[0] for by in (1 + 1e-7, 1)
+    )
+    assert about == exact  # a size that was rounded once
     for step_m in (0.25, 0.6):
         told, *_ = evaluate_goals("generalist", [stretched(scene, step_m / scene.cell_size_m)], goals=3, step_limit=9)
         assert told.average.episodes == 3

@@ -32,6 +32,7 @@ __all__ = ["GENERALIST", "Generalist"]
 STEPS_M = 0.2, 1.0
 """The shortest and the longest move that it can walk by."""
 SLACK = 1e-3  # share by which moves may differ
+DECIMALS = 4  # of a move in metres: float32 is told from what was meant
 
 
 @dataclass(frozen=True)
@@ -72,13 +73,13 @@ class Generalist:
         Raises:
             SceneError: moves are too long or too short, differ between scenes, or turns are no quarters.
         """
-        step_m, shortest_m, longest_m = scenes[0].cell_size_m, *STEPS_M
+        step_m, shortest_m, longest_m = round(scenes[0].cell_size_m, DECIMALS), *STEPS_M
         for scene in scenes:
             remedy = "Build or import the scene with these, or train an agent of its own"
             if scene.turn_deg != 360 / HEADINGS:
                 problem = f"turns of {scene.turn_deg:g} degrees, and the {GENERALIST} walks by quarter turns"
                 raise SceneError(scene.name, problem, remedy)
-            if not shortest_m <= scene.cell_size_m <= longest_m:
+            if not shortest_m <= round(scene.cell_size_m, DECIMALS) <= longest_m:
                 allowed = f"{shortest_m:g} to {longest_m:g} m"
                 problem = f"moves of {scene.cell_size_m:g} m, and the {GENERALIST} walks by {allowed}"
                 raise SceneError(scene.name, problem, remedy)

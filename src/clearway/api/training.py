@@ -25,6 +25,7 @@ from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
 from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunRecord
+from clearway.learn.seeds import SEED_LIMIT
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.live.conditions import Perturbations
@@ -215,7 +216,8 @@ def _takes(
         return None
     count = TAKES if takes is None else as_whole("takes", takes, 1)
     learner.check_sees_takes()  # before what takes long
-    return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=seed, show_progress=show_progress)
+    own = SEED_LIMIT - 1 - seed  # no pictures that an evaluation with the same seed sees
+    return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=own, show_progress=show_progress)
 
 
 def _is_known(learner: Learner) -> bool:
