@@ -6,8 +6,7 @@
     python benchmarks/generalist.py rooms-test --json record.json       # figures of every scene
 
 Scenes are files or folders of them, with pictures. All agents walk to the same goals from the same starts. Intervals
-are of the mean over scenes: scenes are drawn anew, 2,000 times (Efron & Tibshirani 1993), and so are differences, scene
-by scene.
+are of the mean over scenes, and so are differences, scene by scene; see `by_scene`.
 """
 
 from __future__ import annotations
@@ -17,41 +16,15 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
+from by_scene import print_difference, print_table
 from retrieval import Retrieving
 
 import clearway
 from clearway.agents.generalist import Generalist
-from clearway.evaluation.bootstrap import RESAMPLES, intervals
 from clearway.evaluation.goals import GoalEvaluation
 from clearway.learn.provenance import hardware, package_versions
 
-SHOWN = ("success", "success_4x", "spl", "collisions", "steps", "false_arrivals", "missed_arrivals")
-COUNTS = ("collisions", "steps")
 CARELESS, RETRIEVAL = "collisions cost nothing", "nearest picture of the tour"
-
-
-def column(evaluation: GoalEvaluation, name: str) -> np.ndarray:
-    """(scenes,) a figure of each scene; NaN where there is none."""
-    values = [getattr(figures, name) for figures in evaluation.scenes.values()]
-    return np.array([np.nan if value is None else value for value in values], float)
-
-
-def interval(values: np.ndarray) -> tuple[float, float]:
-    """Of the mean over scenes, 95 %."""
-    drawn = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
-    low, high = intervals(np.nanmean(values[drawn], axis=1))
-    return float(low), float(high)
-
-
-def shown(name: str, values: np.ndarray) -> str:
-    """Mean and interval."""
-    if np.isnan(values).all():
-        return ""
-    low, high = interval(values)
-    if name in COUNTS:
-        return f"{np.nanmean(values):.2f} ({low:.2f} to {high:.2f})"
-    return f"{100 * np.nanmean(values):.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def main() -> None:
@@ -74,14 +47,12 @@ def main() -> None:
     for name, agent in {"generalist": generalist, **({} if args.alone else rivals)}.items():
         own, *others = clearway.evaluate_goals(agent, args.scenes, **asked)
         found |= {name: own} | {other.agent: other for other in others}
-    print("| " + " | ".join(("agent", *SHOWN)) + " |\n|" + "---|" * (len(SHOWN) + 1))
-    for name, evaluation in found.items():
-        print("| " + " | ".join((name, *(shown(figure, column(evaluation, figure)) for figure in SHOWN))) + " |")
+    print_table(found)
     own = found["generalist"]
-    print(f"\n{own.average.episodes} episodes in {len(own.scenes)} scenes; tour: {own.tour}")
     if CARELESS in found:
-        fewer = column(found[CARELESS], "collisions") - column(own, "collisions")
-        print(f"collisions spared an episode: {shown('collisions', fewer)}")
+        print_difference(found[CARELESS], own, "collisions", "collisions spared an episode")
+    if RETRIEVAL in found:
+        print_difference(own, found[RETRIEVAL], "spl", "SPL above the nearest picture's")
     if args.json:
         record = {"asked": asked, "versions": package_versions(), "hardware": hardware()}
         args.json.write_text(json.dumps({**record, **{name: one.to_json() for name, one in found.items()}}) + "\n")

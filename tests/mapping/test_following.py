@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.beliefs import NEVER
+from clearway.mapping.beliefs import IMPOSSIBLE
 from clearway.mapping.following import SURE, Follower, been_now
 from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
 from clearway.mapping.routes import shifted
@@ -56,7 +56,7 @@ def errs_and_goes_on(seed: int, *, pictures: int) -> tuple[list[bool], dict[str,
         here = np.where(following == BLOCKED, here, following)
         state = {**state, **after, "been": been_now(state["been"], poses), "action": action}
         if step == 60:
-            slipped = shifted(state["here"], AHEAD[0], NEVER)
+            slipped = shifted(state["here"], AHEAD[0], IMPOSSIBLE)
             state["here"] = np.logaddexp(slipped, state["here"] - 8)
     return right, state
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.beliefs import NEVER
+from clearway.mapping.beliefs import IMPOSSIBLE
 from clearway.mapping.held import Laid, held_by
 
 SIDE, MIDDLE, USUAL = 7, 3, -1.0
@@ -13,7 +13,7 @@ SIDE, MIDDLE, USUAL = 7, 3, -1.0
 
 def state_of(*, row: int, column: int, heading: int) -> dict[str, np.ndarray]:
     """An agent that is sure to stand in the middle, looking ahead, and that the target is elsewhere."""
-    here, goal = np.full((1, 4, SIDE, SIDE), NEVER), np.zeros((1, 4, SIDE, SIDE))
+    here, goal = np.full((1, 4, SIDE, SIDE), IMPOSSIBLE), np.zeros((1, 4, SIDE, SIDE))
     here[0, 0, MIDDLE, MIDDLE] = 0
     goal[0, heading, MIDDLE + row, MIDDLE + column] = 30
     room = np.full((1, SIDE, SIDE), USUAL)

@@ -13,7 +13,8 @@ from safetensors.torch import load_file
 from clearway.errors import ArgumentError, RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_training
 from clearway.perception.encode import find_record
-from clearway.perception.eyes import read_card, read_eyes
+from clearway.perception.eyes import find_record as find_eyes
+from clearway.perception.eyes import from_record, read_card, read_eyes
 from clearway.perception.eyes_network import EyesShape
 from clearway.pretraining.judge import judge, recognition
 from clearway.pretraining.losses import drawn_pairs
@@ -93,6 +94,33 @@ def test_eyes_learn(tmp_path: Path):
     for part in ("loss_stands", "loss_match"):
         early, late = (np.mean([row[part] for row in some]) for some in (rows[:10], rows[-10:]))
         assert late < 0.9 * early, part
+
+
+def test_features_stay_as_they_are_where_they_are_kept(tmp_path: Path, views: Views):
+    pretrain(PretrainRequest(views, SETTINGS), tmp_path / "first")
+    before = from_record(find_eyes(str(tmp_path / "first")))
+    pretrain(PretrainRequest(views, SETTINGS, 1, before), tmp_path / "second")
+    after = from_record(find_eyes(str(tmp_path / "second")))
+    pictures = views.shards[0].seen("rgb", slice(0, 8))
+    np.testing.assert_array_equal(after.encode(pictures), before.encode(pictures))
+    one, other = (encoder.eyes.state_dict() for encoder in (before, after))
+    changed = {name.split(".")[0] for name in one if not torch.equal(one[name], other[name])}
+    assert {"pose", "told"} <= changed and not {"trunk", "description"} & changed
+    assert other["stood"][-1] == 1 + SETTINGS.pictures, "counted anew"
+    assert read_card(tmp_path / "second").trained["keeping"]["sha256"] == read_card(tmp_path / "first").sha256
+
+
+def test_a_training_that_keeps_features_goes_on_bit_for_bit(tmp_path: Path, views: Views):
+    pretrain(PretrainRequest(views, SETTINGS), tmp_path / "first")
+    request = PretrainRequest(views, SETTINGS, 1, from_record(find_eyes(str(tmp_path / "first"))))
+    pretrain(request, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        pretrain(request, tmp_path / "parts", done=interrupt_after(48))
+    with pytest.raises(RunError, match="with other keeping"):
+        pretrain(replace(request, keeping=None), tmp_path / "parts", resume=True)
+    pretrain(request, tmp_path / "parts", resume=True)
+    whole, parts = (load_file(tmp_path / name / "eyes.safetensors") for name in ("whole", "parts"))
+    assert all(torch.equal(whole[name], parts[name]) for name in whole)
 
 
 def test_another_training_in_the_folder_is_refused(tmp_path: Path, views: Views):

@@ -12,7 +12,7 @@ import numpy as np
 
 from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.encoded import Encoded
-from clearway.mapping.beliefs import NEVER, add_sighting
+from clearway.mapping.beliefs import IMPOSSIBLE, add_sighting
 from clearway.mapping.following import Follower, been_now
 from clearway.mapping.held import Held, Laid, held_by
 from clearway.mapping.room_map import RoomMap
@@ -71,7 +71,7 @@ class MappingAgent:
                     self._settings.surest,
                 )
         np.maximum(goal, self._settings.least_evidence, out=goal)
-        likely = probabilities(np.where(state["been"], NEVER, goal), after["room"])
+        likely = probabilities(np.where(state["been"], IMPOSSIBLE, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
         been = been_now(state["been"], poses)  # an episode that goes on has not arrived
         action = search_steps(poses, goal, been, after["room"], after["shut"], self._settings)

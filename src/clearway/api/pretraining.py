@@ -22,6 +22,7 @@ def pretrain(
     out: PathLike,
     pictures: int = 2_000_000,
     seed: int = 0,
+    keeping: str | None = None,
     try_on: Sequence[PathLike] = (),
     threads: int | None = None,
     resume: bool = False,
@@ -34,6 +35,8 @@ def pretrain(
         out: the folder.
         pictures: to learn from in all; views that are seen again count again.
         seed: of the first parameters and of all chances.
+        keeping: eyes, clearway or a folder, whose features stay as they are: only what is told from them is taught, for
+            example on rooms like one's own. None: all is taught, from nothing.
         try_on: views of other rooms, to try the eyes on once they are trained.
         threads: of torch; None leaves its own choice. Results repeat bit for bit at one number.
         resume: go on from the newest checkpoint in `out`.
@@ -46,7 +49,8 @@ def pretrain(
         ArgumentError: an argument is out of range, or the views are of another kind.
         ClearwayError: views are missing or damaged, or `out` holds something else.
     """
-    from clearway.perception.eyes import read_eyes
+    from clearway.perception.eyes import find_record, from_record, read_eyes
+    from clearway.perception.eyes_network import EyesShape
     from clearway.pretraining.judge import judge
     from clearway.pretraining.pretrain import PretrainRequest
     from clearway.pretraining.pretrain import pretrain as train_eyes
@@ -55,11 +59,13 @@ def pretrain(
     from clearway.torch_threads import torch_threads
     from clearway.views.stream import views_in
 
-    settings = PretrainSettings(pictures=as_whole("pictures", pictures, 1, MAX_PICTURES))
+    kept = None if keeping is None else from_record(find_record(keeping))
+    shape = EyesShape() if kept is None else kept.eyes.shape
+    settings = PretrainSettings(pictures=as_whole("pictures", pictures, 1, MAX_PICTURES), shape=shape)
     count = None if threads is None else as_whole("threads", threads, 1)
     tried = views_in([as_path("try_on", path) for path in try_on]) if try_on else None
     shown = views_in([as_path("views", path) for path in views])
-    request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED))
+    request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept)
     folder = as_path("out", out)
     with torch_threads(count), picture_progress("learning to see", settings.pictures, show_progress) as show_done:
         train_eyes(request, folder, resume=resume, done=show_done)

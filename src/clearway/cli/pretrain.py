@@ -29,6 +29,9 @@ class Pretrain:
     """To learn from in all; views that are seen again count again."""
     seed: int = 0
     """Of the first parameters and of all chances."""
+    keeping: str | None = None
+    """Eyes, clearway or a folder, whose features stay as they are: only what is told from them is taught, for
+    example on rooms like your own. By default all is taught, from nothing."""
     try_on: tuple[Path, ...] = ()
     """Views of other rooms, to try the eyes on once they are trained."""
     threads: int | None = None
@@ -47,6 +50,7 @@ class Pretrain:
             out=self.out,
             pictures=self.pictures,
             seed=self.seed,
+            keeping=self.keeping,
             try_on=self.try_on,
             threads=self.threads,
             resume=self.resume,

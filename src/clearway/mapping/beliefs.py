@@ -11,7 +11,7 @@ import numpy as np
 
 from clearway.mapping.lattice import AHEAD, HEADINGS, Lattice
 
-NEVER = -60.0
+IMPOSSIBLE = -60.0
 SEEN = 4.0  # log-odds at most of a cell that was seen, not tried
 VISIBLE = 0.9  # probability that something would be seen in a cell that is surely free: others may be behind a wall
 HALF_SURE = 2.0  # log-odds of a cell at which that is half as much

@@ -78,7 +78,7 @@ class Follower:
         (B, N, F) float16; and of the last step `begun` (B,) bool, `seen` (B, F), `action` (B,) int64.
         """
         known, side = self._known, self._settings.side if self._known is None else len(self._known.room)
-        here = np.full((count, HEADINGS, side, side), beliefs.NEVER, np.float32)
+        here = np.full((count, HEADINGS, side, side), beliefs.IMPOSSIBLE, np.float32)
         shut, been = np.zeros(here.shape, bool), np.zeros(here.shape, bool)
         room = np.full((count, side, side), self._settings.usual_room, np.float32)
         mark = np.zeros(here.shape, np.uint32)
@@ -119,7 +119,7 @@ class Follower:
         else:
             self._sight_again(here, seen, after)
         here -= here.max(axis=(1, 2, 3), keepdims=True)
-        np.maximum(here, beliefs.NEVER, out=here)
+        np.maximum(here, beliefs.IMPOSSIBLE, out=here)
         poses = [likeliest(belief) for belief in here]
         for row, (pose, stands) in enumerate(zip(poses, self._sight.stands(seen), strict=True)):
             if not after["been"][row][pose.index]:
@@ -184,7 +184,7 @@ class Follower:
         beyond = before.moved(steps)
         usual = float(np.clip(room[beyond.cell], -SURE_OF_MOVES, SURE_OF_MOVES))
         moved += usual
-        gone = np.stack([shifted(here[h], AHEAD[h] * steps, beliefs.NEVER) for h in range(HEADINGS)])
+        gone = np.stack([shifted(here[h], AHEAD[h] * steps, beliefs.IMPOSSIBLE) for h in range(HEADINGS)])
         here[:] = np.logaddexp(gone - np.logaddexp(0, -moved), here - np.logaddexp(0, moved))
         if moved < 0:
             direction = before.heading if steps > 0 else before.turned(2).heading

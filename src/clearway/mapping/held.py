@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from clearway.mapping.beliefs import NEVER, likeliest
+from clearway.mapping.beliefs import IMPOSSIBLE, likeliest
 from clearway.mapping.lattice import HEADINGS
 from clearway.mapping.search import probabilities
 from clearway.scenes.scene import Scene
@@ -85,7 +85,7 @@ def held_by(state: Mapping[str, np.ndarray], laid: Laid, usual_room: float, row:
     stands = 1 / (1 + np.exp(-room[tuple(told.T)]))
     missed = been.copy()
     missed[likeliest(here).index] = False  # whether it is here is for it to say
-    target = probabilities(np.where(missed, NEVER, goal)[None], room[None])[0]
+    target = probabilities(np.where(missed, IMPOSSIBLE, goal)[None], room[None])[0]
     own = np.exp(here - here.max())
     return Held(
         cells=np.column_stack([laid.metres(told - middle), stands]),

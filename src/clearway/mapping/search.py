@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from clearway.mapping.beliefs import NEVER, LatticePose, likeliest
+from clearway.mapping.beliefs import IMPOSSIBLE, LatticePose, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS
 from clearway.mapping.routes import FAR, first_action, shifted, ways_from
 from clearway.mapping.settings import MappingSettings
@@ -79,7 +79,7 @@ def _likely(evidence: np.ndarray, left: np.ndarray, room: np.ndarray) -> np.ndar
     """
     evidence = np.where(evidence > 0, TRUST * evidence, evidence)
     told = probabilities(evidence, room)
-    deceived = probabilities(np.where(left, np.minimum(evidence, IF_DECEIVED), NEVER), room)
+    deceived = probabilities(np.where(left, np.minimum(evidence, IF_DECEIVED), IMPOSSIBLE), room)
     return np.where(left, (1 - DECEIVED) * told + DECEIVED * deceived, 0)
 
 

@@ -34,12 +34,7 @@ SHIPPED = Path(__file__).parent / "weights"
 MEAN, STD = (0.45, 0.45, 0.45), (0.25, 0.25, 0.25)  # of colours from 0 to 1
 MAX_WIDTH, MAX_SIDE_PX = 4096, 512  # of a network; a card that asks for more is refused
 MAX_WEIGHTS_BYTES = 256 * 1024**2
-STATISTICS = (
-    "running_mean",
-    "running_var",
-    "whereabouts_seen",
-    "stood",
-)
+STATISTICS = ("running_mean", "running_var", "whereabouts_seen", "stood")
 """Buffers that are kept as they are; all else is kept in half precision."""
 
 
@@ -114,6 +109,11 @@ def from_record(record: EncoderRecord) -> EyesEncoder:
         problem = f"encoder {record.name}: the eyes '{name}' are others than those that made the features"
         raise EncoderError(f"{problem}. Get those, or encode the scene again")
     return EyesEncoder(record, read_eyes(_folder(name)))
+
+
+def card_of(record: EncoderRecord) -> EyesCard:
+    """What the eyes that a record names are. Raises EncoderError as `read_card` does."""
+    return read_card(_folder(str(record.settings.get("eyes"))))
 
 
 def is_eyes(folder: Path) -> bool:

@@ -22,6 +22,7 @@ from clearway.perception.whereabouts import WHEREABOUTS
 DIRECTIONS = 4  # ahead, left, right, behind
 GIST = 64  # numbers of a whole picture that two are compared by
 SHARPNESS = 10.0  # of matches, before it is learnt
+COUNTED = ("whereabouts_seen", "stood")  # buffers, how often what was learnt from was so
 NEAREST_M = 0.1  # added to distances before their logarithm
 
 
@@ -142,6 +143,13 @@ class Eyes(nn.Module):
         for parameter in self.trunk.parameters():
             if parameter.ndim == 4:  # pictures come with their colours last
                 parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
+
+    def teach_on(self, before: Eyes) -> None:
+        """Begin as eyes of the same shape are, whose features stay as they are; what they have counted is forgotten."""
+        counted = {name: tensor for name, tensor in self.state_dict().items() if name in COUNTED}
+        self.load_state_dict({**before.state_dict(), **counted})
+        for part in (self.trunk, self.description):
+            part.requires_grad_(False)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Tokens (B, T, C)."""

@@ -20,14 +20,14 @@ from clearway.errors import RunError
 from clearway.files import json_text, read_json, written_whole
 from clearway.learn.provenance import hardware, package_versions
 from clearway.learn.run_folder import RunFolder
-from clearway.perception.eyes import is_eyes, write_eyes
+from clearway.perception.eyes import EyesCard, card_of, is_eyes, write_eyes
 from clearway.perception.eyes_network import Eyes
 
 if TYPE_CHECKING:
     from clearway.pretraining.pretrain import PretrainRequest
 
 RECORD_FILE = "pretraining.json"
-DECIDES = ("settings", "seed", "views")  # what the eyes will be
+DECIDES = ("settings", "seed", "keeping", "views")  # what the eyes will be
 
 
 def record_of(request: PretrainRequest) -> dict[str, Any]:
@@ -37,11 +37,17 @@ def record_of(request: PretrainRequest) -> dict[str, Any]:
     return {
         "settings": request.settings.to_json(),
         "seed": request.seed,
+        "keeping": None if request.keeping is None else _kept(card_of(request.keeping.record)),
         "views": {"rooms": len(views.rooms), "pictures": len(views), "digest": digest, **views.settings.to_json()},
         "versions": package_versions(),
         "hardware": hardware(),
         "command": list(sys.argv),
     }
+
+
+def _kept(card: EyesCard) -> dict[str, Any]:
+    """What is told of the eyes whose features are kept."""
+    return {"sha256": card.sha256, "trained": dict(card.trained)}
 
 
 class EyesFolder:

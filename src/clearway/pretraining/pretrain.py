@@ -28,6 +28,7 @@ from clearway.learn.interruption import interruption
 from clearway.learn.metrics_log import MetricsLog
 from clearway.learn.optimiser import clip_gradients
 from clearway.model.precision import multiplies_bfloat16
+from clearway.perception.eyes import EyesEncoder
 from clearway.perception.eyes_network import Eyes
 from clearway.pretraining.ahead import made_ahead
 from clearway.pretraining.augment import relit, standardised
@@ -51,7 +52,7 @@ class PretrainRequest:
         views: with colour and depth, two takes of each pose.
         settings: how.
         seed: of the first parameters, of the order of the views, and of all other chances.
-
+    XX
     Raises:
         ArgumentError: the views are of another kind, or too few.
     """
@@ -59,6 +60,7 @@ class PretrainRequest:
     views: Views
     settings: PretrainSettings
     seed: int = 0
+    keeping: EyesEncoder | None = None
 
     def __post_init__(self) -> None:
         self.settings.check()
@@ -128,7 +130,9 @@ class Pretrainer:
         with torch.random.fork_rng(devices=()):
             torch.manual_seed(request.seed)
             self.eyes = Eyes(self.settings.shape)
-        self._named = dict(self.eyes.named_parameters())
+        if request.keeping is not None:
+            self.eyes.teach_on(request.keeping.eyes)
+        self._named = {name: value for name, value in self.eyes.named_parameters() if value.requires_grad}
         parameters = list(self._named.values())
         self._optimiser = torch.optim.AdamW(parameters, lr=0.0, weight_decay=self.settings.weight_decay, fused=True)
         for parameter in parameters:
@@ -179,6 +183,8 @@ class Pretrainer:
         """Learn from the next lesson; gives its figures."""
         settings = self.settings
         self.eyes.train()
+        if self.request.keeping is not None:
+            self.eyes.trunk.eval()
         parts = losses(self.eyes, lesson, self._bfloat16)
         self.eyes.count(torch.from_numpy(lesson.labels.where), torch.from_numpy(lesson.batch.table.stands))
         self._optimiser.zero_grad()

@@ -1,0 +1,53 @@
+"""Figures of agents by scene, and intervals of their means.
+
+Scenes are drawn anew, 2,000 times (Efron & Tibshirani 1993).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from clearway.evaluation.bootstrap import RESAMPLES, intervals
+from clearway.evaluation.goals import GoalEvaluation
+
+SHOWN = ("success", "success_4x", "spl", "collisions", "steps", "false_arrivals", "missed_arrivals")
+COUNTS = ("collisions", "steps")
+
+
+def column(evaluation: GoalEvaluation, name: str) -> np.ndarray:
+    """(scenes,) a figure of each scene; NaN where there is none."""
+    values = [getattr(figures, name) for figures in evaluation.scenes.values()]
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
+def interval(values: np.ndarray) -> tuple[float, float]:
+    """Of the mean over scenes, 95 %."""
+    drawn = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    low, high = intervals(np.nanmean(values[drawn], axis=1))
+    return float(low), float(high)
+
+
+def shown(name: str, values: np.ndarray) -> str:
+    """Mean and interval."""
+    if np.isnan(values).all():
+        return ""
+    low, high = interval(values)
+    if name in COUNTS:
+        return f"{np.nanmean(values):.2f} ({low:.2f} to {high:.2f})"
+    return f"{100 * np.nanmean(values):.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def print_table(found: Mapping[str, GoalEvaluation]) -> None:
+    """A line an agent."""
+    print("| " + " | ".join(("agent", *SHOWN)) + " |\n|" + "---|" * (len(SHOWN) + 1))
+    for name, evaluation in found.items():
+        print("| " + " | ".join((name, *(shown(figure, column(evaluation, figure)) for figure in SHOWN))) + " |")
+    first = next(iter(found.values()))
+    print(f"\n{first.average.episodes} episodes in {len(first.scenes)} scenes; tour: {first.tour}")
+
+
+def print_difference(one: GoalEvaluation, other: GoalEvaluation, name: str, what: str) -> None:
+    """By how much a figure of one is higher than that of the other, scene by scene."""
+    print(f"{what}: {shown(name, column(one, name) - column(other, name))}")
