@@ -1,6 +1,6 @@
-"""Film the viewer as two agents race to one target: `python race.py demo race.webp`. Needs Chromium, see docs/viewer.md.
+"""Film the viewer as two agents race to one target: `python race.py demo race.webp`.
 
-    demo: what `scripts/demo` wrote, with its two runs.
+Its first argument is what `scripts/demo` wrote, with both runs. It needs Chromium, as the viewer's test does.
 """
 
 from __future__ import annotations
