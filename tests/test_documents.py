@@ -1,4 +1,4 @@
-"""The site builds without a broken link; the commands and programs of README, tutorial and commands do what they say."""
+"""The site builds without a broken link; what README, tutorial and commands page show does what it says."""
 
 import re
 import subprocess
