@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from helpers.documents import ROOT, Block, code_blocks, run_block, shortened
 
@@ -47,7 +47,7 @@ def test_the_moving_picture_is_small_and_moves() -> None:
     path = ROOT / "docs/pictures/race.webp"
     assert path.stat().st_size < 3_000_000
     with Image.open(path) as picture:
-        assert picture.n_frames > 10
+        assert sum(1 for _ in ImageSequence.Iterator(picture)) > 10
 
 
 def test_a_change_that_is_of_no_use_is_noticed() -> None:

@@ -13,11 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import FloatRect, ViewportSize, sync_playwright
 
 EPISODE = "scene=bathroom&start=7&target=57&selection=sampled&seed=0"
-VIEWPORT = {"width": 1240, "height": 800}
-CLIP = {"x": 0, "y": 0, "width": 1240, "height": 622}  # the map, the target, both agents
+VIEWPORT: ViewportSize = {"width": 1240, "height": 800}
+CLIP: FloatRect = {"x": 0, "y": 0, "width": 1240, "height": 622}  # the map, the target, both agents
 SHOWN_PX = 1000, 502
 STEP_MS, END_MS = 400, 2400
 QUALITY = 72
