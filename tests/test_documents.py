@@ -1,4 +1,4 @@
-"""The site builds without a broken link, and every command and program of README and tutorial does what it says."""
+"""The site builds without a broken link; what README, tutorial and commands page show does what it says."""
 
 import re
 import subprocess
@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image, ImageSequence
 
 from helpers.documents import ROOT, Block, code_blocks, run_block, shortened
 
@@ -35,6 +36,18 @@ def test_the_sources_that_a_page_names_are_there(page: Path) -> None:
     named = re.findall(r"(?<![\w./-])((?:[a-z_0-9]+/)+[a-z_0-9]+\.py)\b", page.read_text())
     places = ROOT, ROOT / "src", ROOT / "src/clearway"
     assert [name for name in named if not any((place / name).exists() for place in places)] == []
+
+
+@pytest.mark.parametrize(("page", "most"), [("README.md", 700), ("docs/results.md", 2_000)])
+def test_a_page_stays_short(page: str, most: int) -> None:
+    assert len((ROOT / page).read_text().split()) <= most
+
+
+def test_the_moving_picture_is_small_and_moves() -> None:
+    path = ROOT / "docs/pictures/race.webp"
+    assert path.stat().st_size < 3_000_000
+    with Image.open(path) as picture:
+        assert sum(1 for _ in ImageSequence.Iterator(picture)) > 10
 
 
 def test_a_change_that_is_of_no_use_is_noticed() -> None:
@@ -89,9 +102,30 @@ def test_the_tutorial_s_blocks_run(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
-    first, watching, commands, imports, generalist, program = code_blocks(ROOT / "README.md")
+    first, watching, program = code_blocks(ROOT / "README.md")
     programs = [line.partition("#")[0].strip() for line in first.text.splitlines()]
     assert programs == ["scripts/demo", "scripts/test"]  # CI runs the second, and with it this test
+    changes = {"frames=600_000": "frames=4_000", "evaluate(run)": "evaluate(run, episodes=2)"}
+    done = run_block(Block("python", shortened(program.text, changes)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].split()[0] in ("True", "False")
+    train = "clearway train scenes/bathroom.h5 --frames 4000 --out runs/bathroom\n"
+    changes = {
+        ".venv/bin/clearway view demo/runs/shortest demo/runs/collision-aware": (
+            f"{train}{UNTIL_STOPPED}view runs/bathroom runs/bathroom || test $? = 124"
+        ),
+        ".venv/bin/clearway view --agent generalist --room 7": (
+            f"{UNTIL_STOPPED}view --agent generalist --room 7 || test $? = 124"
+        ),
+    }
+    done = run_block(Block("sh", shortened(watching.text, changes)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("http://127.0.0.1:") == 2
+
+
+@pytest.mark.slow
+def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
+    commands, imports, generalist = code_blocks(ROOT / "docs/commands.md")
     changes = {
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
@@ -107,15 +141,6 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
         done = run_block(block, tmp_path)
         assert done.returncode == 0, done.stderr
     changes = {
-        ". .venv/bin/activate    # set up by scripts/demo, with everything in it\n": "",
-        "clearway view demo/runs/shortest demo/runs/collision-aware ": (
-            f"{UNTIL_STOPPED}view runs/rooms runs/rooms || test $? = 124 "
-        ),
-    }
-    done = run_block(Block("sh", shortened(watching.text, changes)), tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("http://127.0.0.1:")
-    changes = {
         "clearway view --agent": f"{UNTIL_STOPPED}view --agent",
         "--room 7                        #": "--room 7 || test $? = 124  #",
         "--count 10": "--count 1 --goals 1 --step-limit 5",
@@ -123,17 +148,13 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
     done = run_block(Block("sh", shortened(generalist.text, changes)), tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("http://127.0.0.1:")
-    changes = {"frames=600_000": "frames=4_000", "evaluate(run)": "evaluate(run, episodes=2)"}
-    done = run_block(Block("python", shortened(program.text, changes)), tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1].split()[0] in ("True", "False")
     made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx", "film.mp4"]
     made += [f"imported/{name}.h5" for name in ("dump", "hall", "office", "lab")]
     assert all((tmp_path / name).exists() for name in made)
 
 
 def prepare_stand_ins(folder: Path) -> None:
-    """What the README's commands take for given: a dump, a floor plan, photographs, a MuJoCo model."""
+    """What the commands take for given: a dump, a floor plan, photographs, a MuJoCo model."""
     (folder / "dumps").mkdir()
     (folder / "hall.txt").write_text("....\n....\n..#.\n")
     (folder / "office").mkdir()

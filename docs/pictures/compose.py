@@ -1,4 +1,4 @@
-"""Compose the README's picture of a demo, map and views: `python compose.py demo demo.jpg`."""
+"""Compose a picture of a demo, map and views: `python compose.py demo demo.jpg`."""
 
 from __future__ import annotations
 
