@@ -7,7 +7,7 @@ import pytest
 import clearway
 from clearway import evaluate_live
 from clearway.agents.generalist import Generalist
-from clearway.errors import ArgumentError, SceneError
+from clearway.errors import ArgumentError, RunError, SceneError
 from clearway.live import goals
 from clearway.live.conditions import REFERENCE, Perturbations
 from clearway.perception import eyes
@@ -77,8 +77,10 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
     built = replace(corridor_scene(5), made_by=Provenance("room", room="bathroom", seed=0), observations=None)
     with pytest.raises(SceneError, match="corridor: has no pictures"):
         evaluate_live("generalist", built, goals=2)
-    with pytest.raises(ArgumentError, match=r"runs/x: off the grid, generalist alone walks to goals"):
+    with pytest.raises(RunError, match=r"runs/x: "):
         evaluate_live("runs/x", corridor_scene(5))
+    with pytest.raises(ArgumentError, match=r"bound to its rooms, and off the grid goals are drawn anew"):
+        evaluate_live(object(), corridor_scene(5))
     with pytest.raises(ArgumentError, match="sweep sets the perturbations itself"):
         evaluate_live("generalist", corridor_scene(5), perturb="all", sweep=(1.0,))
     for sweep in ((-1.0,), ("x",), (1.0, float("inf")), (1e6,)):

@@ -49,6 +49,9 @@ def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_
     assert [one["scenes"] for one in plain["others"]] == [one["scenes"] for one in found["others"]]
     shown = clearway(*words)
     assert shown.code == 0 and "5 goals in 1 scenes, pictures perturbed: move ± 0.05 m" in shown.out
+    words = ("evaluate", run / "run", tmp_path, "--goals", 3, "--step-limit", 30, "--live", "--json")
+    (live,) = clearway(*words).json["results"]
+    assert live["agent"] == "recurrent" and live["average"]["episodes"] == 3 and live["average"]["steps"] > 1
 
 
 @pytest.mark.parametrize(
@@ -57,7 +60,8 @@ def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_
         (("--goals", 0), ("--goals 0",)),
         (("--goals", 500), ("500 goals asked for, the largest part has",)),
         (("--goals", 5, "--episodes", 3), ("--episodes", "Leave one of the two out")),
-        (("--goals", 5, "--live"), ("run: off the grid, generalist alone walks to goals drawn anew",)),
+        (("--goals", 5, "--live"), ("grid", "there is no room to walk in: the scene comes from test")),
+        (("--goals", 5, "--live", "--tour", 9), ("--tour 9: recurrent keeps no map", "Leave it out")),
         (("--goals", 5, "--live", "--against", "x"), ("--against", "Leave one of the two out")),
         (("--goals", 5, "--live", "--selection", "argmax"), ("--selection", "Leave one of the two out")),
         (("--goals", 5, "--live", "--light", 2), ("--light is 2, expected at most 1",)),

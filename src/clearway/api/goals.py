@@ -85,9 +85,7 @@ def evaluate_goals(
     if isinstance(agent, str | os.PathLike):
         path = as_path("agent", agent)
         agent = goal_agent(path)
-    if tour_steps and not isinstance(agent, Generalist):
-        problem = f"tour={tour_steps}: {_named(agent)[0]} keeps no map, and would have nothing of a tour"
-        raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
+    check_can_tour(agent, tour_steps)
     if isinstance(agent, Generalist):
         agent = agent.stepping(found)
     if perturbed := perturbations != Perturbations():
@@ -132,6 +130,20 @@ def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Gen
         problem = f"{path}: holds the agent for scene {agent.card.scene}, and goals are for agents of any room"
         raise ArgumentError(f"{problem}. Evaluate it without goals")
     return agent.generalist
+
+
+def check_can_tour(agent: object, steps: int) -> None:
+    """Raise ArgumentError where an agent that keeps no map is given steps to look around."""
+    from clearway.agents.generalist import Generalist
+
+    if steps and not isinstance(agent, Generalist):
+        problem = f"tour={steps}: {agent_name(agent)} keeps no map, and would have nothing of a tour"
+        raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
+
+
+def agent_name(agent: object) -> str:
+    """What an agent is called in tables."""
+    return _named(agent)[0]
 
 
 def _check_sees(agent: object) -> None:

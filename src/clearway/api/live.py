@@ -1,4 +1,4 @@
-"""`evaluate_live`: the generalist off the grid, at goals drawn anew in any rooms."""
+"""`evaluate_live`: agents that are bound to no room, off the grid, at goals drawn anew in any rooms."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING
 
-from clearway.api.arguments import as_seed, as_whole
-from clearway.api.goals import GOALS, MOST_TOUR_STEPS, STEP_LIMIT
+from clearway.api.arguments import as_path, as_seed, as_whole
+from clearway.api.goals import GOALS, MOST_TOUR_STEPS, STEP_LIMIT, agent_name, check_can_tour, goal_agent
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import Perturbed, perturbations_asked
-from clearway.choices import is_generalist
 from clearway.errors import ArgumentError
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built, label_of, sweep_settings
 
@@ -21,10 +20,11 @@ if TYPE_CHECKING:
     from clearway.agents.agent import Agent
     from clearway.agents.generalist import Generalist
     from clearway.evaluation.goals import GoalEvaluation
+    from clearway.learn.load import TrainedAgent
 
 
 def evaluate_live(
-    agent: str | os.PathLike[str] | Generalist,
+    agent: str | os.PathLike[str] | Generalist | TrainedAgent,
     scenes: Scenes,
     *,
     goals: int = GOALS,
@@ -41,7 +41,8 @@ def evaluate_live(
     `collisions` are moves that ended at an obstacle.
 
     Args:
-        agent: "generalist", which comes with clearway, or a `Generalist`.
+        agent: "generalist", which comes with clearway, or a `Generalist`; a run folder of the algorithm "recurrent", or
+            what `load_agent` gave of it.
         scenes: files, folders of them, or scenes, with pictures, of rooms that can be built again.
         goals: of each scene, distinct poses of its largest part.
         step_limit: steps after which an episode has failed.
@@ -49,8 +50,8 @@ def evaluate_live(
         perturb: what is changed, as of `evaluate_goals`.
         sweep: instead of `perturb`, nothing changed, each perturbation alone and all together, at each of these
             strengths, shares of the full ones. Nothing is moved where a scene is a MuJoCo model of others.
-        tour: steps in which the agent looks around in each room first, as it was built, but with what `perturb` does to
-            moves and pictures.
+        tour: steps in which the generalist looks around in each room first, as it was built, but with what `perturb`
+            does to moves and pictures.
         show: is told what goes on, a line each time.
 
     Returns:
@@ -61,7 +62,9 @@ def evaluate_live(
         ClearwayError: a scene has no room that can be built again, no pictures, too few poses, or other steps and turns
             than the agent.
     """
-    from clearway.agents.generalist import GENERALIST, Generalist
+    from clearway.agents.generalist import Generalist
+    from clearway.learn.load import TrainedAgent
+    from clearway.learn.recurrent import TrainedRecurrent
     from clearway.live.goals import LiveTouring, walk_to_goals
     from clearway.live.live_room import MODEL_SOURCE
     from clearway.torch_threads import torch_threads
@@ -80,20 +83,26 @@ def evaluate_live(
             raise ArgumentError(f"{problem}. Give such numbers, smaller ones")
     if sweep and perturbations != Perturbations():
         raise ArgumentError("sweep sets the perturbations itself. Leave perturb out")
-    if isinstance(agent, str | os.PathLike) and is_generalist(agent):
-        agent = Generalist.shipped()
-    if not isinstance(agent, Generalist):
-        problem = f"{agent!s:.80}: off the grid, {GENERALIST} alone walks to goals drawn anew"
-        raise ArgumentError(f"{problem}. Evaluate a run at its targets: clearway evaluate RUN --live, without --goals")
+    if isinstance(agent, str | os.PathLike):
+        agent = goal_agent(as_path("agent", agent))
     found = load_scenes(scenes)
-    agent = agent.stepping(found)
-    agent.warn_of_aspect(found)
+    walker: Agent | LiveTouring
+    if isinstance(agent, Generalist):
+        agent = agent.stepping(found)
+        agent.warn_of_aspect(found)
+        walker = agent.behind_camera()
+        if steps:
+            walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
+    elif isinstance(agent, TrainedRecurrent):
+        check_can_tour(agent, steps)
+        walker = agent.behind_camera()
+    else:
+        called = agent.record.learner.algorithm if isinstance(agent, TrainedAgent) else str(agent)
+        problem = f"{called:.80}: bound to its rooms, and off the grid goals are drawn anew in any"
+        raise ArgumentError(f"{problem}. Evaluate it at its targets: clearway evaluate RUN --live, without --goals")
     settings = [Condition(label_of(perturbations), perturbations)]
     if sweep:
         fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)
         settings = sweep_settings(sweep, as_it_was_built(REFERENCE) if fixed else REFERENCE)
-    walker: Agent | LiveTouring = agent.behind_camera()
-    if steps:
-        walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
     with torch_threads(1):
-        return walk_to_goals(GENERALIST, walker, found, settings, **asked, show=show)
+        return walk_to_goals(agent_name(agent), walker, found, settings, **asked, show=show)

@@ -93,7 +93,7 @@ def load_network(folder: Path, checkpoint: Path | None = None) -> TrainedNetwork
         name = agent.record.learner.algorithm
         raise RunError(
             f"{folder}: this needs the siamese network, and an agent of {name} has none. Walk with it by "
-            "clearway evaluate without --live, or train another algorithm"
+            "clearway evaluate --goals 20, with --live too where it knows any room, or train another algorithm"
         )
     return agent
 

@@ -131,6 +131,10 @@ class TrainedRecurrent:
         """Its agent on the grid: it goes by features, in any world of the same eyes."""
         return RecurrentAgent(self.network, self.pairs)
 
+    def behind_camera(self) -> RecurrentAgent:
+        """Its agent that sees pictures, in any room."""
+        return RecurrentAgent(self.network, self.pairs, self.encoder)
+
     @property
     def encoder(self) -> EyesEncoder:
         """Its own eyes."""
