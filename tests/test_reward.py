@@ -113,7 +113,7 @@ def test_a_parameter_of_a_term_that_a_reward_lacks_adds_the_term() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"delta": 1.0}, "no parameter delta. Choose among alpha, beta"),
+        ({"delta": 1.0}, "no parameter delta. Did you mean beta\\? Choose among alpha, beta"),
         ({"alpha": float("nan")}, "--alpha is nan, expected a finite number"),
         ({"clearance_m": 0.0}, "--clearance-m is 0.0, expected more than 0"),
     ],
@@ -246,7 +246,7 @@ def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert reward_named("their_rewards:slow").name == "slow"
     assert reward_named("their_rewards:made").name == "slow"
     for name, message in (
-        ("bumps", "'bumps' is unknown. Use one of 'collision-aware'"),
+        ("bumps", "'bumps' is unknown. Did you mean bump\\? Use one of 'collision-aware'"),
         ("their_rewards:fast", "cannot be loaded"),
         ("no_such_module:fast", "cannot be loaded"),
         ("their_fault:slow", "cannot be loaded .NameError"),

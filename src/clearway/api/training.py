@@ -34,6 +34,7 @@ from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
+from clearway.spelling import did_you_mean
 from clearway.torch_threads import torch_threads
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
@@ -195,8 +196,9 @@ def chosen_learner(
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
         learner = algorithm(wanted)()
     else:
-        names = ", ".join((*ALGORITHMS, *PRESETS))
-        raise ArgumentError(f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}")
+        names = (*ALGORITHMS, *PRESETS)
+        told = f"algorithm={wanted!r:.80}: no such algorithm.{did_you_mean(wanted, names)}"
+        raise ArgumentError(f"{told} Use one of {', '.join(names)}")
     given = settings if frames is None else {**settings, "frames": frames}
     return replace(learner, **as_settings(type(learner), given))
 
