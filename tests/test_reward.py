@@ -113,7 +113,7 @@ def test_a_parameter_of_a_term_that_a_reward_lacks_adds_the_term() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"delta": 1.0}, "no parameter delta. Did you mean beta\\? Choose among alpha, beta"),
+        ({"delta": 1.0}, "no parameter delta. Choose among alpha, beta"),
         ({"alpha": float("nan")}, "--alpha is nan, expected a finite number"),
         ({"clearance_m": 0.0}, "--clearance-m is 0.0, expected more than 0"),
     ],

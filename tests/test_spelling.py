@@ -26,6 +26,7 @@ def test_the_nearest_name():
     assert nearest("Bumb", names) == "bump"
     assert nearest("living-rom", names) == "living_room"
     assert nearest("kitchen", names) is None
+    assert nearest("sac", ("ppo", "a3c")) is None
     assert nearest(3, names) is None
 
 

@@ -33,7 +33,7 @@ def nearest(word: object, names: Iterable[str]) -> str | None:
     from difflib import get_close_matches
 
     by_letters = {_letters(name): name for name in names}
-    found = get_close_matches(_letters(word), by_letters, n=1) if isinstance(word, str) else []
+    found = get_close_matches(_letters(word), by_letters, n=1, cutoff=0.7) if isinstance(word, str) else []
     return by_letters[found[0]] if found else None
 
 
