@@ -16,7 +16,7 @@ from clearway.learn.checkpoint import newest_checkpoint
         (("scenes",), ("build", "import", "inspect")),
         (("scenes", "inspect"), ("Missing from clearway scenes inspect: PATH",)),
         (("scenes", "build", "--room", "attic", "--out", "x"), ("attic", "bathroom")),
-        (("train", "x.h5"), ("--out",)),
+        (("scenes", "build"), ("--out",)),
         (("train", "x.h5", "--out"), ("--out", "Missing value")),
         (("train", "x.h5", "--out", "run", "--nope", "3"), ("--nope",)),
         (("train", "x.h5", "--out", "run", "--alpha", "low"), ("--alpha", "'low'")),

@@ -27,6 +27,7 @@ from clearway.cli.plugins import Plugins
 from clearway.cli.pretrain import Pretrain
 from clearway.cli.reading import reading
 from clearway.cli.reproduce import Report, Reproduce
+from clearway.cli.runs import Runs
 from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.serve import Serve
 from clearway.cli.train import Train
@@ -69,6 +70,7 @@ Command = (
     | Annotated[Pretrain, tyro.conf.subcommand("pretrain")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Runs, tyro.conf.subcommand("runs")]
     | Annotated[Oracle, tyro.conf.subcommand("oracle")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Report, tyro.conf.subcommand("report")]
