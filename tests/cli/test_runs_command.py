@@ -109,3 +109,11 @@ def test_a_run_that_trains_is_left_alone(clearway, runs):
         answer = clearway("runs", "clean", "--yes")
     assert "left alone: runs/sub/b: another process trains here" in answer.err
     assert files_below(runs) == before
+
+
+def test_the_list_fits_on_80_columns(clearway, runs, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    (runs / "a").rename(runs / "bathroom-collision-aware-alpha-0.02-gamma-0.015-ppo-s0")
+    lines = clearway("runs", "list").out.splitlines()
+    assert lines[0].split()[-1] == "collisions" and len(lines[0].split()) == 8
+    assert max(map(len, lines)) <= 80

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from clearway.learn.runs import RunSummary
 
 CURVES_AT_MOST = 8  # runs in one picture
-WIDTHS = {"run": 22}  # of columns at least, letters
 NARROW = ("algorithm", "solved", "success", "steps", "collisions")  # columns that are not broken
 
 
@@ -169,9 +168,9 @@ def _print_table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
     if not rows:
         return
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
     for name in names:
-        table.add_column(printable(name), overflow="fold", no_wrap=name in NARROW, min_width=WIDTHS.get(name))
+        table.add_column(printable(name), overflow="fold", no_wrap=name in NARROW)
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
     stdout_console().print(table)
