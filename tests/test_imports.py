@@ -20,6 +20,7 @@ ORDER = (
         "progress",
         "children",
         "ray_cluster",
+        "spelling",
         "spread",
         "terminal",
         "torch_threads",

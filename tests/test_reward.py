@@ -246,7 +246,7 @@ def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert reward_named("their_rewards:slow").name == "slow"
     assert reward_named("their_rewards:made").name == "slow"
     for name, message in (
-        ("bumps", "'bumps' is unknown. Use one of 'collision-aware'"),
+        ("bumps", "'bumps' is unknown. Did you mean bump\\? Use one of 'collision-aware'"),
         ("their_rewards:fast", "cannot be loaded"),
         ("no_such_module:fast", "cannot be loaded"),
         ("their_fault:slow", "cannot be loaded .NameError"),

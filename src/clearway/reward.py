@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from clearway.errors import ClearwayError, PluginError
 from clearway.plugins import find_plugin, imported, load_plugin
+from clearway.spelling import did_you_mean
 
 if TYPE_CHECKING:
     import numpy as np
@@ -265,7 +266,9 @@ class Reward:
         terms: dict[type[Term], Term] = {type(term): term for term in self.terms}
         for name, value in changes.items():
             if name not in TERM_OF:
-                raise RewardError(f"reward: no parameter {name}. Choose among {', '.join(TERM_OF)}")
+                raise RewardError(
+                    f"reward: no parameter {name}.{did_you_mean(name, TERM_OF)} Choose among {', '.join(TERM_OF)}"
+                )
             if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < math.inf:
                 raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
             if name.endswith("_m") and value <= 0:
@@ -378,7 +381,8 @@ def reward_named(name: str | Reward) -> Reward:
         return _made(str(plugin), load_plugin(plugin))
     if not isinstance(name, str) or ":" not in name:
         choices = ", ".join(map(repr, REWARDS))
-        raise RewardError(f"reward={name!r:.80} is unknown. Use one of {choices}, a Reward, or package.module:name")
+        told = f"reward={name!r:.80} is unknown.{did_you_mean(name, REWARDS)}"
+        raise RewardError(f"{told} Use one of {choices}, a Reward, or package.module:name")
     try:
         found = imported(name)
     except PluginError as fault:

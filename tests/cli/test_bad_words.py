@@ -16,11 +16,20 @@ from clearway.learn.checkpoint import newest_checkpoint
         (("scenes",), ("build", "import", "inspect")),
         (("scenes", "inspect"), ("Missing from clearway scenes inspect: PATH",)),
         (("scenes", "build", "--room", "attic", "--out", "x"), ("attic", "bathroom")),
-        (("train", "x.h5"), ("--out",)),
+        (("scenes", "build"), ("--out",)),
         (("train", "x.h5", "--out"), ("--out", "Missing value")),
         (("train", "x.h5", "--out", "run", "--nope", "3"), ("--nope",)),
         (("train", "x.h5", "--out", "run", "--alpha", "low"), ("--alpha", "'low'")),
-        (("train", "x.h5", "--out", "run", "--frames", "1e6"), ("--frames", "'1e6'")),
+        (
+            ("train", "x.h5", "--out", "run", "--frames", "1.5"),
+            ("--frames", "'1.5'", "such as 600000 or 6e5"),
+        ),
+        (("trian", "x.h5"), ("trian", "Did you mean train?")),
+        (("scenes", "inspct", "x.h5"), ("inspct", "Did you mean inspect?")),
+        (("scenes", "import", "imges"), ("imges", "Did you mean images?")),
+        (("train", "x.h5", "--out", "run", "--framse", "3"), ("--framse", "Did you mean --frames?")),
+        (("train", "x.h5", "--out", "run", "--aplha=3"), ("--aplha=3", "Did you mean --alpha?")),
+        (("scenes", "build", "--room", "bathrom", "--out", "x"), ("Did you mean bathroom?", "'kitchen', 'all')")),
         (("train", "x.h5", "--out", "run", "--preset", "best"), ("best", "paper")),
         (("evaluate", "run", "--episodes", "many"), ("--episodes", "'many'")),
     ],
@@ -36,6 +45,11 @@ def test_a_refusal_in_colours_is_one_plain_line():
     assert one_line(framed) == "First, still. See x"
 
 
+def test_a_refusal_without_a_frame_is_one_line_too():
+    framed = " Bad         \n -------------\n  First,     \n  still.     \n  -----------\n  See --help \n"
+    assert one_line(framed) == "First, still. See --help"
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
@@ -45,6 +59,12 @@ def test_a_refusal_in_colours_is_one_plain_line():
         (("--set", "envs=20", "clip_rewards=maybe"), ("clip_rewards=maybe", "true or false")),
         (("--set", "algorithm=magic"), ("algorithm=magic", "ppo")),
         (("--set", "discount=1.5"), ("discount is 1.5",)),
+        (("--set", "rolout_steps=8"), ("--set rolout_steps=8", "Did you mean rollout_steps?")),
+        (("--set", "envs=2.5"), ("--set envs=2.5", "a whole number")),
+        (("--reward", "colision_aware"), ("colision_aware", "Did you mean collision-aware?")),
+        (("--algorithm", "pppo"), ("pppo", "Did you mean ppo?")),
+        (("--targets", "bathrom_02=26"), ("bathrom_02", "Did you mean bathroom_02?")),
+        (("--perturb", "ligth"), ("ligth", "Did you mean light?")),
         (("--algorithm", "dqn"), ("--algorithm 'dqn': no such algorithm", "a3c", "paper-a3c")),
         (("--algorithm", "paper", "--preset", "paper-a3c"), ("--algorithm paper is a preset itself",)),
         (("--alpha", "nan"), ("--alpha is nan",)),

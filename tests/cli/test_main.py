@@ -18,6 +18,7 @@ import clearway as package
 from clearway.cli.console import showing_warnings
 from clearway.cli.imports.command import ImportScenes
 from clearway.cli.main import Command, Scenes
+from clearway.cli.runs import Runs
 from clearway.cli.scenes import Inspect
 from clearway.errors import ClearwayError
 from clearway.scenes.validate import SceneWarning
@@ -41,6 +42,9 @@ COMMANDS = {
     "scenes view",
     "pretrain",
     "train",
+    "runs list",
+    "runs compare",
+    "runs clean",
     "evaluate",
     "oracle",
     "reproduce",
@@ -53,7 +57,7 @@ COMMANDS = {
 }
 
 
-GROUPS = {Scenes: "command", ImportScenes: "kind"}  # commands that hold others, and where
+GROUPS = {Scenes: "command", Runs: "command", ImportScenes: "kind"}  # commands that hold others, and where
 
 
 def kinds(commands: object) -> Iterator[type]:

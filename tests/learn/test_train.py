@@ -197,7 +197,7 @@ def test_resuming_another_experiment_is_refused(tmp_path: Path) -> None:
         with pytest.raises(RunError, match="holds another experiment"):
             train.train(other, tmp_path, resume=True)
     with pytest.raises(RunError, match="Give --frames 160"):
-        train.train(replace(request, learner=small_learner(frames=320)), tmp_path, resume=True)
+        train.train(replace(request, learner=small_learner(frames=80)), tmp_path, resume=True)
 
 
 def test_a_full_disk_stops_the_run_and_the_checkpoint_before_it_stays(

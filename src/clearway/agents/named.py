@@ -16,6 +16,7 @@ from clearway.agents.agent import Agent, Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.errors import AgentError, PluginError
 from clearway.plugins import find_plugin, imported, load_plugin
+from clearway.spelling import did_you_mean
 from clearway.world.world import World
 
 AgentMaker: TypeAlias = Callable[[World], Agent]
@@ -35,7 +36,8 @@ def agent_maker(name: str) -> AgentMaker:
     if plugin := find_plugin("agents", name):
         return named_maker(str(plugin), load_plugin(plugin))
     if ":" not in name:
-        raise AgentError(f"agent {name!r:.80}: unknown. Use one of {', '.join(AGENTS)}, or package.module:name")
+        told = f"agent {name!r:.80}: unknown.{did_you_mean(name, AGENTS)}"
+        raise AgentError(f"{told} Use one of {', '.join(AGENTS)}, or package.module:name")
     try:
         return named_maker(f"agent {name}", imported(name))
     except PluginError as fault:

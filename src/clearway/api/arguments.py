@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from clearway.errors import ArgumentError
 from clearway.learn.seeds import SEED_LIMIT
+from clearway.spelling import did_you_mean
 
 
 def as_path(name: str, value: object) -> Path:
@@ -60,7 +61,8 @@ def as_truth(name: str, value: object) -> bool:
 def as_choice(name: str, value: object, choices: tuple[str, ...]) -> str:
     """One of some words. Raises ArgumentError."""
     if not isinstance(value, str) or value not in choices:
-        raise ArgumentError(f"{name}={value!r:.80}: expected one of {', '.join(map(repr, choices))}. Choose one")
+        expected = f"expected one of {', '.join(map(repr, choices))}.{did_you_mean(value, choices)}"
+        raise ArgumentError(f"{name}={value!r:.80}: {expected} Choose one")
     return value
 
 
@@ -77,7 +79,9 @@ def as_settings(kind: type, given: Mapping[str, object]) -> dict[str, Any]:
     types = {field.name: get_type_hints(kind)[field.name] for field in fields(kind)}
     unknown = [name for name in given if name not in types]
     if unknown:
-        raise ArgumentError(f"{unknown[0]}: no such setting. Use one of {', '.join(types)}")
+        raise ArgumentError(
+            f"{unknown[0]}: no such setting.{did_you_mean(unknown[0], types)} Use one of {', '.join(types)}"
+        )
     return {name: _as(name, value, types[name]) for name, value in given.items()}
 
 

@@ -10,6 +10,7 @@ from clearway.choices import HELD_OUT
 from clearway.errors import ArgumentError
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_held_out_targets, default_targets, held_out_targets
+from clearway.spelling import did_you_mean
 
 Targets: TypeAlias = Mapping[str, Iterable[int]] | Iterable[int] | str | None
 """State ids by scene name, or state ids alone for a single scene; "held-out": some that are; None: default ones."""
@@ -35,7 +36,9 @@ def chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict
     chosen: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
     for name, states in targets.items():
         if name not in names:
-            raise ArgumentError(f"targets: no scene {name!r:.80} is given. Name one of {', '.join(names)}")
+            raise ArgumentError(
+                f"targets: no scene {name!r:.80} is given.{did_you_mean(name, names)} Name one of {', '.join(names)}"
+            )
         if isinstance(states, str) or not isinstance(states, Iterable):
             raise ArgumentError(f"targets[{name!r}]={states!r:.80}: {expected}. Give a list of them")
         chosen[name] = tuple(as_whole(f"targets[{name!r}]", state) for state in states)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 import tempfile
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_args
 
 from clearway.agents.agent import FEATURES
-from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_whole, as_word
+from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
 from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
@@ -26,6 +26,7 @@ from clearway.learn.load import TrainedAgent, load_agent
 from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunRecord
 from clearway.learn.seeds import SEED_LIMIT
+from clearway.learn.solved import unsolved_targets
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.live.conditions import Perturbations
@@ -34,6 +35,7 @@ from clearway.plugins import find_plugin
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
+from clearway.spelling import did_you_mean
 from clearway.torch_threads import torch_threads
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
@@ -48,12 +50,15 @@ class TrainResult:
         scenes: what it was trained on.
         metrics: rows of figures by name, some 200 over the training (`docs/metrics.md`).
         folder: the run folder; None where none was asked for.
+        unsolved: targets that not all of their latest training episodes reached, state ids by scene name; empty where
+            all are solved, or it cannot be told (see `clearway.learn.solved`).
     """
 
     agent: TrainedAgent
     scenes: tuple[Scene, ...]
     metrics: tuple[Mapping[str, float], ...]
     folder: Path | None = None
+    unsolved: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         count = sum(map(len, self.record.targets.values()))
@@ -99,6 +104,8 @@ def train(
     device: str = "cpu",
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
+    until_solved: bool = False,
+    on_begin: Callable[[Path], None] | None = None,
     show_progress: bool = False,
     **settings: Any,
 ) -> TrainResult:
@@ -118,7 +125,7 @@ def train(
         out: the run folder, which `clearway evaluate`, `view`, `export` and the others open. None keeps no folder: the
             run lies in a temporary one until `train` returns, and what there is of it is what `train` returns. Give
             scene files, not scenes in memory, where the folder is to be opened without naming them again.
-        resume: go on with the run in `out` from its newest checkpoint.
+        resume: go on with the run in `out` from its newest checkpoint; with more `frames`, with a finished one too.
         zone_level: whether zones are those of poses ("pose") or of whole cells ("cell").
         perturb: what is perturbed in pictures of every pose that are seen beside the scene's own, one a step, as of
             `evaluate_goals`; nothing by default. The scenes are rooms that can be built again; by
@@ -127,7 +134,10 @@ def train(
         device: of torch, "cpu" or "cuda".
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
-        show_progress: draw a progress bar.
+        until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target
+            reached it.
+        on_begin: called with the run folder as soon as it holds the run, before the first frame.
+        show_progress: draw a progress bar; where there is no terminal, print a line now and then.
         settings: single settings of the algorithm by name, such as `envs=200`; all are fields of its class.
 
     Raises:
@@ -162,12 +172,20 @@ def train(
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
-        folder = train_run(request, path, resume=resume, show_progress=show_progress)
+        folder = train_run(
+            request,
+            path,
+            resume=resume,
+            show_progress=show_progress,
+            until_solved=as_truth("until_solved", until_solved),
+            on_begin=on_begin,
+        )
         return TrainResult(
             agent=load_agent(path),
             scenes=tuple(loaded),
             metrics=tuple(folder.metrics()),
             folder=None if out is None else path,
+            unsolved=unsolved_targets(folder),
         )
 
 
@@ -195,8 +213,9 @@ def chosen_learner(
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
         learner = algorithm(wanted)()
     else:
-        names = ", ".join((*ALGORITHMS, *PRESETS))
-        raise ArgumentError(f"algorithm={wanted!r:.80}: no such algorithm. Use one of {names}")
+        names = (*ALGORITHMS, *PRESETS)
+        told = f"algorithm={wanted!r:.80}: no such algorithm.{did_you_mean(wanted, names)}"
+        raise ArgumentError(f"{told} Use one of {', '.join(names)}")
     given = settings if frames is None else {**settings, "frames": frames}
     return replace(learner, **as_settings(type(learner), given))
 

@@ -25,7 +25,9 @@ from clearway.cli.oracle import Oracle
 from clearway.cli.parse import refusals_in_one_line
 from clearway.cli.plugins import Plugins
 from clearway.cli.pretrain import Pretrain
+from clearway.cli.reading import reading
 from clearway.cli.reproduce import Report, Reproduce
+from clearway.cli.runs import Runs
 from clearway.cli.scenes import Build, Export, Inspect
 from clearway.cli.serve import Serve
 from clearway.cli.train import Train
@@ -68,6 +70,7 @@ Command = (
     | Annotated[Pretrain, tyro.conf.subcommand("pretrain")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Runs, tyro.conf.subcommand("runs")]
     | Annotated[Oracle, tyro.conf.subcommand("oracle")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Report, tyro.conf.subcommand("report")]
@@ -116,13 +119,14 @@ def _exit_code(words: Sequence[str]) -> int:
 
 def _run(words: Sequence[str]) -> None:
     """Run the command that the words ask for."""
-    with refusals_in_one_line():
+    with refusals_in_one_line(words, Command):
         command = tyro.cli(
             Annotated[Command, tyro.conf.arg(help="what to do")],  # or tyro reads all of typing for one
             args=words,
             prog="clearway",
             description=DESCRIPTION,
-            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes, tyro.conf.DisallowNone),
+            registry=reading(),
         )
     with showing_warnings():
         command.run()

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 
+from clearway.cli.known import command_of, options, subcommands
 from clearway.errors import ClearwayError
+from clearway.spelling import did_you_mean
 
 CORNERS = ("╭", "╰")
 LENGTHY = ("Perhaps you meant", "Argument helptext")  # parts of a refusal that --help says better
+_UNKNOWN = re.compile(r"Unrecognized options: (.+)")
+_NO_CHOICE = re.compile(r"invalid choice '(.*)' for argument ")
 
 
 @contextmanager
-def refusals_in_one_line() -> Iterator[None]:
-    """Turn the frame that tyro prints about words it cannot read into a `ClearwayError`; help is printed as ever."""
+def refusals_in_one_line(words: Sequence[str], commands: object) -> Iterator[None]:
+    """Turn the frame that tyro prints about words it cannot read into a `ClearwayError`; help is printed as ever.
+
+    Args:
+        words: that are read.
+        commands: the union of all commands' classes.
+    """
     said = io.StringIO()
     try:
         with redirect_stderr(said):
@@ -23,7 +32,35 @@ def refusals_in_one_line() -> Iterator[None]:
     except SystemExit as leaving:
         if not leaving.code:
             raise
-        raise ClearwayError(one_line(said.getvalue())) from leaving
+        refused = one_line(said.getvalue())
+        raise ClearwayError(_with_suggestion(refused, words, commands)) from leaving
+
+
+def _with_suggestion(refused: str, words: Sequence[str], commands: object) -> str:
+    """A refusal with the name that was probably meant, where there is one."""
+    told, _, rest = refused.partition(". ")
+    for pattern, names in ((_UNKNOWN, _names_there(words, commands)), (_NO_CHOICE, _choices(refused))):
+        if found := pattern.match(told):
+            word = next((part for part in found[1].split(", ") if part.startswith("--")), found[1].split(", ")[0])
+            return f"{told}.{did_you_mean(word.split('=')[0], names)} {rest}"
+    return refused
+
+
+def _names_there(words: Sequence[str], commands: object) -> list[str]:
+    """What can stand where some words go astray: options of the command that they name, or commands."""
+    kind, used = command_of(words, commands)
+    if kind is not None:
+        return [f"--{name}" for name in options(kind)]
+    group = commands
+    for word in words[:used]:
+        group = subcommands(group)[word]
+    return list(subcommands(group))
+
+
+def _choices(refused: str) -> Iterable[str]:
+    """The choices that a refusal lists."""
+    listed = re.search(r"Expected one of \((.*?)\)", refused)
+    return re.findall(r"'([^']*)'", listed[1]) if listed else ()
 
 
 def one_line(framed: str) -> str:
@@ -32,5 +69,7 @@ def one_line(framed: str) -> str:
 
     rows = Text.from_ansi(framed).plain.splitlines()
     inside = "\n".join(row.strip("│ ") for row in rows if not row.startswith(CORNERS))
-    parts = [" ".join(part.strip().split("\n\n")[0].split()) for part in re.split("─{3,}", inside)]
+    parts = [" ".join(part.strip().split("\n\n")[0].split()) for part in re.split("─{3,}|-{10,}", inside)]
+    if len(parts) > 1 and not any(row.startswith(CORNERS) for row in rows):
+        parts = parts[1:]  # a terminal without the letters for frames: the first part is the title
     return ". ".join(part.rstrip(".") for part in parts if part and not part.startswith(LENGTHY))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -12,10 +14,15 @@ from clearway.choices import FeatureStore, Goals, PresetName, ZoneLevel
 from clearway.cli.arguments import given_targets, scene_files
 from clearway.cli.console import say
 from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
+from clearway.cli.run_names import free_run_folder, longer
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
+    from clearway.api.training import TrainResult
     from clearway.learn.learner import Learner
+    from clearway.reward import Reward
+
+TOLD_TARGETS = 10  # unsolved ones of a scene, at most
 
 
 @dataclass(frozen=True)
@@ -27,8 +34,8 @@ class Train:
 
     files: Annotated[tuple[Path, ...], tyro.conf.Positional]
     """Scene files, or folders of them."""
-    out: Path
-    """The run folder."""
+    out: Path | None = None
+    """The run folder; by default a new one, runs/ROOM-REWARD-ALGORITHM-sSEED."""
     targets: tuple[str, ...] = ()
     """Target states: "26 37 43" for one scene, "bathroom=26,37 kitchen=90,136" for several. By default the published
     targets for the paper's four scenes, five seeded ones elsewhere, in generated rooms and flats none that is held out;
@@ -49,10 +56,13 @@ class Train:
     set: tuple[str, ...] = ()
     """Single settings of the algorithm, for example --set envs=200 clip_rewards=true (all: docs/learning.md)."""
     frames: int | None = None
-    """Training frames, instead of the preset's or algorithm's own."""
+    """Training frames, such as 600000 or 6e5; by default 3,000,000 (a3c and the paper's presets 10,000,000, recurrent
+    12,000,000, bc and q-learning 1,000,000, adapt 40,000). With --resume, more of them lengthen a finished run."""
+    until: Literal["solved"] | None = None
+    """solved: stop earlier, once 20 training episodes in a row reached every target; by default all frames are used."""
     feature_basis: int | None = None
-    """Learn from features in so many leading principal directions, instead of the preset's choice; 0: as they are. It
-    loses nothing where poses are fewer, and costs quality elsewhere."""
+    """Learn from features in so many leading principal directions, by default 0: as they are. It loses nothing where
+    poses are fewer, and costs quality elsewhere."""
     goals: Goals | None = None
     """seen: the learner sets itself poses that it has passed as further targets, for which the environment pays
     nothing; given: it does not, as by default. PPO and A2C."""
@@ -72,20 +82,23 @@ class Train:
     """Where features are kept: memory; float16, in half the memory, rounded; mapped, in a file in the cache folder that
     is gone afterwards, for sets that memory cannot hold. The last two also open large sets faster."""
     resume: bool = False
-    """Go on with the run in --out from its newest checkpoint."""
+    """Go on with the run in --out from its newest checkpoint; with more --frames, with a finished one too."""
 
     def run(self) -> None:
         """Train."""
         from clearway.api.training import train
 
         files = scene_files(self.files)
+        targets = given_targets(self.targets, len(files))
+        reward, learner = chosen_reward(self.reward, self.parameters), self._learner()
+        out = self._folder(files, reward, learner)
         result = train(
             files,
-            given_targets(self.targets, len(files)),
-            reward=chosen_reward(self.reward, self.parameters),
-            algorithm=self._learner(),
+            targets,
+            reward=reward,
+            algorithm=learner,
             seed=self.seed,
-            out=self.out,
+            out=out,
             resume=self.resume,
             zone_level=self.zones,
             perturb=self.perturb,
@@ -93,14 +106,25 @@ class Train:
             device=self.device,
             feature_store=self.feature_store,
             threads=self.threads,
+            until_solved=self.until == "solved",
+            on_begin=self._begun,
             show_progress=True,
         )
-        if not result.metrics:  # a finished run whose metrics.jsonl was removed
-            say(f"{self.out}: trained. Next: clearway evaluate {self.out}")
-            return
-        solved, count = result.solved_targets, sum(map(len, result.record.targets.values()))
-        each = "" if solved == count else " --targets"
-        say(f"{self.out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {self.out}{each}")
+        _say_trained(result, out)
+
+    def _folder(self, files: list[Path], reward: Reward, learner: Learner) -> Path:
+        """The run folder, a new one where none is given."""
+        if self.out is not None:
+            return self.out
+        if self.resume:
+            raise ClearwayError("--resume: expected the run to go on with. Name its folder with --out")
+        named = self._adapted() or self.algorithm or self.preset or "default"
+        return free_run_folder(files, reward.name, learner.algorithm if named == "default" else named, self.seed)
+
+    def _begun(self, folder: Path) -> None:
+        """Say where the run is, where its user did not."""
+        if self.out is None:
+            say(f"{folder}: the run's folder. Choose another with --out")
 
     def _adapted(self) -> str | None:
         """The algorithm that adapts what --from names."""
@@ -133,3 +157,26 @@ class Train:
                 option = f"--{name.replace('_', '-')}"
                 raise ClearwayError(f"{option}: {learner.algorithm} has no setting {name}. Leave it out")
         return with_settings(chosen_learner(learner, self.frames, given), self.set)
+
+
+def _say_trained(result: TrainResult, out: Path) -> None:
+    """Say what came of a training and what can be done next; last, how to go on where targets are not solved."""
+    if not result.metrics:  # a finished run whose metrics.jsonl was removed
+        say(f"{out}: trained. Next: clearway evaluate {out}")
+        return
+    solved, count = result.solved_targets, sum(map(len, result.record.targets.values()))
+    each = "" if solved == count else " --targets"
+    say(f"{out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {out}{each}")
+    if result.unsolved and solved < count:
+        frames = 2 * max(result.record.learner.frames, result.agent.frames)
+        say(f"not solved: {_named(result.unsolved)}. To go on: {longer(sys.argv[1:], out, frames)}")
+
+
+def _named(targets: Mapping[str, tuple[int, ...]]) -> str:
+    """Targets of scenes, such as "bathroom=26,37", as --targets takes them; of many the first."""
+    words = [
+        f"{scene}={','.join(map(str, states[:TOLD_TARGETS]))}{',...' * (len(states) > TOLD_TARGETS)}"
+        for scene, states in list(targets.items())[:TOLD_TARGETS]
+    ]
+    left = len(targets) - TOLD_TARGETS
+    return " ".join(words) + (f" and of {left} more scenes" if left > 0 else "")

@@ -74,7 +74,7 @@ def write_checkpoint(
     except (OSError, SafetensorError) as error:
         shutil.rmtree(part, ignore_errors=True)
         raise RunError(f"{final}: cannot write the checkpoint ({error}). Free some space, then resume") from error
-    upto_now = [path for path in _found(folder) if path.name <= final.name]  # later ones are damaged
+    upto_now = [path for path in checkpoints(folder) if path.name <= final.name]  # later ones are damaged
     for old in upto_now[:-KEPT]:
         shutil.rmtree(old)
     return final
@@ -89,13 +89,13 @@ def newest_checkpoint(folder: Path) -> Path:
     Raises:
         RunError: there is none, all are damaged, or the newest was written by a newer clearway.
     """
-    for path in reversed(_found(folder)):
+    for path in reversed(checkpoints(folder)):
         try:
             read_progress(path)
             return path
         except _Damaged as error:
             warnings.warn(f"{error}; an earlier checkpoint is used", stacklevel=2)
-    if _found(folder):
+    if checkpoints(folder):
         raise RunError(f"{folder}: every checkpoint is damaged. Restore one from a copy, or train again")
     raise RunError(f"{folder}: no checkpoint found. Train first, or name another run")
 
@@ -127,7 +127,7 @@ def _read_tensors(path: Path, name: str) -> dict[str, Tensor]:
         raise _Damaged(f"{path / name}: cannot be read ({error}). Use another checkpoint") from error
 
 
-def _found(folder: Path) -> list[Path]:
+def checkpoints(folder: Path) -> list[Path]:
     """Checkpoints in `folder`, oldest first."""
     return sorted(path for path in folder.glob("frames-*") if _NAME.fullmatch(path.name))
 

@@ -1,10 +1,17 @@
-"""The progress bar of a training run: frames/s, solved targets, time left."""
+"""The progress of a training run on standard error: frames/s, solved targets, time left.
+
+A bar where that is a terminal; elsewhere, for example in a batch system's log, a line now and then.
+"""
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
+
+FIRST_LINE_S, MOST_S_BETWEEN_LINES = 10.0, 300.0
 
 
 class ProgressView(Protocol):
@@ -19,13 +26,49 @@ class _Silent:
         """Show nothing."""
 
 
+class _Lines:
+    """A line after some seconds, then ever more rarely: each wait is twice the one before, 5 minutes at most."""
+
+    def __init__(self, frames: int) -> None:
+        self.all_frames = frames
+        self.began: float | None = None
+        self.frames_before = 0
+        self.wait_s = FIRST_LINE_S
+        self.due = 0.0
+
+    def show(self, frames: int, solved: int, targets: int) -> None:
+        """Print a line where one is due."""
+        now = time.monotonic()
+        if self.began is None:
+            self.began, self.frames_before, self.due = now, frames, now + self.wait_s
+        elif now >= self.due:
+            rate = (frames - self.frames_before) / max(now - self.began, 1e-9)
+            left = max(self.all_frames - frames, 0) / max(rate, 1e-9)
+            progress = f"training: {frames:,} of {self.all_frames:,} frames, {rate:,.0f} frames/s"
+            solved_told = f"solved {solved} of {targets}"
+            print(f"{progress}, {solved_told}, {_duration(left)} left", file=sys.stderr, flush=True)
+            self.wait_s = min(2 * self.wait_s, MOST_S_BETWEEN_LINES)
+            self.due = now + self.wait_s
+
+
+def _duration(seconds: float) -> str:
+    """Hours, minutes and seconds, such as 1:02:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02d}:{rest:02d}"
+
+
 @contextmanager
 def progress_view(frames: int, visible: bool) -> Iterator[ProgressView]:
-    """A progress bar up to `frames` on the terminal's standard error, or nothing."""
+    """A progress bar up to `frames` on the terminal's standard error, lines where it is none, or nothing."""
     if not visible:
         yield _Silent()
         return
     from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _Lines(frames)
+        return
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -36,7 +79,7 @@ def progress_view(frames: int, visible: bool) -> Iterator[ProgressView]:
         TextColumn("solved {task.fields[solved]}"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    with Progress(*columns, console=console) as bar:
         task = bar.add_task("training", total=frames, rate=0.0, solved="-")
 
         class Bar:

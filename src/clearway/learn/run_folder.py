@@ -13,6 +13,7 @@ import hashlib
 import json
 import math
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
@@ -26,6 +27,7 @@ from clearway.choices import ZoneLevel
 from clearway.errors import ClearwayError, RunError
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
+from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
@@ -194,7 +196,8 @@ class RunFolder:
             None for a run that begins; else `RunRecord.other_bits` of the one to go on with.
 
         Raises:
-            RunError: the folder holds a run already (and resume is off), or another experiment.
+            RunError: the folder holds a run already (and resume is off), or another experiment, or a run that is not
+                finished and was to have other frames.
         """
         if not self.exists:
             for left in (self.metrics_path, self.checkpoints):
@@ -210,13 +213,37 @@ class RunFolder:
             problem = f"{self.path}: holds another experiment (see its {RUN_FILE})"
             raise RunError(f"{problem}. Give the same settings, or another --out")
         if not before.same_experiment(record):
-            problem = f"{self.path}: was started for {before.learner.frames} frames, and its schedules end there"
-            raise RunError(f"{problem}. Give --frames {before.learner.frames}, or another --out")
+            before = self._lengthened(before, record.learner.frames)
         if not any(self.checkpoints.glob("frames-*")):
             self.write_record(record)  # nothing is left of what was done elsewhere
             self.forget_metrics_after(-1)
             return None
         return before.other_bits(record)
+
+    def _lengthened(self, before: RunRecord, frames: int) -> RunRecord:
+        """Have a finished run go on to more frames.
+
+        Raises:
+            RunError: it is not finished, or has trained so many frames already.
+
+        Warns:
+            UserWarning: its schedules go on as those of so many frames.
+        """
+        begun, trained = before.learner.frames, self._trained_frames()
+        if trained < begun or frames <= trained:
+            problem = f"{self.path}: was started for {begun} frames, and its schedules end there"
+            remedy = f"Give --frames {begun}" if trained < begun else f"Give --frames {begun}, more than {trained}"
+            raise RunError(f"{problem}. {remedy}, or another --out")
+        told = f"{self.path}: was finished after {trained:,} frames, and goes on to {frames:,}"
+        warnings.warn(f"{told}; results will not be those of one training so long", stacklevel=4)
+        longer = replace(before, learner=replace(before.learner, frames=frames))
+        self.write_record(longer)
+        return longer
+
+    def _trained_frames(self) -> int:
+        """Frames of the newest checkpoint; 0 without one."""
+        any_there = any(self.checkpoints.glob("frames-*"))
+        return read_progress(newest_checkpoint(self.checkpoints)).frames if any_there else 0
 
     def write_record(self, record: RunRecord) -> None:
         """Write run.json."""

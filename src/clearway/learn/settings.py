@@ -8,6 +8,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from clearway.errors import RunError
 from clearway.learn.learner import Learner
+from clearway.spelling import did_you_mean, whole_number
 
 Kind = TypeVar("Kind", bound=Learner)
 
@@ -25,7 +26,7 @@ def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
         name, equals, text = word.partition("=")
         if not equals or name not in known:
             names = f"a name among {learner.algorithm}'s settings: {', '.join(known)}"
-            raise RunError(f"--set {word}: expected name=value with {names}. Correct it")
+            raise RunError(f"--set {word}: expected name=value with {names}.{did_you_mean(name, known)} Correct it")
         choices = get_args(types[name]) if get_origin(types[name]) is Literal else ()
         changes[name] = _parsed(word, text, known[name], choices)
     return replace(learner, **changes)
@@ -43,7 +44,7 @@ def _parsed(word: str, text: str, example: object, choices: tuple[str, ...]) -> 
         return text
     assert isinstance(example, int | float)
     try:
-        return type(example)(text)
+        return whole_number(text) if isinstance(example, int) else float(text)
     except ValueError as error:
         kind = "a whole number" if isinstance(example, int) else "a number"
         raise RunError(f"--set {word}: expected {kind}. Correct it") from error

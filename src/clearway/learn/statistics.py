@@ -91,6 +91,11 @@ class EpisodeStatistics:
         """Number of targets told of."""
         return int(self.told.sum())
 
+    @property
+    def all_solved(self) -> bool:
+        """Every target told of is solved."""
+        return self.solved == self.target_count
+
     def take(self) -> Tensor:
         """The totals of the targets told of since the last call, (M, 4) or fewer; all start again from zero."""
         totals = self.totals[self.told]

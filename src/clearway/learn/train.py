@@ -6,7 +6,7 @@ import shutil
 import threading
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -133,15 +133,20 @@ def train(
     resume: bool = False,
     show_progress: bool = False,
     milestones: Sequence[int] = (),
+    until_solved: bool = False,
+    on_begin: Callable[[Path], None] | None = None,
 ) -> RunFolder:
     """Train until all frames are used and leave a run folder behind.
 
     Args:
         request: what to train.
         out: the run folder.
-        resume: go on from the newest checkpoint in `out`; without one, or without a run, begin.
+        resume: go on from the newest checkpoint in `out`; without one, or without a run, begin. A finished run goes on
+            where more frames are asked for.
         show_progress: draw a progress bar.
         milestones: keep the agent as it is after so many frames too, see `RunFolder.milestone`.
+        until_solved: stop before that, once every target is solved, see `EpisodeStatistics.solved`.
+        on_begin: called with the run folder as soon as it holds the run, before the first frame.
 
     Raises:
         RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
@@ -150,13 +155,15 @@ def train(
     trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
     with folder.held():
         other_bits = folder.begin(record_of(request), resume)
+        if on_begin is not None:
+            on_begin(out)
         seconds = 0.0 if other_bits is None else _resumed(trainer, folder, other_bits)
         with (
             closing(trainer),
             progress_view(trainer.learner.frames, show_progress) as view,
             interruption() as interrupted,
         ):
-            _run(trainer, folder, view, interrupted, seconds, milestones)
+            _run(trainer, folder, view, interrupted, seconds, milestones, until_solved)
     return folder
 
 
@@ -190,12 +197,17 @@ def _run(
     interrupted: threading.Event,
     seconds: float,
     milestones: Sequence[int],
+    until_solved: bool,
 ) -> None:
     """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
 
     A run that is finished already is left as it is.
     """
-    if trainer.finished:
+
+    def done() -> bool:
+        return trainer.finished or (until_solved and trainer.statistics.all_solved)
+
+    if done():
         return
     log = MetricsLog(folder.metrics_path, folder.metrics(), seconds)
     seen, rows = trainer.frames, _rows_due(trainer)
@@ -208,13 +220,14 @@ def _run(
         for milestone in milestones:
             if seen < milestone <= trainer.frames:
                 _save_agent(trainer, folder.milestone(milestone), seconds)
-        if update is not None and _rows_due(trainer) > rows:
+        stopped = seen < trainer.frames and not trainer.finished and done()  # its last row is due with no frame
+        if update is not None and (_rows_due(trainer) > rows or stopped):
             log.write(metrics_row(trainer, update, seconds))
             rows = _rows_due(trainer)
         seen = trainer.frames
 
     try:
-        while not trainer.finished and not interrupted.is_set():
+        while not done() and not interrupted.is_set():
             started = time.monotonic()
             update = trainer.update()
             seconds += time.monotonic() - started
@@ -232,7 +245,7 @@ def _run(
             save(trainer, folder, seconds)
     finally:
         log.close()
-    if not trainer.finished:
+    if not done():
         raise KeyboardInterrupt
 
 

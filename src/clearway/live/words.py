@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 
 from clearway.errors import ArgumentError
 from clearway.live.conditions import MOST, REFERENCE, Perturbations
+from clearway.spelling import did_you_mean
 
 GEOMETRY = replace(REFERENCE, light=0.0, pixel_noise=0.0)
 """Where the camera is, and what stands in the room; light and noise can be added to pictures later."""
@@ -35,8 +36,9 @@ def perturbations_named(words: Sequence[str]) -> Perturbations:
         elif name in REFERENCE.to_json():
             asked = {name: _strength(name, text) if equals else getattr(REFERENCE, name)}
         else:
-            known = ", ".join([*GROUPS, *(field.name.replace("_", "-") for field in fields(Perturbations))])
-            raise ArgumentError(f"perturb={word!r:.40}: there is none of that name. Choose among {known}")
+            known = [*GROUPS, *(field.name.replace("_", "-") for field in fields(Perturbations))]
+            told = f"perturb={word!r:.40}: there is none of that name.{did_you_mean(left, known)}"
+            raise ArgumentError(f"{told} Choose among {', '.join(known)}")
         found = replace(found, **asked)
     return found
 

@@ -17,6 +17,7 @@ from clearway.rooms import ROOM_NAMES
 from clearway.scenes.floor_plan_files import SUFFIXES as PLAN_SUFFIXES
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import SENSORS, Sensor
+from clearway.spelling import did_you_mean
 
 RoomSource = str | Path | Scene | LiveRoom
 PerturbationSource = Perturbations | Mapping[str, float] | None
@@ -51,7 +52,8 @@ def opened_room(room: RoomSource, seed: int, *, small: bool, loose: bool) -> Liv
         kinds = "a room's name, a scene file or a scene, or a MuJoCo model's file"
         raise EnvError(f"room={room!r:.80}: expected {kinds}. Rooms: {', '.join(ROOM_NAMES)}")
     if isinstance(room, str) and not Path(room).suffix and not Path(room).exists():
-        raise EnvError(f"room={room!r:.80} is unknown. Use one of {', '.join(ROOM_NAMES)}, or a scene file")
+        told = f"room={room!r:.80} is unknown.{did_you_mean(room, ROOM_NAMES)}"
+        raise EnvError(f"{told} Use one of {', '.join(ROOM_NAMES)}, or a scene file")
     if Path(room).suffix.lower() in MODEL_SUFFIXES:
         from clearway.live.model_room import live_model
 

@@ -1,0 +1,52 @@
+"""How options are told of in help, and read."""
+
+import re
+
+import pytest
+
+from clearway.cli.known import command_of, options, subcommands
+from clearway.cli.main import Command
+from clearway.cli.train import Train
+
+
+def leaves(commands: object, words: tuple[str, ...] = ()):
+    """The words of every command that holds no others."""
+    for name, kind in subcommands(commands).items():
+        yield from leaves(kind, (*words, name)) if subcommands(kind) else ((*words, name),)
+
+
+LEAVES = tuple(leaves(Command))
+
+
+@pytest.mark.parametrize("words", LEAVES, ids=" ".join)
+def test_help_speaks_of_no_types(clearway, words):
+    answer = clearway(*words, "--help")
+    assert answer.code == 0
+    assert not re.search(r"\{None\}|None|\bINT\b|\bFLOAT\b|\bSTR\b|\[\[|\(default: \)|\(default: False\)", answer.out)
+
+
+def test_choices_stand_in_the_order_written(clearway):
+    assert "{bathroom,bedroom,living_room,kitchen,all}" in clearway("scenes", "build", "--help").out
+
+
+def test_defaults_that_say_something_are_told(clearway):
+    text = " ".join(clearway("train", "--help").out.replace("│", "").split())
+    assert "actions and the choice of targets. (default: 0)" in text
+    assert "--targets WORD ..." in text and "--frames N" in text and "--alpha X" in text
+
+
+def test_whole_numbers_as_people_write_them(clearway, monkeypatch):
+    read = []
+    monkeypatch.setattr(Train, "run", lambda command: read.append(command))
+    for text in ("1e6", "1_000_000", "1000000"):
+        assert clearway("train", "x.h5", "--out", "run", "--frames", text, "--seed", "2").code == 0
+    assert [(command.frames, command.seed) for command in read] == [(1_000_000, 2)] * 3
+
+
+def test_the_class_of_a_command_and_its_options():
+    assert command_of(("train", "x.h5"), Command) == (Train, 1)
+    assert command_of(("scenes",), Command) == (None, 1)
+    assert command_of(("scenes", "import", "mjcf", "x"), Command)[1] == 3
+    found = options(Train)
+    assert {"files", "from", "frames", "alpha", "clearance-m", "feature-store"} <= set(found)
+    assert found["from"][1].name == "source"

@@ -1,0 +1,73 @@
+"""`clearway train`: its folder, its last line, its end."""
+
+import shlex
+
+import pytest
+
+from clearway.cli.run_names import free_run_folder, longer
+from clearway.learn.run_folder import RunFolder
+
+
+def test_a_training_without_a_folder_gets_a_new_one(clearway, trained, small, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ("train", trained.scene, "--reward", "bump", "--alpha", "-0.02", "--seed", 3, *small)
+    for name in ("bathroom_02-bump-alpha-0.02-ppo-s3", "bathroom_02-bump-alpha-0.02-ppo-s3-2"):
+        answer = clearway(*words)
+        assert answer.code == 0
+        assert answer.err.splitlines()[0] == f"runs/{name}: the run's folder. Choose another with --out"
+        assert RunFolder(tmp_path / "runs" / name).read_record().seed == 3
+    assert len(list((tmp_path / "runs").iterdir())) == 2
+
+
+def test_what_cannot_be_trained_is_one_line_and_leaves_no_folder(clearway, trained, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert clearway("train", trained.scene, "--targets", "76").refusal("out of range")
+    assert clearway("train", trained.scene, "--resume").refusal("--resume", "--out")
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_of_folders(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files = [tmp_path / f"{name}.h5" for name in ("a", "b", "c")]
+    assert str(free_run_folder(files, "shortest", "paper", 0)) == "runs/a-and-2-more-shortest-paper-s0"
+    assert str(free_run_folder(files[:1], "../my:reward", "ppo", 1)) == "runs/a-my-reward-ppo-s1"
+
+
+def test_unsolved_targets_and_the_command_to_go_on(clearway, trained, small, tmp_path):
+    run = tmp_path / "a run"
+    answer = clearway("train", trained.scene, "--out", run, "--targets", 26, 37, *small)
+    before, last = answer.err.splitlines()[-2:]
+    assert before == f"{run}: trained, 0 of 2 targets solved. Next: clearway evaluate {run} --targets"
+    told, _, command = last.partition(". To go on: ")
+    assert told == "not solved: bathroom_02=26,37"
+    program, *words = shlex.split(command)
+    assert program == "clearway"
+    answer = clearway(*words)
+    assert answer.code == 0
+    assert "was finished after 640 frames, and goes on to 1,280" in " ".join(answer.err.split()).replace(" │ │ ", " ")
+    assert RunFolder(run).metrics()[-1]["frames"] == 1280
+    assert "--frames 2560" in answer.err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("train x.h5", "train x.h5 --out r --frames 9 --resume"),
+        ("train --frames 5 --out r x.h5", "train --frames 9 --out r x.h5 --resume"),
+        ("train --targets 1 2 --frames=5 x.h5 --resume", "train --targets 1 2 --frames=9 x.h5 --resume --out r"),
+        ("train x.h5 --no-resume --until solved", "train x.h5 --until solved --out r --frames 9 --resume"),
+    ],
+)
+def test_the_command_that_makes_a_run_longer(tmp_path, words, expected):
+    from pathlib import Path
+
+    assert longer(words.split(), Path("r"), 9) == f"clearway {expected}"
+
+
+def test_a_training_may_end_once_all_is_solved(clearway, trained, tmp_path):
+    run, words = tmp_path / "run", ("--set", "envs=20", "rollout_steps=8", "width=16", "clip_rewards=true")
+    answer = clearway(
+        "train", trained.scene, "--out", run, "--targets", 26, "--frames", "2e6", "--until", "solved", *words
+    )
+    assert answer.err.splitlines()[-1] == f"{run}: trained, 1 of 1 targets solved. Next: clearway evaluate {run}"
+    assert RunFolder(run).metrics()[-1]["frames"] < 200_000
