@@ -193,7 +193,7 @@ def test_render_shows_view_and_target(make: Make) -> None:
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
-        ({"room": "bathrom"}, "room='bathrom' is unknown. Use one of bathroom, bedroom"),
+        ({"room": "bathrom"}, "room='bathrom' is unknown. Did you mean bathroom? Use one of bathroom, bedroom"),
         ({"room": 3}, "room=3: expected a room's name, a scene file or a scene"),
         ({"room": "bathroom", "room_seed": -1}, "room_seed=-1: expected a whole number from 0 on"),
         ({"perturbations": {"wind": 1.0}}, "perturbations: there is no 'wind'. Choose among angle_noise"),
