@@ -36,7 +36,7 @@ def test_options_change_the_reward_of_a_name() -> None:
         (
             "clearence",
             {},
-            "'clearence' is unknown. Did you mean clearance? Use one of 'collision-aware', 'shortest', 'bump', 'clearance'",
+            r"'clearence' is unknown\. Did you mean clearance\? Use one of 'collision-aware', 'shortest', 'bump'",
         ),
         ("bump", {"clearance_m": -1.0}, "--clearance-m is -1.0, expected more than 0"),
         ("bump", {"blocked": float("inf")}, "--blocked is inf, expected a finite number"),
