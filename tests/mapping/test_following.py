@@ -3,12 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.beliefs import IMPOSSIBLE
-from clearway.mapping.following import SURE, Follower, been_now
+from clearway.mapping.beliefs import IMPOSSIBLE, LatticePose
+from clearway.mapping.following import SURE, Follower, been_now, put_right
 from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
 from clearway.mapping.routes import shifted
 from clearway.mapping.settings import MappingSettings
-from clearway.scenes.actions import BLOCKED
+from clearway.scenes.actions import BLOCKED, Action
 from helpers.made import grid_scene
 from helpers.perfect_sight import PerfectSight, seen_perfectly
 
@@ -78,6 +78,44 @@ def test_it_keeps_one_picture_a_pose_and_so_many_at_most():
     taken, features = state["taken"][0], state["features"][0]
     assert state["count"][0] == 12 == len({tuple(pose) for pose in taken.tolist()}) and features.all(axis=1).any()
     assert tuple(taken[0]) == (0, 15, 15)
+
+
+def kept_at(pose: LatticePose, mark: int) -> dict[str, np.ndarray]:
+    """One picture, held to be taken in a pose."""
+    kept = {"mark": np.zeros((4, 9, 9), np.uint32), "taken": np.zeros((3, 3), np.int64), "count": np.array(1)}
+    kept["mark"][pose.index], kept["taken"][0] = mark, pose.index
+    return kept
+
+
+@pytest.mark.parametrize(
+    ("now", "action", "origin"),
+    [
+        (LatticePose(2, 4, 5), Action.TURN_RIGHT, LatticePose(1, 4, 5)),
+        (LatticePose(1, 2, 2), Action.MOVE_FORWARD, LatticePose(1, 2, 2).moved(-1)),
+    ],
+)
+def test_a_picture_held_to_be_elsewhere_is_put_where_the_next_pose_says_that_it_was_taken(now, action, origin):
+    wrong = LatticePose(1, 4, 4)
+    kept = kept_at(wrong, 7)
+    put_right(wrong, now, action, kept)
+    assert kept["mark"][origin.index] == 7 and kept["mark"][wrong.index] == 0
+    assert tuple(kept["taken"][0]) == origin.index
+
+
+@pytest.mark.parametrize(
+    ("now", "action"),
+    [
+        (LatticePose(2, 4, 4), Action.TURN_RIGHT),
+        (LatticePose(1, 4, 4), Action.MOVE_FORWARD),
+        (LatticePose(1, 4, 4).moved(1), Action.MOVE_FORWARD),
+        (LatticePose(1, 4, 4).moved(-1), Action.MOVE_BACKWARD),
+    ],
+)
+def test_a_picture_stays_where_the_next_pose_follows_from_its_own(now, action):
+    before = LatticePose(1, 4, 4)
+    kept = kept_at(before, 7)
+    put_right(before, now, action, kept)
+    assert kept["mark"][before.index] == 7 and tuple(kept["taken"][0]) == before.index
 
 
 def visited(room: np.ndarray) -> np.ndarray:

@@ -21,9 +21,9 @@ def steps(room: np.ndarray, *, shut: tuple[int, int, int] | None = None, cost: f
         closed[0][shut] = True
     done = np.zeros(evidence.shape, bool)
     done[0][START.index] = True
-    return Action(
-        int(search_steps([START], evidence, done, room[None], closed, MappingSettings(collision_cost=cost))[0])
-    )
+    settings = MappingSettings(collision_cost=cost)
+    action, _ = search_steps([START], evidence, done, room[None], closed, settings)
+    return Action(int(action[0]))
 
 
 def doubtful_ahead() -> np.ndarray:
@@ -53,8 +53,11 @@ def test_where_nothing_is_left_to_search_it_begins_anew():
     evidence, shut = np.zeros((1, 4, SIDE, SIDE), np.float32), np.zeros((1, 4, SIDE, SIDE), bool)
     done = np.ones(evidence.shape, bool)
     evidence[0][END.index] = 5.0
-    action = search_steps([START], evidence, done, room[None], shut, MappingSettings(nearby=2.0))
-    assert action.tolist() == [Action.MOVE_FORWARD]
+    action, lost = search_steps([START], evidence, done, room[None], shut, MappingSettings(nearby=2.0))
+    assert action.tolist() == [Action.MOVE_FORWARD] and lost.tolist() == [True]
+    done[0, 1, 4, 4] = False
+    _, lost = search_steps([START], evidence, done, room[None], shut, MappingSettings(nearby=2.0))
+    assert lost.tolist() == [False]
 
 
 def test_what_is_known_of_cells_counts_with_what_was_seen():
@@ -70,7 +73,7 @@ def test_what_is_known_of_cells_counts_with_what_was_seen():
 def first_of(evidence: np.ndarray, done: np.ndarray, start: LatticePose) -> Action:
     """The first action in a room that is free."""
     room, shut = np.full(evidence.shape[1:], SURE, np.float32), np.zeros((1, *evidence.shape), bool)
-    found = search_steps([start], evidence[None], done[None], room[None], shut, MappingSettings(nearby=2.0))
+    found, _ = search_steps([start], evidence[None], done[None], room[None], shut, MappingSettings(nearby=2.0))
     return Action(int(found[0]))
 
 

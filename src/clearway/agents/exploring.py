@@ -53,7 +53,7 @@ class Explorer:
         seen = self._features(observation)
         poses, after = self._follower.follow(seen, state)
         been = been_now(state["been"], poses)
-        action = search_steps(poses, _unlike(been), been, after["room"], after["shut"], self._settings, in_view=0.0)
+        action, _ = search_steps(poses, _unlike(been), been, after["room"], after["shut"], self._settings, in_view=0.0)
         return Decisions(action), {**after, "been": been, "action": action}
 
 

@@ -74,9 +74,19 @@ class MappingAgent:
         likely = probabilities(np.where(state["been"], IMPOSSIBLE, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
         been = been_now(state["been"], poses)  # an episode that goes on has not arrived
-        action = search_steps(poses, goal, been, after["room"], after["shut"], self._settings)
+        action, lost = search_steps(poses, goal, been, after["room"], after["shut"], self._settings)
+        self._begin_anew(lost, been, after)
         decisions = Decisions(action, arrived=there > self._settings.arrived)
         return decisions, {**after, "target": state["target"], "goal": goal, "been": been, "action": action}
+
+    def _begin_anew(self, lost: np.ndarray, been: np.ndarray, after: State) -> None:
+        """Forget where episodes (B,) bool that have nowhere left to go have been, and what blocked them.
+
+        The target is somewhere, so that some of it was wrong.
+        """
+        been[lost], after["shut"][lost] = False, False
+        room = after["room"]
+        room[lost] = np.where(room[lost] < 0, self._settings.usual_room, room[lost])
 
     def holds(self, state: State, laid: Laid, row: int = 0) -> Held:
         """What it holds in one of the episodes of a state, after a step, on a map in which its lattice is laid."""

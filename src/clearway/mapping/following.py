@@ -30,6 +30,8 @@ EACH_AGAIN = 4.0
 """Further evidence likewise for every picture that came again, before it is held that all do."""
 EYES_WEIGHT = 1.8
 """Of what eyes tell of a move. This, and what is evidence at `NEVER`, fits moves in perturbed rooms of `validation`."""
+LEAST_OF_EYES = -3.0
+"""Evidence for a move, at least, of eyes: of 15 moves in flats of `validation` they hold one for blocked."""
 KEPT, LATEST = 64, 2
 """Pictures that are kept of a walk, and how many of the last ones say nothing of the pose: they share its errors."""
 RECOGNISED = 20.0
@@ -37,6 +39,7 @@ RECOGNISED = 20.0
 CERTAIN = 100.0
 """Evidence for a pose of which a tour has taken the very picture: more than eyes could bring together."""
 CHANGED = ("here", "room", "shut", "been", "mark", "repeats", "count", "taken", "features")
+KEPT_AT = ("mark", "taken", "count")
 STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}
 QUARTERS = {Action.TURN_RIGHT: 1, Action.TURN_LEFT: -1}
 
@@ -111,6 +114,7 @@ class Follower:
         here, room, mark, repeats = after["here"], after["room"], after["mark"], after["repeats"]
         marks = marks_of(seen)
         again = mark == marks[:, None, None, None]
+        before = [likeliest(belief) for belief in here]
         repeats[:] = np.minimum(repeats + again.any(axis=(1, 2, 3)), ALWAYS)
         self._walked(seen, state, after)
         here[again] += RECOGNISED
@@ -121,6 +125,9 @@ class Follower:
         here -= here.max(axis=(1, 2, 3), keepdims=True)
         np.maximum(here, beliefs.IMPOSSIBLE, out=here)
         poses = [likeliest(belief) for belief in here]
+        for row in np.flatnonzero(state["begun"]).tolist():
+            kept = {name: after[name][row] for name in KEPT_AT}
+            put_right(before[row], poses[row], Action(int(state["action"][row])), kept)
         for row, (pose, stands) in enumerate(zip(poses, self._sight.stands(seen), strict=True)):
             if not after["been"][row][pose.index]:
                 add_standing(room[row], pose, stands, self._settings.standing_weight, self._settings.lattice)
@@ -172,7 +179,7 @@ class Follower:
         ):
             done = Action(int(action[row]))
             told = EYES_WEIGHT * float(evidence[self._moved_bins[done]].mean() - evidence[STAYED])
-            moved = told + (IF_SAME if stayed else _if_not_same(int(after["repeats"][row])))
+            moved = max(told, LEAST_OF_EYES) + (IF_SAME if stayed else _if_not_same(int(after["repeats"][row])))
             self._moved(done, moved, {name: values[row] for name, values in after.items()})
         for row in np.flatnonzero(np.isin(action, list(QUARTERS))).tolist():
             after["here"][row] = np.roll(after["here"][row], QUARTERS[Action(int(action[row]))], axis=0)
@@ -191,6 +198,29 @@ class Follower:
             belief["shut"][direction, before.row, before.column] = True
             if room[beyond.cell] < SURE:
                 room[beyond.cell] -= SURE / 2
+
+
+def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mapping[str, np.ndarray]) -> None:
+    """Put the last picture where it was taken, where the pose held `now` is none to which the one `before` leads.
+
+    Else it would lead back to the wrong pose whenever it comes again, and this one's picture away from there, for good.
+
+    Args:
+        before, now: likeliest poses before and after the action.
+        action: of the last step.
+        kept: `mark`, `taken` and `count` of the episode, see `Follower.begin`; changed.
+    """
+    mark, count = kept["mark"], int(kept["count"])
+    if action in QUARTERS:
+        origins = [now.turned(-QUARTERS[action])]
+    else:
+        origins = [now.moved(-STEPS[action]), now]
+    if before in origins:
+        return
+    origin = origins[0]
+    mark[origin.index], mark[before.index] = mark[before.index], 0
+    if count and tuple(kept["taken"][count - 1]) == before.index:
+        kept["taken"][count - 1] = origin.index
 
 
 def _if_not_same(repeats: int) -> float:

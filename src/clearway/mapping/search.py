@@ -40,8 +40,8 @@ def search_steps(
     shut: np.ndarray,
     settings: MappingSettings,
     in_view: float = IN_VIEW,
-) -> np.ndarray:
-    """The next actions (B,) int64.
+) -> tuple[np.ndarray, np.ndarray]:
+    """The next actions (B,) int64, and whether nothing was left (B,) bool to which a way leads.
 
     Args:
         poses: B, where the agents stand.
@@ -55,11 +55,12 @@ def search_steps(
     cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
-    left = np.where(left.any(axis=(1, 2, 3), keepdims=True), left, within)
+    lost = ~left.any(axis=(1, 2, 3))
+    left = np.where(lost[:, None, None, None], within, left)
     worth = np.where(left, _spread(_likely(evidence, left, room), in_view), 0) / (cost + settings.nearby)
     ends = [likeliest(values) for values in worth]
     found = [first_action(poses[row], end, cost[row], price[row]) for row, end in enumerate(ends)]
-    return np.array(found, np.int64)
+    return np.array(found, np.int64), lost
 
 
 def _entering(room: np.ndarray, shut: np.ndarray, collision_cost: float) -> np.ndarray:
