@@ -153,6 +153,10 @@ def test_a_stop_does_not_wait_for_a_decision_which_is_then_not_carried_out() -> 
     go_on.set()
     thread.join(10)
     assert moving(robot.sent) == []
+    robot.walk.stop(False)
+    assert robot.walk.clear(0.1)
+    robot.walk.tick(0.2)  # no new picture: the old decision is void
+    assert moving(robot.sent) == [] and robot.walk.state == "looking"
 
 
 def test_a_target_that_changes_during_a_decision_makes_it_void() -> None:
