@@ -72,6 +72,7 @@ def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
     ids = [f'id="clearway.{name}"' for name in ("api.training.train", "scenes.thor_v1.read_scene")]  # from docstrings
     first, later = map(reference.index, ids)
     assert first < later
+    assert "Made with" not in (tmp_path / "site/index.html").read_text()
 
 
 @pytest.mark.slow
