@@ -67,11 +67,12 @@ def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     pages = {page.parent.name for page in (tmp_path / "site").rglob("index.html")}
-    assert {"tutorial", "python", "zones", "learning", "reference", "metrics", "results"} <= pages
+    assert {"tutorial", "python", "zones", "learning", "reference", "metrics", "results", "building"} <= pages
     reference = (tmp_path / "site/reference/index.html").read_text()
     ids = [f'id="clearway.{name}"' for name in ("api.training.train", "scenes.thor_v1.read_scene")]  # from docstrings
     first, later = map(reference.index, ids)
     assert first < later
+    assert "Made with" not in (tmp_path / "site/index.html").read_text()
 
 
 @pytest.mark.slow
@@ -152,6 +153,33 @@ def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
     made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx", "film.mp4", "curves.png"]
     made += [f"imported/{name}.h5" for name in ("dump", "hall", "office", "lab")]
     assert all((tmp_path / name).exists() for name in made)
+
+
+@pytest.mark.slow
+def test_the_own_building_page_s_blocks_run(tmp_path: Path) -> None:
+    changes = {
+        "--frames 6e5": "--frames 12000",
+        "runs/office --targets": "runs/office --episodes 2 --targets",
+        "clearway view": f"{UNTIL_STOPPED}view",
+        "view runs/office\n": "view runs/office || test $? = 124\n",
+        "--episodes 20": "--episodes 2",
+        "clearway serve": f"{UNTIL_STOPPED}serve",
+        "serve office.onnx\n": "serve office.onnx || test $? = 124\n",
+        "--goals 5 --tour 100": "--goals 1 --tour 5",
+    }
+    blocks = code_blocks(ROOT / "docs/building.md")
+    whole = "\n".join(block.text for block in blocks)
+    prepare_stand_ins(tmp_path)
+    said = ""
+    for block in blocks:
+        here = {old: new for old, new in changes.items() if old in block.text}
+        done = run_block(Block(block.language, shortened(block.text, here)), tmp_path)
+        assert done.returncode == 0, f"{block.text}\n{done.stderr}"
+        said += done.stdout
+    assert all(old in whole for old in changes)
+    made = ["mine/office.h5", "mine/hall.h5", "mine/lab.h5", "office.png", "office.onnx", "generalist.onnx"]
+    assert all((tmp_path / name).exists() for name in made)
+    assert re.search(r"^(arrived|not there yet) after \d+ steps$", said, re.MULTILINE)
 
 
 def prepare_stand_ins(folder: Path) -> None:

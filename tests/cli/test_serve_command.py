@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -68,6 +69,17 @@ def test_a_random_token_is_said_also_where_the_variable_is_empty(clearway, monke
     assert served[1] == "a-token-of-one-s-own"
 
 
+def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, served):
+    line = "arrived is null in all answers: an earlier clearway exported this file. Export it again"
+    assert line in clearway("serve", "x.onnx").err.replace("\n", " ")
+
+    class Telling(Sums):
+        card = replace(Sums.card, settings={"arrival": {"threshold": 0.8, "numbers": 2}})
+
+    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Telling())
+    assert "arrived" not in clearway("serve", "x.onnx").err
+
+
 @pytest.mark.parametrize(("host", "shown"), [("::1", "[::1]"), ("localhost", "localhost")])
 def test_addresses_are_printed_as_a_browser_takes_them(clearway, served, host, shown):
     try:
@@ -95,6 +107,7 @@ def test_a_service_says_where_it_is_and_ends_when_told_to():
         assert process.stderr is not None
         url = re.fullmatch(r"scene attic: (http://127\.0\.0\.1:\d+)\n", process.stderr.readline())[1]
         token = re.fullmatch(r"token: (\S{32})\n", process.stderr.readline())[1]
+        assert process.stderr.readline().startswith("arrived is null in all answers")
         with Client(url, token) as client, client.session(selection="argmax") as session:
             session.set_target(plain(1))
             assert session.act(plain(1)).value == 1004

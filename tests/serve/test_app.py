@@ -128,6 +128,7 @@ def test_wrong_tokens(called, service, token) -> None:
     agent = client.get("/agent", headers={"authorization": f"bearer {TOKEN}"})
     assert agent.status_code == 200
     assert agent.json()["observation"] == CARD.observation
+    assert agent.json()["tells_arrival"] is False  # a card without a threshold
 
 
 @pytest.mark.parametrize("token", WRONG_TOKENS)

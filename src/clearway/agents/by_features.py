@@ -5,11 +5,14 @@ Axis letters: B episodes, K history (newest last), F features.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
 from clearway.agents import memory
 from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.arrival import Arrival
 from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.agents.encoded import Encoded
 from clearway.model.policy import ScenePolicy
@@ -22,10 +25,11 @@ class FeatureAgent:
     Args:
         policy: of the scene.
         encoder: makes the features of what is seen; None: features themselves are seen.
+        arrival: says where it has arrived; None: it cannot tell.
     """
 
-    def __init__(self, policy: ScenePolicy, encoder: Encoder | None = None) -> None:
-        self._policy = policy
+    def __init__(self, policy: ScenePolicy, encoder: Encoder | None = None, arrival: Arrival | None = None) -> None:
+        self._policy, self._arrival = policy, arrival
         self._features = Encoded(encoder)
         self.sees: tuple[str, ...] = (self._features.sees,)
 
@@ -46,5 +50,7 @@ class FeatureAgent:
         seen = memory.history(state["earlier"], state["begun"], self._features(observation))  # (B, K, F)
         probabilities, value = self._policy(torch.from_numpy(seen), torch.from_numpy(state["target"]))
         decisions, chance = drawn(probabilities.numpy(), state[CHANCE], value.numpy()[:, 0])
+        if self._arrival is not None:
+            decisions = replace(decisions, arrived=self._arrival(seen[:, -1], state["target"]))
         after = {"earlier": seen[:, 1:], "begun": np.ones_like(state["begun"]), CHANCE: chance}
         return decisions, {**state, **after}

@@ -65,6 +65,8 @@ class Serve:
             say(f"scene {agent.card.scene}: {address_of(listener, self.host)}")
             if not own:
                 say(f"token: {token}")
+            if not agent.card.tells_arrival:
+                say("arrived is null in all answers: an earlier clearway exported this file. Export it again")
             each = state_bytes(agent)
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6

@@ -12,6 +12,7 @@ from clearway.errors import DeployError
 FORMAT_VERSION = 3  # 2 since there is `observation`, 3 since there is `kind`
 EXPORT_AGAIN = "Export it again with clearway export"
 SIAMESE = "siamese"
+ARRIVAL = "arrival"  # among the settings of such an agent: by what it says where it has arrived
 ANY_ROOM = "any room"  # stands for the scene of an agent that is bound to none
 
 
@@ -52,6 +53,11 @@ class Card:
     def draws(self) -> bool:
         """The agent tells probabilities of its actions, and draws by them."""
         return self.kind != GENERALIST
+
+    @property
+    def tells_arrival(self) -> bool:
+        """The agent says whether it has arrived. Files that were exported by an earlier clearway do not."""
+        return self.kind == GENERALIST or ARRIVAL in self.settings
 
     def to_json(self) -> str:
         """As JSON text, for `card_from_json`."""

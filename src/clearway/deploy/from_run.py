@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from clearway.agents.arrival import Arrival, fitted_arrival
 from clearway.agents.by_features import FeatureAgent
-from clearway.deploy.card import Card
+from clearway.deploy.card import ARRIVAL, Card
 from clearway.errors import DeployError, EncoderError
 from clearway.learn.learner import OnFeatures
 from clearway.learn.load import TrainedNetwork, load_network, run_scenes
 from clearway.model.policy import ScenePolicy
-from clearway.perception import Encoder, encoder_from_record
+from clearway.perception import Encoder, encoder_from_record, eyes
 from clearway.perception.encoder import NetworkEncoder, sensor_of
 from clearway.scenes.actions import ACTION_NAMES
 from clearway.scenes.scene import EncoderRecord, Scene
@@ -46,6 +51,13 @@ class RunInScene:
         """What decides in the scene, by features."""
         return self.trained.in_scene(self.index)
 
+    @cached_property
+    def arrival(self) -> Arrival | None:
+        """Says where it has arrived, by the scene's own pictures; None where they are all the same."""
+        assert self.scene.features is not None, "a run's scene has features"
+        features = np.asarray(self.scene.features)
+        return fitted_arrival(features, compared_numbers(self.encoder_record, features.shape[1]))
+
     def card(self, encoder: Encoder | None) -> Card:
         """The agent's card; with or without its encoder inside."""
         record, made_by, shape = self.trained.record, self.encoder_record, self.trained.network.shape
@@ -67,6 +79,7 @@ class RunInScene:
                 "versions": dict(record.versions),
             },
             observation=None if seen is None else seen.to_json(),
+            settings={} if self.arrival is None else {ARRIVAL: self.arrival.to_json()},
         )
 
     def _normalisation(self, encoder: Encoder | None) -> dict[str, object]:
@@ -84,6 +97,14 @@ class RunInScene:
                 "directions": self.trained.feature_map.input_count,
             },
         }
+
+
+def compared_numbers(record: EncoderRecord, feature_count: int) -> int:
+    """How many features tell two pictures apart, from the first: the description that eyes make, else all."""
+    if record.settings.get("kind") != eyes.KIND:
+        return feature_count
+    shape: Any = record.settings["shape"]
+    return int(shape["description_width"])
 
 
 def load_run_in_scene(
@@ -147,5 +168,5 @@ class RunAgent(FeatureAgent):
 
     def __init__(self, chosen: RunInScene) -> None:
         encoder = picture_encoder(chosen)
-        super().__init__(chosen.policy, encoder)
+        super().__init__(chosen.policy, encoder, chosen.arrival)
         self.card: Card = chosen.card(encoder)

@@ -161,7 +161,10 @@ class Navigator:
 
     @property
     def arrived(self) -> bool | None:
-        """Whether the agent held at its last act that it is at the target; None where it cannot tell, or none was."""
+        """Whether the agent held at its last act that it is at the target; None where it cannot tell, or none was.
+
+        `card.tells_arrival` says whether it can: files that an earlier clearway exported cannot.
+        """
         return self._arrived
 
     def explore(self, picture: object) -> Decision:

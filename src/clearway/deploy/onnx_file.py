@@ -7,7 +7,7 @@ found by its bytes, so that no parser sees a file before it was checked.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,10 @@ import numpy as np
 
 from clearway.agents import memory
 from clearway.agents.agent import FEATURES, Decisions, Observation, State
+from clearway.agents.arrival import Arrival, arrival_of_json
 from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.deploy.agent import sight_of
-from clearway.deploy.card import EXPORT_AGAIN, SIAMESE, Card, card_from_json
+from clearway.deploy.card import ARRIVAL, EXPORT_AGAIN, SIAMESE, Card, card_from_json
 from clearway.errors import DeployError
 
 CARD_KEY, CHECKSUM_KEY = "clearway", "clearway.sha256"
@@ -85,7 +86,7 @@ class OnnxAgent:
         file: that holds it.
 
     Raises:
-        DeployError: it holds another kind of agent.
+        DeployError: it holds another kind of agent, or its card is damaged.
     """
 
     def __init__(self, file: OnnxFile) -> None:
@@ -94,6 +95,7 @@ class OnnxAgent:
             problem = f"{file.source}: holds an agent of the kind {self.card.kind!r:.40}, unknown to this clearway"
             raise DeployError(f"{problem}. Upgrade clearway")
         self.sees: tuple[str, ...] = (sight_of(self.card),)
+        self._arrival = _arrival_of(file)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
         """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
@@ -116,6 +118,8 @@ class OnnxAgent:
             given = {"history": after, "target": state["target"]}
             probabilities, value = self._session.run(["probabilities", "value"], given)
         decisions, chance = drawn(probabilities, state[CHANCE], value[:, 0])
+        if self._arrival is not None:
+            decisions = replace(decisions, arrived=self._arrival(after[:, -1], state["target"]))
         return decisions, {**state, "history": after, "begun": np.ones_like(state["begun"]), CHANCE: chance}
 
     def _features(self, target: Observation) -> np.ndarray:
@@ -132,6 +136,17 @@ class OnnxAgent:
         """Probabilities (B, A), value (B, 1) and history (B, K, F) after pictures; where they start, they fill it."""
         given = {"picture": picture, "start": start, "history": history, "target": target}
         return self._session.run(["probabilities", "value", "history_after"], given)
+
+
+def _arrival_of(file: OnnxFile) -> Arrival | None:
+    """By what an agent says where it has arrived; None of files that were exported before there was that."""
+    kept = file.card.settings.get(ARRIVAL)
+    if kept is None:
+        return None
+    try:
+        return arrival_of_json(dict(kept), file.card.feature_count)  # type: ignore[call-overload]
+    except (ValueError, TypeError) as fault:
+        raise DeployError(f"{file.source}: its metadata cannot be read ({fault}). {EXPORT_AGAIN}") from fault
 
 
 def _content(path: Path) -> bytes:

@@ -75,6 +75,7 @@ class AgentDescription(BaseModel):
     picture_size: list[int] | None
     observation: dict[str, Any] | None
     encoder: str
+    tells_arrival: bool
     version: str
 
 
@@ -118,6 +119,7 @@ def make_app(service: Service) -> FastAPI:
             picture_size=None if card.picture_size is None else list(card.picture_size),
             observation=None if card.observation is None else dict(card.observation),
             encoder=str(card.encoder.get("name")),
+            tells_arrival=card.tells_arrival,
             version=__version__,
         )
 
