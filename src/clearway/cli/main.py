@@ -15,6 +15,7 @@ from typing import Annotated
 
 import tyro
 
+from clearway.cli.config import with_config
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.evaluate import Evaluate
@@ -119,6 +120,7 @@ def _exit_code(words: Sequence[str]) -> int:
 
 def _run(words: Sequence[str]) -> None:
     """Run the command that the words ask for."""
+    words = with_config(words, Command)
     with refusals_in_one_line(words, Command):
         command = tyro.cli(
             Annotated[Command, tyro.conf.arg(help="what to do")],  # or tyro reads all of typing for one

@@ -13,7 +13,7 @@ import tyro
 from clearway.choices import FeatureStore, Goals, PresetName, ZoneLevel
 from clearway.cli.arguments import given_targets, scene_files
 from clearway.cli.console import say
-from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
+from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward, given_parameters
 from clearway.cli.run_names import free_run_folder, longer
 from clearway.errors import ClearwayError
 
@@ -122,7 +122,20 @@ class Train:
         return free_run_folder(files, reward.name, learner.algorithm if named == "default" else named, self.seed)
 
     def _begun(self, folder: Path) -> None:
-        """Say where the run is, where its user did not."""
+        """Say where the run is, where its user did not; leave its settings, if its reward is the user's own."""
+        from clearway.api.run_settings import leave_settings
+        from clearway.reward import REWARDS
+
+        if self.reward not in REWARDS:  # of others the run knows the terms, but not the name to find them by
+            changed = given_parameters(self.parameters)
+            leave_settings(
+                folder,
+                {"reward": self.reward, **changed},
+                perturb=self.perturb,
+                takes=self.takes,
+                threads=self.threads,
+                until=self.until,
+            )
         if self.out is None:
             say(f"{folder}: the run's folder. Choose another with --out")
 
