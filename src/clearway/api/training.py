@@ -18,7 +18,7 @@ from clearway.api.run_settings import leave_settings, reward_options
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
 from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
-from clearway.choices import FeatureStore, ZoneLevel
+from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import ArgumentError
 from clearway.evaluation.takes import Takes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
@@ -106,6 +106,7 @@ def train(
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
     until_solved: bool = False,
+    track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
     show_progress: bool = False,
     **settings: Any,
@@ -137,6 +138,8 @@ def train(
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target
             reached it.
+        track: where figures are shown as they come, beside `metrics.jsonl`: "tensorboard", in the run folder, or
+            "wandb", offline unless its user has logged in.
         on_begin: called with the run folder as soon as it holds the run, before the first frame.
         show_progress: draw a progress bar; where there is no terminal, print a line now and then.
         settings: single settings of the algorithm by name, such as `envs=200`; all are fields of its class.
@@ -179,6 +182,7 @@ def train(
             takes=takes,
             threads=threads,
             until="solved" if until_solved else None,
+            track=track,
         )
         if on_begin is not None:
             on_begin(path)
@@ -192,6 +196,7 @@ def train(
             resume=resume,
             show_progress=show_progress,
             until_solved=as_truth("until_solved", until_solved),
+            track=track,
             on_begin=begun,
         )
         return TrainResult(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from clearway.choices import FeatureStore, Goals, PresetName, ZoneLevel
+from clearway.choices import FeatureStore, Goals, PresetName, TrackerName, ZoneLevel
 from clearway.cli.arguments import given_targets, scene_files
 from clearway.cli.console import say
 from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward, given_parameters
@@ -81,6 +81,9 @@ class Train:
     feature_store: FeatureStore = "memory"
     """Where features are kept: memory; float16, in half the memory, rounded; mapped, in a file in the cache folder that
     is gone afterwards, for sets that memory cannot hold. The last two also open large sets faster."""
+    track: TrackerName | None = None
+    """Show figures elsewhere as they come: tensorboard, in the run folder; wandb, offline unless you are logged in.
+    Needs the extra of that name; by default metrics.jsonl in the run folder alone."""
     resume: bool = False
     """Go on with the run in --out from its newest checkpoint; with more --frames, with a finished one too."""
 
@@ -107,6 +110,7 @@ class Train:
             feature_store=self.feature_store,
             threads=self.threads,
             until_solved=self.until == "solved",
+            track=self.track,
             on_begin=self._begun,
             show_progress=True,
         )
@@ -135,6 +139,7 @@ class Train:
                 takes=self.takes,
                 threads=self.threads,
                 until=self.until,
+                track=self.track,
             )
         if self.out is None:
             say(f"{folder}: the run's folder. Choose another with --out")
