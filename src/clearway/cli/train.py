@@ -184,7 +184,10 @@ def _say_trained(result: TrainResult, out: Path) -> None:
         return
     solved, count = result.solved_targets, sum(map(len, result.record.targets.values()))
     each = "" if solved == count else " --targets"
-    say(f"{out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {out}{each}")
+    used, asked = result.agent.frames, result.record.learner.frames
+    further = f" on {used:,} frames ({used - asked:,} more than asked for: the last step or update is whole)"
+    told = further if used > asked else ""
+    say(f"{out}: trained{told}, {solved} of {count} targets solved. Next: clearway evaluate {out}{each}")
     if result.unsolved and solved < count:
         frames = 2 * max(result.record.learner.frames, result.agent.frames)
         say(f"not solved: {_named(result.unsolved)}. To go on: {longer(sys.argv[1:], out, frames)}")
