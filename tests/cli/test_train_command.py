@@ -44,7 +44,7 @@ def test_unsolved_targets_and_the_command_to_go_on(clearway, trained, small, tmp
     assert program == "clearway"
     answer = clearway(*words)
     assert answer.code == 0
-    assert "was finished after 640 frames, and goes on to 1,280" in " ".join(answer.err.split()).replace(" │ │ ", " ")
+    assert "was finished after 640 frames, and goes on to 1,280" in answer.err
     assert RunFolder(run).metrics()[-1]["frames"] == 1280
     assert "--frames 2560" in answer.err.splitlines()[-1]
 
