@@ -125,7 +125,7 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
-    commands, runs, again, imports, generalist = code_blocks(ROOT / "docs/commands.md")
+    commands, runs, again, imports, generalist, encode = code_blocks(ROOT / "docs/commands.md")
     changes = {
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
@@ -139,7 +139,7 @@ def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
     prepare_stand_ins(tmp_path)
     short = Block("sh", shortened(commands.text, changes))
     shorter = Block("sh", shortened(runs.text, {"--frames 6e5": "--frames 4e3"}))
-    for block in (short, shorter, again, imports):
+    for block in (short, shorter, again, imports, encode):
         done = run_block(block, tmp_path)
         assert done.returncode == 0, done.stderr
     changes = {
@@ -151,7 +151,7 @@ def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("http://127.0.0.1:")
     made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx", "film.mp4", "curves.png", "runs/again/run.yaml"]
-    made += [f"imported/{name}.h5" for name in ("dump", "hall", "office", "lab")]
+    made += [f"{folder}/{name}.h5" for folder in ("imported", "together") for name in ("dump", "hall", "office", "lab")]
     assert all((tmp_path / name).exists() for name in made)
 
 

@@ -37,6 +37,7 @@ COMMANDS = {
     "scenes import mjcf",
     "scenes import miniworld",
     "scenes import plugin",
+    "scenes encode",
     "scenes inspect",
     "scenes export",
     "scenes view",

@@ -18,6 +18,7 @@ import tyro
 from clearway.cli.config import with_config
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
+from clearway.cli.encode import EncodeScenes
 from clearway.cli.evaluate import Evaluate
 from clearway.cli.export import ExportAgent
 from clearway.cli.generate import Generate
@@ -45,7 +46,7 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build and generate rooms, take views of them, import others, inspect, walk through, export.
+    """Scene files: build and generate rooms, take views of them, import others, encode, inspect, walk through, export.
 
     Example: clearway scenes inspect bathroom.h5
     """
@@ -55,6 +56,7 @@ class Scenes:
         | Annotated[Generate, tyro.conf.subcommand("generate")]
         | Annotated[TakeViews, tyro.conf.subcommand("views")]
         | Annotated[ImportScenes, tyro.conf.subcommand("import")]
+        | Annotated[EncodeScenes, tyro.conf.subcommand("encode")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
         | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[ViewScene, tyro.conf.subcommand("view")]
