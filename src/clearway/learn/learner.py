@@ -158,8 +158,10 @@ def next_steps(frames: int, all_frames: int, envs: int, rollout_steps: int, leas
     A step is one of all environments, so that up to `envs - 1` more are used where they do not divide the frames.
 
     Args:
-        frames, all_frames: used, and asked for.
-        envs, rollout_steps: environments, and steps of a whole rollout.
+        frames: used so far.
+        all_frames: asked for.
+        envs: environments.
+        rollout_steps: of a whole rollout.
         least: steps that can be learnt from.
     """
     return min(rollout_steps, max(least, -(-(all_frames - frames) // envs)))
