@@ -126,7 +126,7 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
-    commands, runs, imports, generalist = code_blocks(ROOT / "docs/commands.md")
+    commands, runs, again, imports, generalist, encode = code_blocks(ROOT / "docs/commands.md")
     changes = {
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
@@ -138,8 +138,9 @@ def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
         "reproduce all": "reproduce fig3 --rooms bathroom --frames 4000",
     }
     prepare_stand_ins(tmp_path)
-    some = (Block("sh", shortened(runs.text, {"--frames 6e5": "--frames 4e3"})), imports)
-    for block in (Block("sh", shortened(commands.text, changes)), *some):
+    short = Block("sh", shortened(commands.text, changes))
+    shorter = Block("sh", shortened(runs.text, {"--frames 6e5": "--frames 4e3"}))
+    for block in (short, shorter, again, imports, encode):
         done = run_block(block, tmp_path)
         assert done.returncode == 0, done.stderr
     changes = {
@@ -150,8 +151,8 @@ def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
     done = run_block(Block("sh", shortened(generalist.text, changes)), tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("http://127.0.0.1:")
-    made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx", "film.mp4", "curves.png"]
-    made += [f"imported/{name}.h5" for name in ("dump", "hall", "office", "lab")]
+    made = ["bathroom.png", "pictures", "episode.mp4", "kitchen.onnx", "film.mp4", "curves.png", "runs/again/run.yaml"]
+    made += [f"{folder}/{name}.h5" for folder in ("imported", "together") for name in ("dump", "hall", "office", "lab")]
     assert all((tmp_path / name).exists() for name in made)
 
 

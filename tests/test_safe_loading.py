@@ -9,7 +9,8 @@ import clearway
 
 PACKAGE = Path(clearway.__file__).parent
 MESSAGES = PACKAGE / "spread/messages.py"  # between processes of ours alone: nothing of a file ever becomes one
-MODULES = sorted(set(PACKAGE.rglob("*.py")) - {MESSAGES})
+SETTINGS = PACKAGE / "settings_file.py"  # YAML, by a loader of plain values: see below
+MODULES = sorted(set(PACKAGE.rglob("*.py")) - {MESSAGES, SETTINGS})
 UNSAFE_MODULES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal", "yaml"}
 UNSAFE_CALLS = {"eval", "exec", "torch.load", "numpy.load", "np.load", "pandas.read_pickle", "torch.hub.load"}
 
@@ -38,6 +39,17 @@ def test_messages_between_processes_are_read_where_work_is_spread_alone() -> Non
     readers = [path for path in MODULES if "spread.messages" in path.read_text(encoding="utf-8")]
     assert {path.parent for path in readers} == {MESSAGES.parent}
     assert unsafe(MESSAGES.read_text(encoding="utf-8")) == ["pickle"]
+
+
+def test_yaml_is_read_by_a_loader_of_plain_values_alone() -> None:
+    source = SETTINGS.read_text(encoding="utf-8")
+    assert unsafe(source) == ["yaml"]
+    used = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute)]
+    names = {node.attr for node in used if ast.unparse(node.value) == "yaml"}
+    kept = {"SafeLoader", "safe_dump", "load", "Node", "MappingNode", "AliasEvent", "MarkedYAMLError", "YAMLError"}
+    assert names == kept
+    assert source.count("yaml.load(") == source.count(", _Loader)") == 1
+    assert "class _Loader(yaml.SafeLoader)" in source
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,9 @@ FeatureStore = Literal["memory", "float16", "mapped"]
 Goals = Literal["given", "seen"]
 """See `clearway.learn.own_goals`."""
 
+TrackerName = Literal["tensorboard", "wandb"]
+"""See `clearway.learn.tracking`."""
+
 MatmulPrecision = Literal["highest", "medium"]
 """See `clearway.model.precision`."""
 

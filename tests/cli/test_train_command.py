@@ -44,7 +44,7 @@ def test_unsolved_targets_and_the_command_to_go_on(clearway, trained, small, tmp
     assert program == "clearway"
     answer = clearway(*words)
     assert answer.code == 0
-    assert "was finished after 640 frames, and goes on to 1,280" in " ".join(answer.err.split()).replace(" │ │ ", " ")
+    assert "was finished after 640 frames, and goes on to 1,280" in answer.err
     assert RunFolder(run).metrics()[-1]["frames"] == 1280
     assert "--frames 2560" in answer.err.splitlines()[-1]
 
@@ -71,3 +71,12 @@ def test_a_training_may_end_once_all_is_solved(clearway, trained, tmp_path):
     )
     assert answer.err.splitlines()[-1] == f"{run}: trained, 1 of 1 targets solved. Next: clearway evaluate {run}"
     assert RunFolder(run).metrics()[-1]["frames"] < 200_000
+
+
+def test_frames_that_were_used_beyond_those_asked_for_are_said(clearway, trained, small, tmp_path):
+    words = ("train", trained.scene, "--targets", 26, *small)
+    answer = clearway(*words, "--frames", 650, "--out", tmp_path / "more")
+    assert "trained on 660 frames (10 more than asked for: the last step or update is whole), 0 of 1" in answer.err
+    answer = clearway(*words, "--frames", 660, "--out", tmp_path / "exact")
+    assert "trained, 0 of 1 targets solved" in answer.err
+    assert RunFolder(tmp_path / "exact").metrics()[-1]["frames"] == 660

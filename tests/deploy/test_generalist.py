@@ -164,6 +164,9 @@ def test_scenes_of_another_aspect_are_walked_with_a_warning(one_file) -> None:
     square = grid_scene(3, picture_size=(24, 24))
     with pytest.warns(AspectWarning, match="scene grid: pictures of 24 x 24 pixels have the aspect 1.00"):
         one_file.generalist.seen([square])
+    with pytest.warns(AspectWarning) as told:
+        one_file.generalist.warn_of_aspect([square, replace(square, name="other"), SCENE])
+    assert [str(one.message).partition(":")[0] for one in told] == ["scene grid and 1 more"]
     one_file.generalist.seen([SCENE])
 
 

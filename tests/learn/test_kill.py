@@ -11,7 +11,6 @@ import pytest
 
 from clearway.learn import train
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
-from clearway.learn.metrics_log import BOARD
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import write_scene
 from helpers import killed_runs
@@ -34,9 +33,9 @@ def without_seconds(folder: RunFolder) -> list[dict[str, float]]:
 
 
 def files_of(folder: RunFolder) -> set[str]:
-    """What lies in a run folder, TensorBoard's files left out: their names hold the time and the process."""
+    """What lies in a run folder."""
     paths = [path.relative_to(folder.path) for path in folder.path.rglob("*") if path.is_file()]
-    return {str(path) for path in paths if path.parts[0] != BOARD}
+    return {str(path) for path in paths}
 
 
 @pytest.mark.slow

@@ -1,10 +1,7 @@
-import importlib.util
 import json
 import re
-import sys
 from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -57,8 +54,7 @@ def test_the_document_explains_every_figure_of_an_algorithm_and_no_other(
     assert not [key for key in row if f"`{key}`" not in training]
 
 
-def test_rows_are_json_lines_that_reach_the_file_at_once(tmp_path: Path, row: dict[str, float], monkeypatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)  # as where TensorBoard is not installed
+def test_rows_are_json_lines_that_reach_the_file_at_once(tmp_path: Path, row: dict[str, float]) -> None:
     log = MetricsLog(tmp_path / "metrics.jsonl")
     log.write(row)
     log.write(row | {"frames": 160})
@@ -66,62 +62,3 @@ def test_rows_are_json_lines_that_reach_the_file_at_once(tmp_path: Path, row: di
     log.close()
     assert [json.loads(line) for line in lines] == [row, row | {"frames": 160}]
     assert [path.name for path in tmp_path.iterdir()] == ["metrics.jsonl"]
-
-
-class FakeWriter:
-    """Stands in for TensorBoard's: appends what it is handed to a file in its folder."""
-
-    def __init__(self, log_dir: str, purge_step: int | None) -> None:
-        folder = Path(log_dir)
-        folder.mkdir(exist_ok=True)
-        self.file = (folder / "events").open("a")
-
-    def add_scalar(self, name: str, value: float, step: float, walltime: float) -> None:
-        self.file.write(json.dumps([name, step, value, walltime]) + "\n")
-
-    def close(self) -> None:
-        self.file.close()
-
-
-@pytest.fixture
-def fake_board(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name == "tensorboard")
-    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=FakeWriter))
-
-
-@pytest.mark.usefixtures("fake_board")
-def test_tensorboard_has_each_figure_of_a_resumed_run_once(tmp_path: Path, row: dict[str, float]) -> None:
-    rows = [row | {"frames": 80 * number, "seconds": float(number)} for number in range(1, 5)]
-    path = tmp_path / "metrics.jsonl"
-    log = MetricsLog(path)
-    for each in rows[:3]:
-        log.write(each)
-    log.close()
-    path.write_text(json.dumps(rows[0]) + "\n")  # the checkpoint was written after the first row
-    log = MetricsLog(path, before=rows[:1], seconds=1.5)
-    for each in rows[1:]:
-        log.write(each)
-    log.close()
-    events = [json.loads(line) for line in (tmp_path / "tensorboard" / "events").read_text().splitlines()]
-    assert [event[:3] for event in events] == [[name, r["frames"], r[name]] for r in rows for name in r]
-    times = [event[3] for event in events if event[0] == "loss"]
-    assert [later - times[0] for later in times] == pytest.approx([0.0, 1.0, 2.0, 3.0], abs=1e-3)
-    assert [json.loads(line) for line in path.read_text().splitlines()] == rows
-
-
-def test_tensorboard_reads_what_was_written(tmp_path: Path, row: dict[str, float]) -> None:
-    pytest.importorskip("tensorboard")
-    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
-
-    path = tmp_path / "metrics.jsonl"
-    log = MetricsLog(path)
-    log.write(row)
-    log.write(row | {"frames": 160})
-    log.close()
-    log = MetricsLog(path, before=[row], seconds=row["seconds"])
-    log.write(row | {"frames": 160, "loss": 7.0})
-    log.close()
-    read = EventAccumulator(str(tmp_path / "tensorboard")).Reload()
-    assert set(read.Tags()["scalars"]) == set(row)
-    found = [(event.step, event.value) for event in read.Scalars("loss")]
-    assert found == [(80, pytest.approx(row["loss"])), (160, 7.0)]

@@ -116,9 +116,9 @@ def test_a_training_sets_itself_the_poses_it_has_been_in_and_no_others(monkeypat
     assert goals is not None
     collect = trainer.collector.collect
 
-    def watched() -> Rollout:
+    def watched(steps: int) -> Rollout:
         could_know = set(stood)
-        rollout = collect()
+        rollout = collect(steps)
         begun = world.target_state[rollout.target.unique()].tolist()
         assert set(begun) <= could_know | set(trainer.world.target_state.tolist())
         drawn.update(begun)

@@ -58,10 +58,11 @@ def test_where_a_pose_shows_another_picture_they_never_repeat_and_eyes_decide():
 def test_a_pose_that_shows_another_picture_says_so_even_where_they_came_again_before():
     scene = seen_perfectly(corridor_scene(6))
     follower = Follower(PerfectSight(scene), SETTINGS)
-    state, found = follower.begin(1), []
+    state, found, here = follower.begin(1), [], 0
     for step in range(9):
         noise = 0.001 if step == 8 else 0.0
-        _, after = follower.follow(scene.features[[0]] + np.float32(noise), state)
+        _, after = follower.follow(scene.features[[here]] + np.float32(noise), state)
         found.append(int(after["repeats"][0]))
-        state = {**state, **after, "action": np.array([int(Action.MOVE_FORWARD)])}
-    assert found[:4] == [0, 1, 2, ALWAYS] and found[-1] == NEVER
+        state = {**state, **after, "action": np.array([int(Action.TURN_RIGHT)])}
+        here = int(scene.graph[here, Action.TURN_RIGHT])
+    assert found[:7] == [0, 0, 0, 0, 1, 2, ALWAYS] and found[-1] == NEVER

@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -172,3 +175,27 @@ def test_eyes_are_judged_room_by_room(tmp_path: Path, views: Views):
     found, again = (judge(eyes, views, seed=1) for _ in range(2))
     assert found == again and found.rooms == 3 and not eyes.training
     assert 0 <= found.recognised <= found.recognised_near <= 1 and 0 <= found.overlap <= 1
+
+
+def test_a_training_is_shown_where_it_is_asked_for(tmp_path: Path, views: Views, monkeypatch: pytest.MonkeyPatch):
+    begun = []
+
+    class Board:
+        def __init__(self, folder: str, purge_step: int | None) -> None:
+            begun.append((folder, []))
+
+        def add_scalar(self, name: str, value: float, step: float, walltime: float) -> None:
+            begun[-1][1].append((name, value, step))
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name if name == "tensorboard" else None)
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=Board))
+    folder = pretrain(PretrainRequest(views, SETTINGS), tmp_path / "eyes", track="tensorboard")
+    ((where, shown),) = begun
+    assert where == str(tmp_path / "eyes" / "tensorboard")
+    assert shown == [(name, row[name], row["frames"]) for row in folder.metrics() for name in row]
+    with pytest.raises(RunError, match="needs wandb"):
+        pretrain(PretrainRequest(views, SETTINGS), tmp_path / "other", track="wandb")
+    assert len(begun) == 1 and not (tmp_path / "other").exists()

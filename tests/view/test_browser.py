@@ -1,51 +1,25 @@
 """The viewer's page in a real headless Chromium, clicked through; any error on the page fails the test."""
 
 import json
-import os
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
 import av
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 
-CHROMIUM_VARIABLE = "CLEARWAY_CHROMIUM"
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
+from helpers.browser import opened_browser
+
 PATIENCE_MS = 60_000  # others may be using the machine
 PHONE = {"width": 390, "height": 844}
 
 
-def chromium(own: str) -> str:
-    """Path of a Chromium: the one named by the variable, one of the system, or playwright's own."""
-    named = os.environ.get(CHROMIUM_VARIABLE)
-    if named:
-        return named
-    installed = [path for path in map(shutil.which, NAMES) if path]
-    if installed:
-        return installed[0]
-    if Path(own).exists():
-        return own
-    pytest.skip(f"no Chromium found: install one, or name it in ${CHROMIUM_VARIABLE}")
-
-
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        path = chromium(playwright.chromium.executable_path)
-        browser = playwright.chromium.launch(executable_path=path, args=list(ARGUMENTS))
+    with opened_browser() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture

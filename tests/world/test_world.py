@@ -131,8 +131,9 @@ def test_features_that_do_not_belong_together() -> None:
         "only some of the scenes": replace(corridor_scene(3, name="second"), features=None, encoder=None),
     }
     for message, second in cases.items():
-        with pytest.raises(SceneError, match=message):
+        with pytest.raises(SceneError, match=message) as refused:
             make_world([first, second], targets)
+        assert "clearway scenes encode FILES --encoder made-up --out FOLDER" in str(refused.value)
 
 
 def test_a_target_that_is_no_whole_number_is_refused() -> None:

@@ -89,12 +89,19 @@ class Generalist:
         return replace(self, settings=replace(self.settings, step_m=step_m))
 
     def warn_of_aspect(self, scenes: Sequence[Scene]) -> None:
-        """Warn (AspectWarning) where pictures have another aspect than those that the eyes were taught on."""
+        """Warn (AspectWarning) where pictures have another aspect than those that the eyes were taught on.
+
+        Once for all scenes of one kind of picture.
+        """
+        found: dict[str, list[str]] = {}
         for scene in scenes:
             if scene.observations is not None:
                 _, height, width, _ = scene.observations.shape
                 if problem := other_aspect((height, width), self.picture_px):
-                    warnings.warn(f"scene {scene.name}: {problem}", AspectWarning, stacklevel=3)
+                    found.setdefault(problem, []).append(scene.name)
+        for problem, (first, *others) in found.items():
+            where = f"scene {first}" + (f" and {len(others)} more" if others else "")
+            warnings.warn(f"{where}: {problem}", AspectWarning, stacklevel=3)
 
     def on_poses(self, world: World) -> MappingAgent:
         """The agent on the grid: it goes by features of its eyes, in any world."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from clearway.api.arguments import as_path, as_whole
 
 if TYPE_CHECKING:
+    from clearway.choices import TrackerName
     from clearway.pretraining.judge import Judgement
 
 PathLike = str | os.PathLike[str]
@@ -26,6 +27,7 @@ def pretrain(
     try_on: Sequence[PathLike] = (),
     threads: int | None = None,
     resume: bool = False,
+    track: TrackerName | None = None,
     show_progress: bool = False,
 ) -> Judgement | None:
     """Train eyes and leave them in a folder, whose name is then an encoder's.
@@ -40,6 +42,7 @@ def pretrain(
         try_on: views of other rooms, to try the eyes on once they are trained.
         threads: of torch; None leaves its own choice. Results repeat bit for bit at one number.
         resume: go on from the newest checkpoint in `out`.
+        track: where figures are shown as they come, "tensorboard" or "wandb", beside `metrics.jsonl`.
         show_progress: draw a progress bar, if standard error is a terminal.
 
     Returns:
@@ -68,5 +71,5 @@ def pretrain(
     request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept)
     folder = as_path("out", out)
     with torch_threads(count), picture_progress("learning to see", settings.pictures, show_progress) as show_done:
-        train_eyes(request, folder, resume=resume, done=show_done)
+        train_eyes(request, folder, resume=resume, track=track, done=show_done)
         return None if tried is None else judge(read_eyes(folder), tried)

@@ -92,7 +92,7 @@ def _encoder_of(scenes: Sequence[Scene]) -> Encoder:
     record = scenes[0].encoder
     if record is None:
         problem = f"scene {scenes[0].name} has no features by a known encoder, and the agent sees features"
-        raise EncoderError(f"{problem}. Encode the scenes: clearway scenes encode")
+        raise EncoderError(f"{problem}. Encode the scenes: clearway scenes encode FILES --out FOLDER")
     if (seen := sensor_of(record)) != RGB:
         problem = f"encoder {record.name} sees {seen}, and perturbed takes are colour pictures"
         raise EncoderError(f"{problem}. Leave perturb out")

@@ -14,10 +14,11 @@ from typing import Any, get_args
 
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word
+from clearway.api.run_settings import leave_settings, reward_options
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
 from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
-from clearway.choices import FeatureStore, ZoneLevel
+from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import ArgumentError
 from clearway.evaluation.takes import Takes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
@@ -105,6 +106,7 @@ def train(
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
     until_solved: bool = False,
+    track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
     show_progress: bool = False,
     **settings: Any,
@@ -136,6 +138,8 @@ def train(
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target
             reached it.
+        track: where figures are shown as they come, beside `metrics.jsonl`: "tensorboard", in the run folder, or
+            "wandb", offline unless its user has logged in.
         on_begin: called with the run folder as soon as it holds the run, before the first frame.
         show_progress: draw a progress bar; where there is no terminal, print a line now and then.
         settings: single settings of the algorithm by name, such as `envs=200`; all are fields of its class.
@@ -169,6 +173,20 @@ def train(
         takes=None if seen is None else seen.seen[FEATURES],
         takes_made=None if seen is None else {**seen.made, "seed": number},
     )
+
+    def begun(path: Path) -> None:
+        leave_settings(
+            path,
+            reward_options(reward),
+            perturb=_as_words(perturb),
+            takes=takes,
+            threads=threads,
+            until="solved" if until_solved else None,
+            track=track,
+        )
+        if on_begin is not None:
+            on_begin(path)
+
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
@@ -178,7 +196,8 @@ def train(
             resume=resume,
             show_progress=show_progress,
             until_solved=as_truth("until_solved", until_solved),
-            on_begin=on_begin,
+            track=track,
+            on_begin=begun,
         )
         return TrainResult(
             agent=load_agent(path),
@@ -237,6 +256,13 @@ def _takes(
     learner.check_sees_takes()  # before what takes long
     own = SEED_LIMIT - 1 - seed  # no pictures that an evaluation with the same seed sees
     return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=own, show_progress=show_progress)
+
+
+def _as_words(perturb: Perturbed) -> tuple[str, ...]:
+    """What is perturbed, as words of the command line."""
+    if isinstance(perturb, Perturbations):
+        return tuple(f"{name}={value:g}" for name, value in perturb.to_json().items() if value)
+    return tuple(perturb.split() if isinstance(perturb, str) else perturb)
 
 
 def _is_known(learner: Learner) -> bool:

@@ -55,15 +55,14 @@ def say_held_out(targets: Mapping[str, Sequence[int]]) -> None:
 
 @contextmanager
 def showing_warnings() -> Iterator[None]:
-    """Print warnings as framed text on standard error, each once, whatever Python was told about warnings."""
+    """Print warnings on standard error, each once and in one line, whatever Python was told about warnings."""
+    told: set[str] = set()
 
     def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-        from rich.panel import Panel
-        from rich.text import Text
-
-        text = "\n".join(printable(line) for line in str(message).split("\n"))
-        frame = Panel(Text(text), title="warning", border_style="yellow", title_align="left")
-        stderr_console().print(frame)
+        text = " ".join(str(message).split())
+        if text not in told:
+            told.add(text)
+            say(f"warning: {text}")
 
     with warnings.catch_warnings():
         warnings.simplefilter("default", UserWarning)

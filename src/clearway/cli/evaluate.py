@@ -49,6 +49,9 @@ class Evaluate:
     """A checkpoint folder of the run; by default the newest."""
     targets: bool = False
     """Print a row for each target too."""
+    all: bool = False
+    """Print a row for each way of acting, and for the exact optima; by default for the agent, a random walk, shortest
+    paths, and those of --beside. JSON and the files in the run folder hold all."""
     pictures: Path | None = None
     """Folder for maps with the paths of an episode, contact sheets and learning curves."""
     goals: int | None = None
@@ -236,7 +239,7 @@ class Evaluate:
 
         levels: list[Level] = ["targets"] if self.targets else []
         levels += ["scenes", "average"] if len(result.scenes) > 1 else ["average"]
-        stdout_console().print(rich_tables(result.evaluations, levels))
+        stdout_console().print(rich_tables(result.evaluations, levels, every=self.all))
 
 
 def _targets_of(result: EvaluateResult) -> dict[str, list[int]]:

@@ -15,8 +15,10 @@ from typing import Annotated
 
 import tyro
 
+from clearway.cli.config import with_config
 from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
+from clearway.cli.encode import EncodeScenes
 from clearway.cli.evaluate import Evaluate
 from clearway.cli.export import ExportAgent
 from clearway.cli.generate import Generate
@@ -44,7 +46,7 @@ DESCRIPTION = (
 
 @dataclass(frozen=True)
 class Scenes:
-    """Scene files: build and generate rooms, take views of them, import others, inspect, walk through, export.
+    """Scene files: build and generate rooms, take views of them, import others, encode, inspect, walk through, export.
 
     Example: clearway scenes inspect bathroom.h5
     """
@@ -54,6 +56,7 @@ class Scenes:
         | Annotated[Generate, tyro.conf.subcommand("generate")]
         | Annotated[TakeViews, tyro.conf.subcommand("views")]
         | Annotated[ImportScenes, tyro.conf.subcommand("import")]
+        | Annotated[EncodeScenes, tyro.conf.subcommand("encode")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
         | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[ViewScene, tyro.conf.subcommand("view")]
@@ -119,6 +122,7 @@ def _exit_code(words: Sequence[str]) -> int:
 
 def _run(words: Sequence[str]) -> None:
     """Run the command that the words ask for."""
+    words = with_config(words, Command)
     with refusals_in_one_line(words, Command):
         command = tyro.cli(
             Annotated[Command, tyro.conf.arg(help="what to do")],  # or tyro reads all of typing for one

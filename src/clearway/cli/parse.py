@@ -50,7 +50,7 @@ def _names_there(words: Sequence[str], commands: object) -> list[str]:
     """What can stand where some words go astray: options of the command that they name, or commands."""
     kind, used = command_of(words, commands)
     if kind is not None:
-        return [f"--{name}" for name in options(kind)]
+        return [f"--{name}" for name in (*options(kind), "config")]
     group = commands
     for word in words[:used]:
         group = subcommands(group)[word]

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import tyro
 
+from clearway.choices import TrackerName
 from clearway.cli.console import say
 
 
@@ -36,6 +37,9 @@ class Pretrain:
     """Views of other rooms, to try the eyes on once they are trained."""
     threads: int | None = None
     """Threads of torch. Results repeat bit for bit at one number of threads."""
+    track: TrackerName | None = None
+    """Show figures elsewhere as they come: tensorboard, in --out; wandb, offline unless you are logged in. Needs the
+    extra of that name; by default metrics.jsonl in --out alone."""
     resume: bool = False
     """Go on with the training in --out from its newest checkpoint."""
     json: bool = False
@@ -54,6 +58,7 @@ class Pretrain:
             try_on=self.try_on,
             threads=self.threads,
             resume=self.resume,
+            track=self.track,
             show_progress=True,
         )
         figures = {} if found is None else found.to_json()

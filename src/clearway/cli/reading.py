@@ -20,9 +20,14 @@ from tyro.constructors import (
     UnsupportedTypeAnnotationError,
 )
 
+from clearway.cli.known import subcommands
 from clearway.spelling import whole_number
 
 PLACEHOLDERS = {int: "N", float: "X", str: "WORD", Path: "PATH"}  # of an option's value in help
+
+CONFIG_HELP = (
+    "Take options from a YAML file, such as a run's run.yaml, a name and a value a line. The command line goes before."
+)
 
 
 def reading() -> ConstructorRegistry:
@@ -43,9 +48,23 @@ def reading() -> ConstructorRegistry:
         finally:
             busy.remove(info.type)
         assert isinstance(found, StructConstructorSpec)
-        return replace(found, fields=tuple(map(_told_plainly, found.fields)))
+        plain = replace(found, fields=tuple(map(_told_plainly, found.fields)))
+        return _with_config(plain) if hasattr(info.type, "run") and not subcommands(info.type) else plain
 
     return rules
+
+
+def _with_config(command: StructConstructorSpec) -> StructConstructorSpec:
+    """The command with the option --config, which `config.with_config` has done away with before anything is read."""
+    kind = Annotated[Path | None, tyro.conf.arg(metavar=PLACEHOLDERS[Path], help_behavior_hint=_default_told)]
+    option = StructFieldSpec("config", kind, None, helptext=CONFIG_HELP)  # type: ignore[arg-type]
+
+    def made(**values: Any) -> Any:
+        values.pop("config", None)
+        return command.instantiate(**values)
+
+    made.__doc__ = command.instantiate.__doc__  # which help begins with
+    return replace(command, instantiate=made, fields=(*command.fields, option))
 
 
 def _whole_number(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec | None:
@@ -63,7 +82,7 @@ def _whole_number(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec | None:
 
 def _choice(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec | UnsupportedTypeAnnotationError | None:
     """What may be left out as what it is, without the word None; several choices as one, in the order written."""
-    kind = _without_none(info.type)
+    kind = without_none(info.type)
     if kind is info.type:
         return None
     spec = ConstructorRegistry.get_primitive_spec(PrimitiveTypeInfo.make(kind, set(info.markers)))
@@ -76,7 +95,7 @@ def _choice(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec | UnsupportedTy
     )
 
 
-def _without_none(kind: Any) -> Any:
+def without_none(kind: Any) -> Any:
     """`X` of `X | None`, and one choice of words of a union of such; any other type as it is."""
     if get_origin(kind) not in (Union, UnionType):
         return kind
@@ -102,7 +121,7 @@ def _told_plainly(field: StructFieldSpec) -> StructFieldSpec:
 
 def _placeholder(kind: Any) -> str | None:
     """What stands for an option's value in help; empty for a switch, None for what is no option."""
-    kind = _without_none(kind)
+    kind = without_none(kind)
     if kind is bool:
         return ""
     if kind in PLACEHOLDERS:

@@ -45,4 +45,10 @@ def chosen_reward(name: str, parameters: RewardParameters, clip: bool | None = N
     """
     if ":" in name and "" not in sys.path:
         sys.path.insert(0, "")  # a module in the current folder, as for python -m
-    return reward_named(name).with_changes(clip=clip, **asdict(parameters))  # type: ignore[call-overload]
+    return reward_named(name).with_changes(clip=clip, **given_parameters(parameters))
+
+
+def given_parameters(parameters: RewardParameters) -> dict[str, float]:
+    """The parameters that are given, by name."""
+    values: dict[str, float | None] = asdict(parameters)  # type: ignore[call-overload]
+    return {name: value for name, value in values.items() if value is not None}

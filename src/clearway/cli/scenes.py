@@ -163,7 +163,7 @@ def _print_table(content: dict[str, object]) -> None:
 
 def _cell(value: object) -> str:
     if isinstance(value, dict):
-        return ", ".join(f"{k} {v}" for k, v in value.items())
-    if isinstance(value, tuple) and all(isinstance(one, str) for one in value):
-        return ", ".join(value)
-    return str(value)
+        return ", ".join(f"{k} {_cell(v)}" for k, v in value.items())
+    if isinstance(value, tuple | list):
+        return ", ".join(map(_cell, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from clearway.choices import FeatureStore, Goals, PresetName, ZoneLevel
+from clearway.choices import FeatureStore, Goals, PresetName, TrackerName, ZoneLevel
 from clearway.cli.arguments import given_targets, scene_files
 from clearway.cli.console import say
-from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward
+from clearway.cli.reward import RewardChoice, RewardParameters, chosen_reward, given_parameters
 from clearway.cli.run_names import free_run_folder, longer
 from clearway.errors import ClearwayError
 
@@ -81,6 +81,9 @@ class Train:
     feature_store: FeatureStore = "memory"
     """Where features are kept: memory; float16, in half the memory, rounded; mapped, in a file in the cache folder that
     is gone afterwards, for sets that memory cannot hold. The last two also open large sets faster."""
+    track: TrackerName | None = None
+    """Show figures elsewhere as they come: tensorboard, in the run folder; wandb, offline unless you are logged in.
+    Needs the extra of that name; by default metrics.jsonl in the run folder alone."""
     resume: bool = False
     """Go on with the run in --out from its newest checkpoint; with more --frames, with a finished one too."""
 
@@ -107,6 +110,7 @@ class Train:
             feature_store=self.feature_store,
             threads=self.threads,
             until_solved=self.until == "solved",
+            track=self.track,
             on_begin=self._begun,
             show_progress=True,
         )
@@ -122,7 +126,21 @@ class Train:
         return free_run_folder(files, reward.name, learner.algorithm if named == "default" else named, self.seed)
 
     def _begun(self, folder: Path) -> None:
-        """Say where the run is, where its user did not."""
+        """Say where the run is, where its user did not; leave its settings, if its reward is the user's own."""
+        from clearway.api.run_settings import leave_settings
+        from clearway.reward import REWARDS
+
+        if self.reward not in REWARDS:  # of others the run knows the terms, but not the name to find them by
+            changed = given_parameters(self.parameters)
+            leave_settings(
+                folder,
+                {"reward": self.reward, **changed},
+                perturb=self.perturb,
+                takes=self.takes,
+                threads=self.threads,
+                until=self.until,
+                track=self.track,
+            )
         if self.out is None:
             say(f"{folder}: the run's folder. Choose another with --out")
 
@@ -166,7 +184,10 @@ def _say_trained(result: TrainResult, out: Path) -> None:
         return
     solved, count = result.solved_targets, sum(map(len, result.record.targets.values()))
     each = "" if solved == count else " --targets"
-    say(f"{out}: trained, {solved} of {count} targets solved. Next: clearway evaluate {out}{each}")
+    used, asked = result.agent.frames, result.record.learner.frames
+    further = f" on {used:,} frames ({used - asked:,} more than asked for: the last step or update is whole)"
+    told = further if used > asked else ""
+    say(f"{out}: trained{told}, {solved} of {count} targets solved. Next: clearway evaluate {out}{each}")
     if result.unsolved and solved < count:
         frames = 2 * max(result.record.learner.frames, result.agent.frames)
         say(f"not solved: {_named(result.unsolved)}. To go on: {longer(sys.argv[1:], out, frames)}")

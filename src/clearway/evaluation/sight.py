@@ -32,7 +32,8 @@ class Sight:
         self._world, self._names = world, agent.sees
         self._pictures = {name: _pictures(name, scenes) for name in agent.sees if name not in (POSE, FEATURES)}
         if FEATURES in agent.sees and world.features is None:
-            raise AgentError("the agent sees features, and the scenes have none. Encode them: clearway scenes encode")
+            problem = "the agent sees features, and the scenes have none"
+            raise AgentError(f"{problem}. Encode them: clearway scenes encode FILES --out FOLDER")
         self._first = world.scene_offset.cpu().numpy()
         self._takes = None if takes is None else _those_seen(takes, agent)
 

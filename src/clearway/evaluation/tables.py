@@ -121,16 +121,36 @@ def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", 
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"
 
 
-def rich_tables(evaluations: Sequence[Evaluation], levels: Sequence[Level]) -> Group:
-    """The main figures for the terminal, a table a level: intervals dim, failures in red, notes at the end."""
+def rich_tables(evaluations: Sequence[Evaluation], levels: Sequence[Level], *, every: bool = True) -> Group:
+    """The main figures for the terminal, a table a level: intervals dim, failures in red, notes at the end.
+
+    Args:
+        evaluations: that of the agent first.
+        levels: of the tables.
+        every: show all evaluations. Else the agent by its first way of acting, and others to compare with, without
+            exact optima.
+    """
     from rich.console import Group
 
-    contents = [table_text(evaluations, level, width="terminal") for level in levels]
-    *tables, last = map(_rich, contents)
-    return Group(*tables, noted(last, contents[-1].notes))
+    shown = evaluations if every else main_rows(evaluations)
+    contents = [table_text(shown, level, width="terminal") for level in levels]
+    *tables, last = (_rich(content, level == "average") for content, level in zip(contents, levels, strict=True))
+    left = len(evaluations) - len(shown)
+    more = [f"{left} more row{'s' * (left > 1)}, of other ways of acting and exact optima: --all."] if left else []
+    return Group(*tables, noted(last, [*contents[-1].notes, *more]))
 
 
-def _rich(content: TableText) -> Table:
+def main_rows(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
+    """The agent by its first way of acting, and other agents without the exact optima."""
+    first, *others = evaluations
+    return [
+        first,
+        *(one for one in others if one.agent != first.agent and not one.agent.startswith(tuple(REFERENCES))),
+    ]
+
+
+def _rich(content: TableText, intervals: bool) -> Table:
+    """The table for the terminal; without intervals there is room for a column more."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -145,9 +165,9 @@ def _rich(content: TableText) -> Table:
             table.add_column(heading, justify="right", no_wrap=True)
     for row in content.rows:
         texts = []
-        for cell in row:
+        for index, cell in enumerate(row):
             text = Text(cell.text, style="bold red" if cell.failed else "")
-            if cell.below:
+            if cell.below and (intervals or index < first_figure):
                 text.append(f"\n{cell.below.replace('-', ' ')}", style="dim")  # folded between words, not within
             texts.append(text)
         table.add_row(*texts)

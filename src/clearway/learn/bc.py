@@ -20,7 +20,7 @@ from torch import Tensor
 
 from clearway.errors import RunError
 from clearway.learn.figures import Figures, check_finite
-from clearway.learn.learner import Learner, OnFeatures, linear
+from clearway.learn.learner import Learner, OnFeatures, linear, next_steps
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import Adam, clip_gradients
 from clearway.learn.rollout import ACTION_STREAM, Collector, as_rows
@@ -84,7 +84,7 @@ class Cloning:
         self.frames, self.updates = 0, 0
         scene = torch.arange(learner.envs, device=world.device) * world.scene_count // learner.envs
         envs_per_scene = torch.bincount(scene, minlength=world.scene_count).tolist()
-        self.rows_per_scene = tuple(count * learner.rollout_steps for count in envs_per_scene)
+        self.envs_per_scene = tuple(envs_per_scene)
         heads = learner.head_count(world.scene_count)
         shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
         self.network = SiameseActorCritic(shape, seed).to(world.device)
@@ -121,7 +121,8 @@ class Cloning:
         """
         lr = linear(self.learner.lr_start, self.learner.lr_end, self.frames, self.learner.frames)
         self.lookup.refresh()
-        rollout = self.collector.collect()
+        left = next_steps(self.frames, self.learner.frames, self.learner.envs, self.learner.rollout_steps)
+        rollout = self.collector.collect(left)
         self.statistics.add(rollout)
         history, target = as_rows(rollout.history), as_rows(rollout.target)
         right = shortest_path_actions(self.world, self.distances, history[:, -1], target)
@@ -142,7 +143,8 @@ class Cloning:
 
         kept: the activations of these rows, where the parameters are still those of the rollout.
         """
-        known = history, target, self.rows_per_scene
+        steps = len(target) // self.learner.envs
+        known = history, target, tuple(count * steps for count in self.envs_per_scene)
         activations = kept or self.lookup.forward(*known)
         loss, agreement, gradient = cloning_loss(activations.output, right)
         self.lookup.backward(*known, activations, gradient)

@@ -152,6 +152,21 @@ class OnFeatures:
     history_length: int = 4
 
 
+def next_steps(frames: int, all_frames: int, envs: int, rollout_steps: int, least: int = 1) -> int:
+    """Steps of the next rollout, after some frames: fewer in the last, so that it ends with the frames asked for.
+
+    A step is one of all environments, so that up to `envs - 1` more are used where they do not divide the frames.
+
+    Args:
+        frames: used so far.
+        all_frames: asked for.
+        envs: environments.
+        rollout_steps: of a whole rollout.
+        least: steps that can be learnt from.
+    """
+    return min(rollout_steps, max(least, -(-(all_frames - frames) // envs)))
+
+
 def linear(start: float, end: float, frames: int, all_frames: int) -> float:
     """A setting that goes linearly from start to end over all frames, after some of them."""
     return start + (end - start) * min(frames / all_frames, 1.0)

@@ -1,21 +1,18 @@
-"""Figures of a training run as JSON lines, and to TensorBoard where it is installed. Names: docs/metrics.md."""
+"""Figures of a training run as JSON lines, and to a tracker where one is asked for. Names: docs/metrics.md."""
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import shutil
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from torch import Tensor
 
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS, EpisodeStatistics
+from clearway.learn.tracking import Tracker
 
 Row = dict[str, float]
-BOARD = "tensorboard"  # folder of TensorBoard's files, beside the JSON lines
 
 
 class Counting(Protocol):
@@ -63,38 +60,21 @@ class MetricsLog:
 
     Args:
         path: of the JSON lines.
-        before: the rows that the file holds already. TensorBoard's files beside it are written anew from them, so that
-            a resumed run has every figure there once, and none that a killed process had not written out is missing.
-        seconds: training time so far.
+        tracker: is shown every row too.
     """
 
-    def __init__(self, path: Path, before: Sequence[Row] = (), seconds: float = 0.0) -> None:
-        self.file = path.open("a")
-        self.board: Any = None
-        if importlib.util.find_spec("tensorboard"):
-            from torch.utils.tensorboard import SummaryWriter
-
-            folder = path.parent / BOARD
-            shutil.rmtree(folder, ignore_errors=True)
-            self.began = time.time() - seconds
-            self.board = SummaryWriter(str(folder), purge_step=0 if before else None)  # for one that looks on
-            for row in before:
-                self._show(row)
+    def __init__(self, path: Path, tracker: Tracker | None = None) -> None:
+        self.file, self.tracker = path.open("a"), tracker
 
     def write(self, row: Row) -> None:
         """Append one row."""
         self.file.write(json.dumps(row) + "\n")
         self.file.flush()
-        if self.board:
-            self._show(row)
-
-    def _show(self, row: Row) -> None:
-        """Hand the row's figures to TensorBoard, at the time when training had come so far without a pause."""
-        for name, value in row.items():
-            self.board.add_scalar(name, value, row["frames"], walltime=self.began + row["seconds"])
+        if self.tracker:
+            self.tracker.show(row)
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the file, and the tracker's."""
         self.file.close()
-        if self.board:
-            self.board.close()
+        if self.tracker:
+            self.tracker.close()

@@ -23,7 +23,7 @@ from torch import Tensor
 from clearway.agents.by_pose import PoseAgent
 from clearway.errors import RunError
 from clearway.learn.figures import Figures, check_finite
-from clearway.learn.learner import Learner, linear
+from clearway.learn.learner import Learner, linear, next_steps
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.rollout import ACTION_STREAM
 from clearway.learn.statistics import EpisodeStatistics
@@ -110,7 +110,8 @@ class TableTrainer:
         explore = linear(learner.explore_start, learner.explore_end, self.frames, learner.frames)
         walked: list[tuple[Tensor, ...]] = []
         errors: list[Tensor] = []
-        for _ in range(learner.rollout_steps):
+        steps = next_steps(self.frames, learner.frames, learner.envs, learner.rollout_steps)
+        for _ in range(steps):
             target = nav.target
             row = self.first_row[target] + nav.state
             probabilities = explore / ACTION_COUNT + (1 - explore) * best_actions(self.values[row])
@@ -121,7 +122,7 @@ class TableTrainer:
             walked.append((target, step.reached, step.truncated, step.blocked))
             nav.restart(step.ended)
         self.statistics.add(WalkedSteps(*(torch.stack(column) for column in zip(*walked, strict=True))))
-        self.frames += learner.envs * learner.rollout_steps
+        self.frames += learner.envs * steps
         self.updates += 1
         result = {"value_error": float(torch.stack(errors).mean()), "explore": explore}
         check_finite(result, self.frames)

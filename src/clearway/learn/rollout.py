@@ -65,6 +65,11 @@ class Rollout:
     history_after: Tensor
     target_after: Tensor
 
+    @property
+    def steps(self) -> int:
+        """T."""
+        return len(self.action)
+
 
 class Collector:
     """Gathers rollouts, one after the other.
@@ -74,7 +79,7 @@ class Collector:
         network: the policy.
         action_stream: one random stream an environment.
         envs_per_scene: number of environments of each scene.
-        steps: T.
+        steps: T, where a rollout is not told otherwise.
         keep_hidden: keep the hidden activations too, for an update that follows at once.
     """
 
@@ -88,19 +93,27 @@ class Collector:
         keep_hidden: bool,
     ) -> None:
         self.navigation, self.network, self.action_stream = navigation, network, action_stream
-        self.steps, self.keep_hidden = steps, keep_hidden
+        self.keep_hidden = keep_hidden
         device, count = navigation.world.device, sum(envs_per_scene)
         self.rows_per_scene = tuple(envs_per_scene)
         self.one_step = Activations.empty(count, network.width, device, dtype=network.dtype)
-        width = network.width if keep_hidden else 0
-        self.kept = Activations.empty(count * steps, width, device, dtype=network.dtype)
+        self._make_room(steps)
+
+    def _make_room(self, steps: int) -> None:
+        """Memory for rollouts of so many steps."""
+        network, count = self.network, len(self.one_step.output)
+        width = network.width if self.keep_hidden else 0
+        self.steps = steps
+        self.kept = Activations.empty(count * steps, width, self.one_step.output.device, dtype=network.dtype)
         # what each step is written to
-        self.memory = self.kept.by_step(steps) if keep_hidden else [self.one_step] * steps
+        self.memory = self.kept.by_step(steps) if self.keep_hidden else [self.one_step] * steps
 
     @torch.no_grad()
-    def collect(self) -> Rollout:
-        """Walk T steps from where the environments stand; ended episodes begin anew at once."""
+    def collect(self, steps: int | None = None) -> Rollout:
+        """Walk T steps, or so many, from where the environments stand; ended episodes begin anew at once."""
         nav = self.navigation
+        if steps is not None and steps != self.steps:
+            self._make_room(steps)
         seen: list[tuple[Tensor, Tensor, Tensor, Transition, Tensor]] = []
         for t in range(self.steps):
             history, target = nav.history, nav.target
@@ -111,16 +124,16 @@ class Collector:
             step = nav.step(action)
             seen.append((history, target, action, step, nav.history))
             nav.restart(step.ended)
-        histories, targets, actions, steps, last_histories = zip(*seen, strict=True)
+        histories, targets, actions, happened, last_histories = zip(*seen, strict=True)
         return Rollout(
             history=torch.stack(histories),
             target=torch.stack(targets),
             action=torch.stack(actions),
-            arrived=torch.stack([step.state for step in steps]),
-            reward=torch.stack([step.reward for step in steps]),
-            reached=torch.stack([step.reached for step in steps]),
-            truncated=torch.stack([step.truncated for step in steps]),
-            blocked=torch.stack([step.blocked for step in steps]),
+            arrived=torch.stack([step.state for step in happened]),
+            reward=torch.stack([step.reward for step in happened]),
+            reached=torch.stack([step.reached for step in happened]),
+            truncated=torch.stack([step.truncated for step in happened]),
+            blocked=torch.stack([step.blocked for step in happened]),
             last_history=torch.stack(last_histories),
             kept=self.kept,
             history_after=nav.history,

@@ -2,6 +2,7 @@
 
 run.json         the learner (algorithm and its own settings), reward, seed, zone level, scenes with their targets and
                  digests, versions, hardware, command
+run.yaml         the same as options of clearway train, to repeat it (`api.run_settings`)
 metrics.jsonl    one row of figures a line (docs/metrics.md)
 checkpoints/     see `checkpoint`
 milestones/N/    the agent after N frames, where it was asked for: a checkpoint to act from, not to train on from

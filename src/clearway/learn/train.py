@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.choices import FeatureStore, ZoneLevel
+from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import RunError
 from clearway.learn.checkpoint import (
     Progress,
@@ -34,6 +34,7 @@ from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.seeds import check_seed
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.learn.tracking import check_tracker, tracker_of
 from clearway.reward import Reward
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
@@ -134,6 +135,7 @@ def train(
     show_progress: bool = False,
     milestones: Sequence[int] = (),
     until_solved: bool = False,
+    track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
 ) -> RunFolder:
     """Train until all frames are used and leave a run folder behind.
@@ -146,12 +148,14 @@ def train(
         show_progress: draw a progress bar.
         milestones: keep the agent as it is after so many frames too, see `RunFolder.milestone`.
         until_solved: stop before that, once every target is solved, see `EpisodeStatistics.solved`.
+        track: where figures are shown as they come, see `tracking`.
         on_begin: called with the run folder as soon as it holds the run, before the first frame.
 
     Raises:
         RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
         KeyboardInterrupt: the user interrupted; the run can be resumed.
     """
+    check_tracker(track)
     trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
     with folder.held():
         other_bits = folder.begin(record_of(request), resume)
@@ -163,7 +167,7 @@ def train(
             progress_view(trainer.learner.frames, show_progress) as view,
             interruption() as interrupted,
         ):
-            _run(trainer, folder, view, interrupted, seconds, milestones, until_solved)
+            _run(trainer, folder, view, interrupted, seconds, milestones, until_solved, track)
     return folder
 
 
@@ -198,6 +202,7 @@ def _run(
     seconds: float,
     milestones: Sequence[int],
     until_solved: bool,
+    track: TrackerName | None,
 ) -> None:
     """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
 
@@ -209,7 +214,8 @@ def _run(
 
     if done():
         return
-    log = MetricsLog(folder.metrics_path, folder.metrics(), seconds)
+    settings = folder.read_record().to_json() if track else {}
+    log = MetricsLog(folder.metrics_path, tracker_of(track, folder.path, settings, folder.metrics(), seconds))
     seen, rows = trainer.frames, _rows_due(trainer)
     saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
     update: Figures | None = None

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.hindsight import hindsight_batch
+from clearway.learn.learner import next_steps
 from clearway.learn.lookahead import Observed, better_policy
 from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient, merged
 from clearway.learn.minibatches import Minibatch, dealt_epochs
@@ -108,7 +109,7 @@ class Trainer:
 
     @property
     def frames_per_update(self) -> int:
-        """Frames that one update uses."""
+        """Frames that one update uses; the last may use fewer."""
         return self.env_count * self.learner.rollout_steps
 
     @property
@@ -126,7 +127,7 @@ class Trainer:
         self._rotate()
         lr, settings = learner.lr_at(self.frames), LossSettings.after(self.frames, learner)
         self.lookup.refresh()
-        rollout = self.collector.collect()
+        rollout = self.collector.collect(self._next_steps())
         self.statistics.add(rollout)
         batch, explained = self._batch(rollout, looks_ahead=settings.lookahead_weight > 0)
         rows = len(batch)
@@ -134,7 +135,7 @@ class Trainer:
             batch = self._with_hindsight(rollout, batch)
         kept = self.collector.kept if self.one_pass and len(batch) == rows else None
         steps = self.learn(batch, kept, lr, settings, self._shuffler(self.updates))
-        self.frames += self.frames_per_update
+        self.frames += self.env_count * rollout.steps
         self.updates += 1
         if self.own_goals:
             self.own_goals.see(self.world.pose(rollout.history[:, :, -1]))
@@ -152,6 +153,12 @@ class Trainer:
             result["own_goals"] = self.own_goals.count
         check_finite(result, self.frames)
         return result
+
+    def _next_steps(self) -> int:
+        """Steps of the next rollout; every scene has a row for every minibatch."""
+        learner, fewest = self.learner, min(count for count in self.collector.rows_per_scene if count)
+        least = -(-learner.minibatches // fewest)
+        return next_steps(self.frames, learner.frames, self.env_count, learner.rollout_steps, least)
 
     def _rotate(self) -> None:
         """Put the environments into other scenes where it is their turn."""
@@ -173,7 +180,7 @@ class Trainer:
         log_pi = torch.log_softmax(rollout.kept.scores, 1)
         action = as_rows(rollout.action)
         log_prob = log_pi.gather(1, action[:, None])[:, 0]
-        value = by_step(rollout.kept.value, learner.rollout_steps)
+        value = by_step(rollout.kept.value, rollout.steps)
         rows_per_scene = self.collector.rows_per_scene
         _, after = self.lookup.judged(rollout.history_after, rollout.target_after, rows_per_scene)
         ended = rollout.reached | rollout.truncated
@@ -193,7 +200,7 @@ class Trainer:
             log_prob,
             as_rows(advantage),
             as_rows(value_target),
-            tuple(count * learner.rollout_steps for count in rows_per_scene),
+            tuple(count * rollout.steps for count in rows_per_scene),
         )
         if learner.lookahead:
             self.observed.add(self.world.pose(batch.history[:, -1]), action, as_rows(rollout.arrived))
@@ -236,7 +243,7 @@ class Trainer:
         learner = self.learner
         told = hindsight_batch(
             rollout,
-            by_step(batch.log_prob, learner.rollout_steps),
+            by_step(batch.log_prob, rollout.steps),
             self.navigation,
             self.lookup,
             discount=learner.discount,

@@ -211,10 +211,8 @@ def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mappi
         kept: `mark`, `taken` and `count` of the episode, see `Follower.begin`; changed.
     """
     mark, count = kept["mark"], int(kept["count"])
-    if action in QUARTERS:
-        origins = [now.turned(-QUARTERS[action])]
-    else:
-        origins = [now.moved(-STEPS[action]), now]
+    turned = action in QUARTERS
+    origins = [now.turned(-QUARTERS[action])] if turned else [now.moved(-STEPS[action]), now]
     if before in origins:
         return
     origin = origins[0]

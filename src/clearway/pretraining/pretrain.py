@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from clearway.choices import TrackerName
 from clearway.errors import ArgumentError, RunError
 from clearway.learn.checkpoint import (
     Progress,
@@ -27,6 +28,7 @@ from clearway.learn.checkpoint import (
 from clearway.learn.interruption import interruption
 from clearway.learn.metrics_log import MetricsLog
 from clearway.learn.optimiser import clip_gradients
+from clearway.learn.tracking import check_tracker, tracker_of
 from clearway.model.precision import multiplies_bfloat16
 from clearway.perception.eyes import EyesEncoder
 from clearway.perception.eyes_network import Eyes
@@ -91,6 +93,7 @@ def pretrain(
     out: Path,
     *,
     resume: bool = False,
+    track: TrackerName | None = None,
     done: Callable[[int], object] = lambda pictures: None,
 ) -> EyesFolder:
     """Train eyes until all pictures are used, and leave them in a folder.
@@ -99,6 +102,7 @@ def pretrain(
         request: what to train on, and how.
         out: the folder.
         resume: go on from the newest checkpoint in `out`; without one, begin.
+        track: where figures are shown as they come, see `learn.tracking`.
         done: is told how many pictures are used.
 
     Raises:
@@ -106,13 +110,14 @@ def pretrain(
         SceneError: a shard is damaged or gone.
         KeyboardInterrupt: the user interrupted; it can be resumed.
     """
+    check_tracker(track)
     folder = EyesFolder(out)
     with folder.held():
         trainer = Pretrainer(request)
         seconds = 0.0
         if folder.begin(record_of(request), resume):
             seconds = _resumed(trainer, folder)
-        _run(trainer, folder, done, seconds)
+        _run(trainer, folder, done, seconds, track)
         folder.write_eyes(trainer.eyes, trainer.pictures)
     return folder
 
@@ -227,11 +232,18 @@ def _resumed(trainer: Pretrainer, folder: EyesFolder) -> float:
     return progress.seconds
 
 
-def _run(trainer: Pretrainer, folder: EyesFolder, done: Callable[[int], object], seconds: float) -> None:
+def _run(
+    trainer: Pretrainer,
+    folder: EyesFolder,
+    done: Callable[[int], object],
+    seconds: float,
+    track: TrackerName | None,
+) -> None:
     """Update until all pictures are used or the user interrupts; ends with a checkpoint either way."""
     if trainer.finished:
         return
-    log = MetricsLog(folder.metrics_path, folder.metrics(), seconds)
+    settings = {"seed": trainer.request.seed, **trainer.settings.to_json()}
+    log = MetricsLog(folder.metrics_path, tracker_of(track, folder.path, settings, folder.metrics(), seconds))
     every = max(1, trainer.settings.updates // ROWS)
     saved_at = time.monotonic()
     with interruption() as interrupted:

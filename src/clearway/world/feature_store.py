@@ -42,13 +42,13 @@ def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | No
     first = scenes[0]
     for scene in scenes:
         if scene.features is None or first.features is None:
-            raise SceneError(scene.name, "only some of the scenes have features", "Encode all scenes together")
+            raise SceneError(scene.name, "only some of the scenes have features", _remedy(first))
         if scene.features.shape[1] != first.features.shape[1]:
             sizes = f"{scene.features.shape[1]} features a state, {first.name} has {first.features.shape[1]}"
-            raise SceneError(scene.name, sizes, "Encode all scenes with the same encoder", "resnet_feature")
+            raise SceneError(scene.name, sizes, _remedy(first), "resnet_feature")
         if _identity(scene) != _identity(first):
             problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
-            raise SceneError(scene.name, problem, "Encode all scenes together with one encoder", "resnet_feature")
+            raise SceneError(scene.name, problem, _remedy(first), "resnet_feature")
     assert first.features is not None
     joined = empty_store(sum(scene.state_count for scene in scenes), first.features.shape[1], store)
     for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
@@ -62,6 +62,12 @@ def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | No
 
 def _identity(scene: Scene) -> str:
     return f"{scene.encoder.name} ({scene.encoder.identity})" if scene.encoder else "an unknown encoder"
+
+
+def _remedy(scene: Scene) -> str:
+    """The command that gives scenes features of one encoder: that of this scene, else the default one."""
+    name = scene.encoder.name if scene.encoder else "clearway"
+    return f"Encode all of them together: clearway scenes encode FILES --encoder {name} --out FOLDER"
 
 
 def empty_store(states: int, features: int, store: FeatureStore) -> Tensor:

@@ -1,0 +1,74 @@
+"""The settings of a run as a file: `clearway train --config RUN/run.yaml --out ANOTHER` repeats the run.
+
+Nothing is left to defaults that another version, or the scenes, could change: the algorithm's settings stand there one
+by one, and the targets by their numbers. Keys are the options of `clearway train`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from clearway.errors import ClearwayError
+from clearway.learn.run_folder import RunFolder, RunRecord
+from clearway.reward import REWARDS, Reward
+from clearway.settings_file import write_settings
+
+SETTINGS_FILE = "run.yaml"
+OPTIONS = ("frames", "feature_basis", "goals")  # settings of algorithms that have options of their own
+HEAD = "The settings of this run. To repeat it: clearway train --config run.yaml --out ANOTHER_FOLDER"
+
+
+def leave_settings(folder: Path, reward: Mapping[str, Any] | None, **further: object) -> None:
+    """Write a run's settings into its folder, where it can be repeated from files and words alone.
+
+    Args:
+        folder: of a run that has begun.
+        reward: the reward as options, see `reward_options`; None: by no words.
+        further: other options, such as threads; those that are None, False or empty are left out.
+    """
+    record = RunFolder(folder).read_record()
+    if reward is None or any(scene.path is None for scene in record.scenes):
+        return
+    write_settings(folder / SETTINGS_FILE, {**_of_record(record), **reward, **_given(further)}, HEAD)
+
+
+def reward_options(reward: str | Reward) -> dict[str, Any] | None:
+    """A reward as options: its name, and the parameters in which it differs; None where these do not say it."""
+    if isinstance(reward, str):
+        return {"reward": reward}
+    name = reward.name.partition(",")[0]
+    if name not in REWARDS:
+        return None
+    known = REWARDS[name].parameters
+    changed = {key: value for key, value in reward.parameters.items() if known.get(key) != value}
+    try:
+        same = REWARDS[name].with_changes(clip=None, **changed).terms == reward.terms
+    except ClearwayError:
+        return None
+    return {"reward": name, **changed} if same else None
+
+
+def _of_record(record: RunRecord) -> dict[str, Any]:
+    """What a run's record says, as options."""
+    learner = asdict(record.learner)
+    own = {name: learner.pop(name) for name in OPTIONS if name in learner}
+    return {
+        "files": [scene.path for scene in record.scenes],
+        "targets": {scene.name: list(scene.targets) for scene in record.scenes},
+        "algorithm": record.learner.algorithm,
+        **own,
+        "set": learner,
+        "seed": record.seed,
+        "zones": record.zone_level,
+        "device": str(record.hardware.get("device", "cpu")),
+        "feature_store": str(record.hardware.get("feature_store", "memory")),
+    }
+
+
+def _given(options: Mapping[str, object]) -> dict[str, object]:
+    """Options that say something; several words as a list."""
+    said = {name: value for name, value in options.items() if value not in (None, False, (), "")}
+    return {name: list(value) if isinstance(value, tuple | list) else value for name, value in said.items()}

@@ -1,0 +1,71 @@
+"""Files of settings in YAML, such as a run's `run.yaml`: read within limits, as plain values only, and written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from clearway.errors import ClearwayError
+from clearway.files import written_whole
+
+MAX_BYTES = 1024**2
+
+
+class _Loader(yaml.SafeLoader):
+    """Plain values alone; a key that occurs twice is refused, and so is what refers to another place of the file."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Refuse aliases, by which a small file could become a large one."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.MarkedYAMLError(problem="an alias (*), which is not read here", problem_mark=mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Refuse a key that occurs twice."""
+        found = set()
+        for key, _ in node.value:
+            if key.value in found:
+                problem = f"the key {str(key.value)[:40]} occurs twice"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+            if isinstance(key.value, str):
+                found.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """What a YAML file of settings holds, by key; empty where it holds nothing.
+
+    Raises:
+        ClearwayError: there is no such file, it is too large, no YAML, or no mapping with words as keys.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as fault:
+        raise ClearwayError(f"{path}: not readable ({fault.strerror}). Name a YAML file of settings") from fault
+    if len(content) > MAX_BYTES:
+        raise ClearwayError(f"{path}: larger than {MAX_BYTES // 1024**2} MiB, too large for settings. Name another")
+    try:
+        read = yaml.load(content.decode("utf-8"), _Loader)
+    except yaml.MarkedYAMLError as fault:
+        where = f", line {fault.problem_mark.line + 1}" if fault.problem_mark else ""
+        raise ClearwayError(f"{path}{where}: no YAML ({fault.problem}). Correct it") from fault
+    except (yaml.YAMLError, ValueError, RecursionError, TypeError) as fault:
+        reason = " ".join(str(fault).split())[:200]
+        raise ClearwayError(f"{path}: no YAML ({reason}). Correct it") from fault
+    if read is None:
+        return {}
+    if not isinstance(read, dict) or not all(isinstance(key, str) for key in read):
+        raise ClearwayError(f"{path}: expected lines such as frames: 600000, a name of an option each. Correct it")
+    return read
+
+
+def write_settings(path: Path, settings: Mapping[str, Any], head: str) -> None:
+    """Write settings, plain values by key, under a comment of one line."""
+    text = yaml.safe_dump(dict(settings), sort_keys=False, allow_unicode=True, width=100)
+    with written_whole(path) as part:
+        part.write_text(f"# {head}\n{text}", encoding="utf-8")

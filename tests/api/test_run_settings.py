@@ -1,0 +1,37 @@
+"""A run's settings as a file, from Python."""
+
+from clearway.api.run_settings import reward_options
+from clearway.api.training import train
+from clearway.learn.run_folder import RunFolder
+from clearway.reward import BUMP, REWARDS, Arrival, Reward, Term, Time
+from clearway.scenes.thor_v1 import write_scene
+from clearway.settings_file import read_settings
+from helpers.small_runs import small_scenes
+
+SMALL = {"envs": 20, "rollout_steps": 8, "width": 16, "frames": 320}
+
+
+class Own(Term):
+    pass
+
+
+def test_a_reward_as_options():
+    assert reward_options("bump") == {"reward": "bump"}
+    assert reward_options(BUMP.with_changes(alpha=-0.5)) == {"reward": "bump", "alpha": -0.5}
+    for name, reward in REWARDS.items():
+        assert reward_options(reward) == {"reward": name}
+    assert reward_options(Reward("mine", (Time(), Arrival()))) is None
+    assert reward_options(Reward("bump", (Time(), Arrival()))) is None
+
+
+def test_a_training_from_files_leaves_its_settings_and_one_from_memory_none(tmp_path):
+    scene = small_scenes()[0]
+    write_scene(scene, tmp_path / "a.h5")
+    train(tmp_path / "a.h5", out=tmp_path / "run", until_solved=True, perturb=(), seed=2, **SMALL)
+    settings = read_settings(tmp_path / "run" / "run.yaml")
+    assert settings["files"] == [str((tmp_path / "a.h5").resolve())]
+    assert (settings["until"], settings["seed"], settings["frames"]) == ("solved", 2, 320)
+    targets = RunFolder(tmp_path / "run").read_record().targets
+    assert settings["targets"] == {name: list(states) for name, states in targets.items()}
+    train(scene, out=tmp_path / "other", **SMALL)
+    assert not (tmp_path / "other" / "run.yaml").exists()
