@@ -49,6 +49,7 @@ ORDER = (
     {"viz"},
     {"web"},
     {"view"},
+    {"examples"},
     {"serve"},
     {"api", "gymnasium_hook"},
     {"cli"},
