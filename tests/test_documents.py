@@ -129,7 +129,7 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
-    at_once, commands, imports, generalist = code_blocks(ROOT / "docs/commands.md")
+    at_once, commands, runs, imports, generalist = code_blocks(ROOT / "docs/commands.md")
     opened = {"clearway view --example   ": f"{UNTIL_STOPPED}view --example || test $? = 124  "}
     done = run_block(Block("sh", shortened(at_once.text, opened)), tmp_path)
     assert done.returncode == 0, done.stderr
@@ -145,7 +145,8 @@ def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
         "reproduce all": "reproduce fig3 --rooms bathroom --frames 4000",
     }
     prepare_stand_ins(tmp_path)
-    for block in (Block("sh", shortened(commands.text, changes)), imports):
+    brief = Block("sh", shortened(runs.text, {"--frames 6e5": "--frames 4e3"}))
+    for block in (Block("sh", shortened(commands.text, changes)), brief, imports):
         done = run_block(block, tmp_path)
         assert done.returncode == 0, done.stderr
     changes = {
