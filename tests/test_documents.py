@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from PIL import Image, ImageSequence
 
+from clearway.view.bundle import bundled
+from clearway.view.content import page_files
+from clearway.view.saved import MODULES, SCRIPTS
 from helpers.documents import ROOT, Block, code_blocks, run_block, shortened
 
 UNTIL_STOPPED = "timeout 30 clearway "
@@ -115,18 +118,23 @@ def test_the_readme_s_blocks_run(tmp_path: Path) -> None:
         ".venv/bin/clearway view demo/runs/shortest demo/runs/collision-aware": (
             f"{train}{UNTIL_STOPPED}view runs/bathroom runs/bathroom || test $? = 124"
         ),
+        ".venv/bin/clearway view --example ": f"{UNTIL_STOPPED}view --example || test $? = 124 ",
         ".venv/bin/clearway view --agent generalist --room 7": (
             f"{UNTIL_STOPPED}view --agent generalist --room 7 || test $? = 124"
         ),
     }
     done = run_block(Block("sh", shortened(watching.text, changes)), tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("http://127.0.0.1:") == 2
+    assert done.stdout.count("http://127.0.0.1:") == 3
 
 
 @pytest.mark.slow
 def test_the_commands_page_s_blocks_run(tmp_path: Path) -> None:
-    commands, runs, again, imports, generalist, encode = code_blocks(ROOT / "docs/commands.md")
+    at_once, commands, runs, again, imports, generalist, encode = code_blocks(ROOT / "docs/commands.md")
+    opened = {"clearway view --example   ": f"{UNTIL_STOPPED}view --example || test $? = 124  "}
+    done = run_block(Block("sh", shortened(at_once.text, opened)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "page/index.html").exists()
     changes = {
         "build --room all --out scenes ": "build --room bathroom --out scenes/bathroom.h5",
         "train scenes ": "train scenes --frames 4000 ",
@@ -197,3 +205,13 @@ def prepare_stand_ins(folder: Path) -> None:
     for block in (Block("sh", build + export), here):
         done = run_block(block, folder)
         assert done.returncode == 0, done.stderr
+
+
+def test_the_live_page_is_small_and_that_of_this_version() -> None:
+    folder = ROOT / "docs/live"
+    assert sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) < 3_000_000
+    files = {name: content.decode() for name, (content, _) in page_files().items()}
+    remedy = "make it again: clearway view --example --save docs/live"
+    assert (folder / "page/page.js").read_text() == bundled(files, "app.js"), remedy
+    assert (folder / "page/style.css").read_text() == files["style.css"], remedy
+    assert (folder / "index.html").read_text() == files["index.html"].replace(MODULES, SCRIPTS), remedy

@@ -12,7 +12,7 @@ import pytest
 
 from clearway import files
 from clearway.errors import ClearwayError
-from clearway.files import json_text, written_whole
+from clearway.files import folder_written_whole, json_text, written_whole
 
 WRITER = """
 import sys; sys.path[:] = {path!r}
@@ -133,3 +133,29 @@ def test_a_cache_in_the_home_of_nobody_is_one_clear_error(monkeypatch: pytest.Mo
     monkeypatch.setenv("CLEARWAY_CACHE", "~nobody-of-this-name/cache")
     with pytest.raises(ClearwayError, match="CLEARWAY_CACHE=~nobody-of-this-name/cache: there is no such home folder"):
         files.cache_dir()
+
+
+def test_a_folder_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), folder_written_whole(tmp_path / "page") as part:
+        (part / "half").write_text("half")
+        raise RuntimeError
+    assert names(tmp_path) == []
+    (tmp_path / "page").mkdir()
+    with folder_written_whole(tmp_path / "page") as part:
+        (part / "whole").write_text("whole")
+        assert names(tmp_path / "page") == []
+    assert (names(tmp_path), names(tmp_path / "page")) == (["page"], ["whole"])
+    for taken in (tmp_path / "page", tmp_path / "page/whole"):
+        with pytest.raises(ClearwayError, match="no empty folder"), folder_written_whole(taken):
+            raise AssertionError("never begun")
+
+
+def test_an_unfinished_folder_of_a_killed_process_goes(tmp_path: Path) -> None:
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    left = tmp_path / f".page.{files._host()}-{dead.pid}-x.part"
+    left.mkdir()
+    (left / "half").touch()
+    with folder_written_whole(tmp_path / "other") as part:
+        (part / "whole").touch()
+    assert names(tmp_path) == ["other"]

@@ -50,6 +50,7 @@ ORDER = (
     {"viz"},
     {"web"},
     {"view"},
+    {"examples"},
     {"serve"},
     {"api", "gymnasium_hook"},
     {"cli"},

@@ -8,6 +8,7 @@ import math
 import os
 import platform
 import re
+import shutil
 import tempfile
 import zlib
 from collections.abc import Iterator
@@ -54,6 +55,37 @@ def written_whole(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def check_free(folder: Path) -> None:
+    """Raise ClearwayError where there is something already, other than an empty folder."""
+    if folder.is_symlink() or (folder.exists() and (not folder.is_dir() or any(folder.iterdir()))):
+        raise ClearwayError(f"{folder}: exists and is no empty folder. Give another one, or remove it")
+
+
+@contextmanager
+def folder_written_whole(path: Path) -> Iterator[Path]:
+    """A temporary folder beside `path` to write into; it becomes `path` on success, and is removed on any failure.
+
+    What processes that were killed left unfinished beside it is removed.
+
+    Raises:
+        ClearwayError: `path` is there and is no empty folder.
+        OSError: the folder cannot be made.
+    """
+    check_free(path)
+    final = path.resolve()
+    final.parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(final.parent)
+    part = Path(tempfile.mkdtemp(prefix=f".{final.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=final.parent))
+    try:
+        yield part
+        part.chmod(0o777 & ~_umask())
+        if final.exists():
+            final.rmdir()
+        part.replace(final)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
 @contextmanager
 def _faults_named(part: Path, path: Path) -> Iterator[None]:
     """Let errors of writing `part`, which name it or nothing, name `path`."""
@@ -70,7 +102,10 @@ def _remove_leftovers(folder: Path) -> None:
     for part in folder.glob(".*.part"):
         maker = PART_NAME.fullmatch(part.name)
         if maker and maker["host"] == _host() and not _is_alive(int(maker["process"])):
-            part.unlink(missing_ok=True)
+            if part.is_dir() and not part.is_symlink():
+                shutil.rmtree(part, ignore_errors=True)
+            else:
+                part.unlink(missing_ok=True)
 
 
 def _host() -> str:

@@ -25,6 +25,7 @@ from clearway.scenes.validate import SceneWarning
 
 COMMANDS = {
     "demo",
+    "examples",
     "scenes build",
     "scenes generate",
     "scenes views",

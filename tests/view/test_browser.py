@@ -102,8 +102,8 @@ def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -
     shown(page, "4 / 4")
     assert (number(page, "you", "to_go"), number(page, "you", "collisions")) == ("0", "1")
     assert number(page, "you", "earned") == "9.95"  # 10 - 0.02 - 0.02 - 0.011, by the collision-aware reward
-    expect(page.locator('[data-walker="you"] .badge')).to_have_text("reached")
-    expect(page.locator("#status")).to_contain_text("you: target reached in 4 steps, 1 collision")
+    expect(page.locator('[data-walker="you"] .badge')).to_have_text("winner")
+    expect(page.locator("#status")).to_contain_text("you: target reached in 4 steps, 1 collision. You win, in 4 steps")
     assert int(number(page, "aware", "steps")) == int(number(page, "plain", "steps")) == 4
     shares = page.locator('[data-walker="aware"] .share').all_inner_texts()
     assert sum(float(share.removesuffix(" %")) for share in shares) == pytest.approx(100, abs=2.1)
@@ -202,6 +202,69 @@ def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[...,
     assert pixels(page) != plain
     page.keyboard.press("n")
     shown(page, "1 / 1")
+
+
+def test_play_at_the_end_starts_over(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor&start=4&target=8&seed=52")
+    page.locator("#speed").fill("5")
+    page.get_by_role("button", name="Play").click()
+    expect(page.locator(".badge.good")).to_have_count(2)
+    end = page.locator("#position").inner_text().partition(" / ")[2]
+    shown(page, f"{end} / {end}")
+    page.locator("#speed").fill("0")
+    page.get_by_role("button", name="Play").click()
+    expect(page.locator("#position")).to_have_text(re.compile(rf"^[01] / {end}$"))
+    expect(page.locator("body.playing")).to_be_visible()
+
+
+def test_the_page_says_who_walks_where_and_cuts_no_name(opened: Callable[..., Page]) -> None:
+    page = opened("scene=corridor&start=4&target=8", viewport=PHONE)
+    expect(page.locator("h1")).to_contain_text("corridor: aware and plain, to where the target's picture was taken")
+    names = page.locator(".walker h2")
+    for name in ("collision-aware, after a long night", "shortest-path-agent-of-the-longest-name"):
+        names.first.evaluate("(heading, name) => (heading.textContent = name)", name)
+        box = "({ scrollWidth, clientWidth }) => [scrollWidth, clientWidth]"
+        wide, room = names.first.evaluate(box)
+        assert wide <= room
+        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_the_star_is_seen_round_those_who_stand_on_it(opened: Callable[..., Page]) -> None:
+    green = """(canvas) => {
+        const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+        copy.drawImage(canvas, 0, 0);
+        const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+        let found = 0;
+        for (let i = 0; i < data.length; i += 4) found += data[i] === 0 && data[i + 1] === 135 && data[i + 2] === 108;
+        return found;
+    }"""
+    page = opened("scene=corridor&start=4&target=8&seed=52")
+    apart = page.locator("#map").evaluate(green)
+    page.locator("#speed").fill("5")
+    page.get_by_role("button", name="Play").click()
+    expect(page.locator(".badge.good")).to_have_count(2)
+    assert page.locator("#map").evaluate(green) > 0.6 * apart > 0
+
+
+RACE = {
+    "alone": ([(4, 1), (6, 0)], [0], {"index": 0, "text": "a wins, in 4 steps"}),
+    "together": ([(4, 1), (4, 0)], [0, 1], {"index": 1, "text": "b wins, with fewer collisions (0)"}),
+    "tie": ([(4, 1), (4, 1)], [0, 1], {"index": None, "text": "A tie: a and b"}),
+    "none": ([(4, 1), (4, 1)], [], None),
+}
+
+
+@pytest.mark.parametrize("case", RACE)
+def test_a_race_is_won_by_who_arrives_first(opened: Callable[..., Page], case: str) -> None:
+    walks, first, expected = RACE[case]
+    walkers = [
+        {"name": name, "steps": [{"collisions": bumps}] * (steps + 1)}
+        for name, (steps, bumps) in zip("ab", walks, strict=True)
+    ]
+    page = opened("scene=corridor")
+    script = "async ([walkers, first]) => (await import('./page/verdict.js')).verdict(walkers, first)"
+    found = page.evaluate(script, [walkers, first])
+    assert found == expected
 
 
 def test_depth_is_a_switch_away_where_the_scene_has_it(opened: Callable[..., Page]) -> None:

@@ -18,6 +18,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from clearway.view import server
+from clearway.view.content import grey
 from clearway.view.stage import Stage
 
 
@@ -134,7 +135,7 @@ def test_depth_is_shown_in_grey_from_near_to_far(address: str, stage: Stage) -> 
     assert np.ptp(expected) > 20
     assert np.abs(found - expected[..., None]).mean() < 6
     sensor = stage.scenes[0].sensors[1]
-    assert server.grey(np.array([0.0, 20.0], np.float32), sensor).tolist() == [255, 0]
+    assert grey(np.array([0.0, 20.0], np.float32), sensor).tolist() == [255, 0]
 
 
 def test_an_episode_over_the_socket(address: str) -> None:

@@ -7,7 +7,7 @@ import torch
 
 from clearway.errors import RunError, SceneError
 from clearway.reward import Reward
-from clearway.view.stage import Stage, _has, run_stage, scene_stage
+from clearway.view.stage import Stage, _has, run_stage, scene_stage, variety
 from helpers.agents import after_poses
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import FEATURES
@@ -110,3 +110,16 @@ def test_a_scene_alone_has_no_agents(stage: Stage) -> None:
     world = shown.user_world(shown.scenes[0], 3)
     assert world.scene_state(0) == 3
     np.testing.assert_array_equal(world.blocked.numpy(), shown.scenes[0].graph < 0)
+
+
+def test_the_first_target_is_no_wall(stage: Stage) -> None:
+    fine = np.indices((300, 400)).sum(0) % 20 < 10  # bricks
+    wall = np.repeat(np.where(fine, 90, 170).astype(np.uint8)[..., None], 3, axis=2)
+    view = np.full((300, 400, 3), 120, np.uint8)
+    view[:150], view[150:, :200] = 240, 30
+    assert variety(view) > 5 * variety(wall)
+    scene = corridor_scene(5)
+    pictures = np.stack([view if state == 6 else wall for state in range(scene.state_count)])
+    shown = Stage((replace(scene, observations=pictures),), {scene.name: (2, 6, 9)})
+    assert shown.first_target(scene.name) == 6
+    assert stage.first_target("bare") == stage.targets["bare"][0]  # without pictures

@@ -20,6 +20,7 @@ from clearway.cli.console import showing_warnings
 from clearway.cli.demo import Demo
 from clearway.cli.encode import EncodeScenes
 from clearway.cli.evaluate import Evaluate
+from clearway.cli.examples import Examples
 from clearway.cli.export import ExportAgent
 from clearway.cli.generate import Generate
 from clearway.cli.imports.command import ImportScenes
@@ -40,7 +41,7 @@ from clearway.errors import ArgumentError, ClearwayError
 
 DESCRIPTION = (
     "Train, evaluate and look at agents that walk to the place where a picture was taken "
-    "and anticipate collisions on the way. Begin with: clearway demo"
+    "and anticipate collisions on the way. Begin with: clearway view --example"
 )
 
 
@@ -69,6 +70,7 @@ class Scenes:
 
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Examples, tyro.conf.subcommand("examples")]
     | Annotated[Scenes, tyro.conf.subcommand("scenes")]
     | Annotated[Pretrain, tyro.conf.subcommand("pretrain")]
     | Annotated[Train, tyro.conf.subcommand("train")]

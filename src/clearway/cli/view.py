@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from clearway.cli.arguments import check_at_least, scene_files
-from clearway.cli.console import stderr_console
+from clearway.cli.console import say, stderr_console
 from clearway.cli.generate import chosen_room
 from clearway.errors import ClearwayError
+from clearway.files import check_free
 
 if TYPE_CHECKING:
     from clearway.view.stage import Stage
@@ -24,7 +25,7 @@ MOST_RUNS = 2
 class ViewRuns:
     """Watch an agent in the browser, or two side by side from the same start; drive, and race it.
 
-    Example: clearway view runs/collision-aware runs/shortest
+    Example: clearway view --example
     """
 
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
@@ -32,6 +33,8 @@ class ViewRuns:
     seen."""
     agent: Literal["generalist"] | None = None
     """The same as the word generalist in front."""
+    example: bool = False
+    """Open what comes along: two trained agents in a bathroom, or, with generalist, the generalist there."""
     room: int | None = None
     """Seed of a room for the generalist, made at once: kitchen, living room, bedroom and bathroom in turn."""
     tour: int = 0
@@ -44,17 +47,37 @@ class ViewRuns:
     """Where the page is served on this machine; 0 for any free port."""
     open: bool = False
     """Open the browser too."""
+    save: Path | None = None
+    """Write a page with recorded episodes into this new folder, and serve nothing."""
+    episodes: int | None = None
+    """With --save: episodes from drawn starts to each target, by default 3; that of --episode comes first."""
 
     def run(self) -> None:
-        """Serve the page until interrupted."""
-        _show(self._stage(), self.port, self.episode, self.open)
+        """Serve the page until interrupted, or save it."""
+        if self.save is None and self.episodes is not None:
+            raise ClearwayError("--episodes: is for a saved page. Give its folder with --save, or leave it out")
+        check_at_least(1, episodes=self.episodes)
+        if self.save is not None:
+            check_free(self.save)
+            for name, given in {"port": self.port, "open": self.open}.items():
+                if given:
+                    raise ClearwayError(f"--{name}: a saved page is not served. Leave out --{name} or --save")
+        stage, opening = self._stage()
+        if self.save is None:
+            _show(stage, self.port, self.episode or opening, self.open)
+        else:
+            _save(stage, self.save, self.episode or opening, self.episodes)
 
-    def _stage(self) -> Stage:
+    def _stage(self) -> tuple[Stage, str]:
+        """The stage, and the episode to open with where none is given."""
         from clearway.choices import is_generalist
 
         first = self.folders[:1]
-        if self.agent or any(map(is_generalist, first)):
-            return self._generalist(self.folders if self.agent else self.folders[1:])
+        generalist = bool(self.agent) or any(map(is_generalist, first))
+        if self.example:
+            return self._example(generalist)
+        if generalist:
+            return self._generalist(self.folders if self.agent else self.folders[1:]), ""
         from clearway.view.stage import run_stage
 
         if self.room is not None:
@@ -62,8 +85,23 @@ class ViewRuns:
         if self.tour:
             raise ClearwayError("--tour: agents of runs keep no map. Leave it out, or view generalist")
         if not 1 <= len(self.folders) <= MOST_RUNS:
-            raise ClearwayError(f"{len(self.folders)} run folders, one or two can be shown. Name one or two")
-        return run_stage(self.folders, scene_files(self.scenes) if self.scenes else None)
+            told = f"{len(self.folders)} run folders, one or two can be shown. Name one or two"
+            raise ClearwayError(told if self.folders else f"{told}, or see what comes along: clearway view --example")
+        return run_stage(self.folders, scene_files(self.scenes) if self.scenes else None), ""
+
+    def _example(self, generalist: bool) -> tuple[Stage, str]:
+        from clearway.examples.stage import example_stage, generalist_example
+
+        named = self.folders if self.agent or not generalist else self.folders[1:]
+        for name, given in {"a run or scene": named, "--scenes": self.scenes, "--room": self.room is not None}.items():
+            if given:
+                raise ClearwayError(f"--example: has its own agents and scene, and {name} was given too. Leave one out")
+        check_at_least(0, tour=self.tour)
+        if generalist:
+            return generalist_example(self.tour), ""
+        if self.tour:
+            raise ClearwayError("--tour: agents of runs keep no map. Leave it out, or view generalist")
+        return example_stage()
 
     def _generalist(self, files: tuple[Path, ...]) -> Stage:
         from clearway.api.scenes import load_scenes
@@ -100,6 +138,14 @@ class ViewScene:
         if others:
             raise ClearwayError(f"{self.file}: a folder of {1 + len(others)} scene files. Name one, such as {path}")
         _show(scene_stage(read_scene(path)), self.port, "", self.open)
+
+
+def _save(stage: Stage, folder: Path, first: str, episodes: int | None) -> None:
+    """Save the page, and say where it is and how large."""
+    from clearway.view.saved import EPISODES, save_page
+
+    size = save_page(stage, folder, first=first, episodes=episodes or EPISODES)
+    say(f"{folder / 'index.html'}: {size.episodes} episodes, {size.files} files, {size.megabytes:.1f} MB. Open it")
 
 
 def _show(stage: Stage, port: int, episode: str, in_browser: bool) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from PIL import Image
 
 from clearway.agents.agent import Agent, State
 from clearway.agents.by_pose import network_on_poses
@@ -21,6 +22,8 @@ from clearway.reward import COLLISION_AWARE, Reward
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 from clearway.world.world import World, scene_tables
+
+PARTS = 16, 12  # of a picture, across and down
 
 
 class StageAgent(Protocol):
@@ -125,6 +128,7 @@ class Stage:
     scenes: tuple[Scene, ...]
     targets: dict[str, tuple[int, ...]]
     agents: tuple[StageAgent, ...] = ()
+    _first: dict[str, int] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def zone_level(self) -> ZoneLevel:
@@ -135,6 +139,16 @@ class Stage:
     def reward(self) -> Reward:
         """What a user who drives earns: as the first agent."""
         return self.agents[0].reward if self.agents else COLLISION_AWARE
+
+    def first_target(self, name: str) -> int:
+        """Of the targets offered in a scene the one whose picture tells most: no wall that fills it."""
+        scene, offered = self.scenes[self.index(name)], self.targets[name]
+        if name not in self._first:
+            pictures = scene.observations
+            self._first[name] = (
+                offered[0] if pictures is None else max(offered, key=lambda state: variety(pictures[state]))
+            )
+        return self._first[name]
 
     def index(self, name: str) -> int:
         """Place of a scene in `scenes`.
@@ -157,17 +171,23 @@ class Stage:
         return self._user_world.with_targets({scene.name: (target,)})
 
 
+def variety(picture: np.ndarray) -> float:
+    """How much the large parts (16 x 12) of a picture (h, w, 3) uint8 differ: little where a wall fills it."""
+    small = Image.fromarray(np.asarray(picture)).resize(PARTS, Image.Resampling.BOX)
+    return float(np.asarray(small, np.float64).std(axis=(0, 1)).mean())
+
+
 def scene_stage(scene: Scene) -> Stage:
     """A scene to walk through without an agent."""
     return Stage((scene,), {scene.name: default_targets(scene)})
 
 
-def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None) -> Stage:
+def run_stage(folders: Sequence[Path], given: Sequence[Path | Scene] | None = None) -> Stage:
     """The agents of one or two runs, in the scenes that they share.
 
     Args:
         folders: of the runs.
-        scene_files: where the scenes are, if no longer where they were at training.
+        given: the scenes, or their files, if no longer where they were at training.
 
     Raises:
         RunError: a run cannot be used, or the two share no scene.
@@ -175,7 +195,7 @@ def run_stage(folders: Sequence[Path], scene_files: Sequence[Path] | None = None
     agents = []
     for folder, name in zip(folders, _names(folders), strict=True):
         trained = load_network(folder)
-        agents.append(StageRun(name, trained, tuple(run_scenes(trained.record, scene_files))))
+        agents.append(StageRun(name, trained, tuple(run_scenes(trained.record, given))))
         agents[-1].make_ready()
     first, *others = agents
     scenes = tuple(scene for scene in first.scenes if all(_has(other, scene) for other in others))

@@ -52,8 +52,7 @@ class Viewing:
     def _answer(self, message: object) -> Message:
         match message:
             case {"do": "begin", "episode": str(query)}:
-                self.begin(read_episode(query))
-                return self._whole_episode()
+                return self.tell(read_episode(query))
             case {"do": "step"} if self.walkers:
                 return self._step([None] * len(self.walkers), set(range(len(self.walkers))))
             case {"do": "drive", "action": int(action), "along": bool(along)} if 0 <= action < ACTION_COUNT:
@@ -73,7 +72,7 @@ class Viewing:
             ClearwayError: the scene, start or target does not exist or leads nowhere; the old episode stays.
         """
         scene = self.stage.scenes[self.stage.index(wanted.scene) if wanted.scene is not None else 0]
-        target = self.stage.targets[scene.name][0] if wanted.target is None else wanted.target
+        target = self.stage.first_target(scene.name) if wanted.target is None else wanted.target
         drive = wanted.drive or not self.stage.agents
         worlds = [shown.place(scene.name, target) for shown in self.stage.agents]
         worlds += [self.stage.user_world(scene, target)] if drive else []
@@ -102,6 +101,11 @@ class Viewing:
             )
             walkers.append(walk)
         self.episode, self.walkers = episode, walkers
+
+    def tell(self, wanted: Episode) -> Message:
+        """Begin an episode; what the page is told of it. Raises ClearwayError as `begin` does."""
+        self.begin(wanted)
+        return self._whole_episode()
 
     def names(self, episode: Episode) -> list[str]:
         """Of an episode's walkers, in their order."""

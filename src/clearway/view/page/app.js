@@ -5,19 +5,21 @@ import { connect, fetched } from "./connection.js";
 import { listenToKeys } from "./keys.js";
 import { showLegend } from "./legend.js";
 import { createMap } from "./map.js";
+import { openSaved, saved } from "./saved.js";
+import { counted, verdict } from "./verdict.js";
 
 const $ = (id) => document.getElementById(id);
 const STEPS_PER_S = [1, 2, 4, 8, 16, 30];
 const STATUS_MS = 6000;
 
-const known = { stage: null, scene: null, sceneIndex: -1, episode: null, walkers: [], ended: [], cards: [], pictures: null, minds: new Map(), link: "" };
+const known = { stage: null, scene: null, sceneIndex: -1, episode: null, walkers: [], ended: [], cards: [], pictures: null, minds: new Map(), link: "", first: [] };
 let shown = 0; // the step looked at
 let playing = false;
 let turn = 0; // of playing: an older loop notices that it is over
 let asked = Promise.resolve(); // done when the last question's answer is taken in
 
 const map = createMap($("map"), pick, (state) => ($("cursor").textContent = state === null ? "" : `Cursor: ${nameOf(state)}`));
-const viewer = connect((reason) => say(reason ?? "The viewer has ended. Start it again, then load its new address.", true, false));
+const viewer = saved ? openSaved() : connect((reason) => say(reason ?? "The viewer has ended. Start it again, then load its new address.", true, false));
 
 async function start() {
   known.stage = await fetched("stage.json");
@@ -25,11 +27,19 @@ async function start() {
   $("mind").replaceChildren(...known.stage.agents.map((agent, index) => element("option", { value: index, textContent: agent.name })));
   const some = { agent: known.stage.agents.length > 0, values: known.stage.agents.some(({ values }) => values), map: known.stage.agents.some((agent) => agent.map) };
   for (const [what, there] of Object.entries(some)) for (const part of document.querySelectorAll(`.needs-${what}`)) part.hidden = !there;
+  for (const part of document.querySelectorAll(".needs-viewer")) part.hidden ||= Boolean(saved);
   if (some.map) document.querySelector("input[name=layer][value=held]").checked = true;
   $("scene-field").hidden = known.stage.scenes.length < 2;
   document.title = `clearway: ${known.stage.agents.map((agent) => agent.name).join(", ") || known.stage.scenes[0]}`;
   $("speed").dispatchEvent(new Event("input"));
   await load(location.hash.slice(1));
+}
+
+// Who walks where, in words: the page's title.
+function titled() {
+  const names = known.stage.agents.map(({ name }) => name), room = known.scene.name.replaceAll("_", " ");
+  const walking = names.length ? `${names.join(" and ")}, to where the target's picture was taken` : "a walk to where the target's picture was taken";
+  $("about").textContent = `${room}: ${walking}${saved ? " (recorded)" : ""}`;
 }
 
 async function load(query) {
@@ -77,9 +87,10 @@ async function takeEpisode(answer) {
     const scene = await fetched(`scenes/${answer.scene}/map.json`);
     await map.setScene(scene, `scenes/${answer.scene}/above.jpg`);
     Object.assign(known, { scene, sceneIndex: answer.scene });
+    titled();
     showSensors();
   }
-  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link });
+  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link, first: [] });
   if (!before || before.scene !== answer.scene || before.target !== answer.target) known.minds.clear();
   shown = 0;
   $("scene").value = known.scene.name;
@@ -115,11 +126,9 @@ function takeSteps(answer) {
   answer.steps.forEach((step, index) => step && known.walkers[index].steps.push(step));
   const arrived = answer.steps.flatMap((step, index) => (step?.reached ? [index] : []));
   Object.assign(known, { ended: answer.ended, link: answer.link });
+  if (!known.first.length) known.first = arrived; // of a race: who arrives later has lost
   shown = last();
-  for (const index of arrived) {
-    const { name, steps } = known.walkers[index], { collisions } = steps.at(-1);
-    say(`${name}: target reached in ${counted(steps.length - 1, "step")}, ${counted(collisions, "collision")}`);
-  }
+  if (arrived.length) say([...arrived.map((index) => arrival(known.walkers[index])), winner()?.text].filter(Boolean).join(". "));
   show();
   if (!playing) keepLink();
   return answer.steps.some((step) => step);
@@ -129,13 +138,14 @@ function takeMind(answer) {
   known.minds.set(answer.walker, answer);
 }
 
-const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
+const arrival = ({ name, steps }) => `${name}: target reached in ${counted(steps.length - 1, "step")}, ${counted(steps.at(-1).collisions, "collision")}`;
+const winner = () => (known.episode.drive && known.walkers.length > 1 ? verdict(known.walkers, known.first) : null);
 const last = () => Math.max(...known.walkers.map((walker) => walker.steps.length - 1));
 const over = () => known.ended.every((ended, index) => ended || (!known.walkers[index].agent && known.walkers.length > 1));
 
 function show() {
-  const end = last();
-  known.cards.forEach(({ show: showCard }, index) => showCard(shown, known.ended[index]));
+  const end = last(), won = winner()?.index;
+  known.cards.forEach(({ show: showCard }, index) => showCard(shown, known.ended[index], won === index));
   map.show({ walkers: known.walkers, target: known.episode.target, start: known.episode.start, step: shown });
   $("timeline").max = end;
   $("timeline").value = shown;
@@ -158,7 +168,7 @@ function showTarget(pictures) {
     $("goal-picture").src = pictures.path(target);
     $("goal-picture").alt = `Picture of the target, ${heading(target)}`;
   }
-  const trained = known.stage.agents[0]?.values ? (known.scene.targets.includes(target) ? ", trained on" : ", not trained on") : "";
+  const trained = known.stage.agents[0]?.values ? ((known.scene.trained ?? known.scene.targets).includes(target) ? ", trained on" : ", not trained on") : "";
   $("goal-where").textContent = heading(target) + trained;
   const focused = $("targets").contains(document.activeElement);
   $("targets").replaceChildren(
@@ -246,7 +256,7 @@ async function copyLink() {
   keepLink();
   try {
     await navigator.clipboard.writeText(new URL(`#${known.link}`, location.href).href);
-    say("Link copied: it replays this episode as long as this viewer runs");
+    say(saved ? "Link copied: it opens this page at this episode" : "Link copied: it replays this episode as long as this viewer runs");
   } catch {
     say("The link is in the address bar");
   }
@@ -293,7 +303,7 @@ function chooseLayer(kind) {
 }
 
 const newStart = () => begin({ start: null, seed: Math.floor(Math.random() * 1e6) });
-const race = () => known.stage.agents.length && begin({ drive: known.episode.drive ? 0 : 1 });
+const race = () => !saved && known.stage.agents.length && begin({ drive: known.episode.drive ? 0 : 1 });
 const help = () => $("help-dialog").showModal();
 
 $("scene").addEventListener("change", () => begin({ scene: $("scene").value, start: null, target: null }));

@@ -72,7 +72,7 @@ export function createCard(walker, index, pictures, onDrive) {
   swatch.style.width = swatch.style.height = "22px";
   drawAgent(penOf(swatch, 22, 22), 11, 11.5, 7.5, 0, look);
 
-  function show(shown, ended) {
+  function show(shown, ended, won) {
     const at = Math.min(shown, walker.steps.length - 1), step = walker.steps[at];
     if (pictures.any) {
       const source = pictures.path(step.state);
@@ -83,8 +83,8 @@ export function createCard(walker, index, pictures, onDrive) {
     const said = { ...step, steps: at, reward: at ? signed(step.reward) : "–", earned: signed(step.earned), to_go: step.to_go < 0 ? "no path" : step.to_go, value: step.value === null ? "–" : signed(step.value) };
     for (const [key, value] of fields) value.textContent = said[key];
     badge.className = `badge ${step.reached ? "good" : step.blocked ? "bad" : ""}`;
-    badge.textContent = step.reached ? "reached" : step.blocked ? "blocked" : ended && at === walker.steps.length - 1 ? "gave up" : ["free", "precollision", "collision"][step.zone];
-    badge.title = step.reached ? "The target is reached" : "Zone of the pose";
+    badge.textContent = step.reached ? (won ? "winner" : "reached") : step.blocked ? "blocked" : ended && at === walker.steps.length - 1 ? "gave up" : ["free", "precollision", "collision"][step.zone];
+    badge.title = step.reached ? (won ? "First at the target" : "The target is reached") : "Zone of the pose";
     bars.forEach((bar, action) => {
       const share = step.probabilities ? step.probabilities[action] : null;
       bar.fill.style.width = `${(share ?? 0) * 100}%`;

@@ -1,7 +1,7 @@
 // Small line charts of the episode by step.
 import { drawBump, drawLine, lookOf, penOf } from "./looks.js";
 
-const LEFT = 40, RIGHT = 8, TOP = 8, BOTTOM = 6;
+const LEFT = 48, RIGHT = 8, TOP = 8, BOTTOM = 6;
 
 // Draws `valueOf(step)` (null: nothing) of every walker; a mark stands at the step shown.
 export function drawChart(canvas, walkers, shown, valueOf, digits) {

@@ -1,8 +1,10 @@
 // Talks to the viewer: one question at a time over the WebSocket, answers in order.
+import { saved } from "./saved.js";
 
 const TOO_MANY_PAGES = 4001; // a code of the viewer's own
 
 export async function fetched(path) {
+  if (saved) return saved.files[path];
   const response = await fetch(path);
   if (!response.ok) throw new Error(`${path}: ${response.status}`);
   return response.json();

@@ -4,6 +4,7 @@ import { ACTIONS, GHOST, INK, STANDS, TARGET, WALL, ZONES, ZONE_OPACITY, drawAge
 const VEIL = "rgb(255 255 255 / 45%)"; // over the cells in the picture from above
 const SHADE = "rgb(29 35 41 / 62%)"; // over the room, where an agent's belief is shown
 const CELL_SHARE = 0.94;
+const STAR = 0.27, STAR_MET = 0.44, ARROW = 0.24, ARROW_MET = 0.13; // of a cell; the second where they meet: neither hides the other
 const LOWEST_PX = 220, LARGEST_CELL_PX = 90;
 
 // `onPick(state, what)` is told of a pose chosen as "start" or "target" (null: as the page says); `onCursor(state)` of
@@ -146,7 +147,9 @@ export function createMap(canvas, onPick, onCursor) {
     pen.drawImage(ground, 0, 0, width, height);
     const seer = layer.kind === "held" ? shown.walkers[layer.mind] : null;
     if (seer) paintHeld(pen, seer.steps[Math.min(shown.step, seer.steps.length - 1)].held);
-    drawTarget(pen, ...at(shown.target), side * 0.27, scene.headings_deg[shown.target]);
+    const there = (state) => scene.cells[state] === scene.cells[shown.target];
+    const met = shown.walkers.some(({ steps }) => there(steps[Math.min(shown.step, steps.length - 1)].state));
+    drawTarget(pen, ...at(shown.target), side * (met ? STAR_MET : STAR), scene.headings_deg[shown.target]);
     const lanes = shown.walkers.map((_, i) => (i - (shown.walkers.length - 1) / 2) * side * 0.13);
     const thick = Math.min(Math.max(side * 0.08, 2), 5);
     shown.walkers.forEach((walker, i) => {
@@ -163,7 +166,7 @@ export function createMap(canvas, onPick, onCursor) {
         drawBump(pen, x + lanes[i], y + lanes[i], side * 0.09, look);
       }
       const last = steps.at(-1), [x, y] = at(last.state);
-      drawAgent(pen, x + lanes[i], y + lanes[i], side * 0.24, scene.headings_deg[last.state], look);
+      drawAgent(pen, x + lanes[i], y + lanes[i], side * (there(last.state) ? ARROW_MET : ARROW), scene.headings_deg[last.state], look);
     });
     if (cursor !== null && document.activeElement === canvas) drawCursor(pen);
   }
