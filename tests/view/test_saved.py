@@ -8,14 +8,14 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect, sync_playwright
+from playwright.sync_api import Browser, expect
 
 from clearway.errors import ClearwayError
 from clearway.view import saved
 from clearway.view.bundle import bundled
 from clearway.view.saved import save_page
 from clearway.view.stage import Stage, scene_stage
-from helpers.chromium import launched
+from helpers.browser import opened_browser
 
 FIRST = "scene=corridor&start=4&target=8&seed=52"
 PATIENCE_MS = 60_000
@@ -68,10 +68,8 @@ def test_a_recorded_episode_is_the_one_that_the_viewer_walks(page_folder: Path, 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        browser = launched(playwright)
+    with opened_browser() as browser:
         yield browser
-        browser.close()
 
 
 class Quiet(SimpleHTTPRequestHandler):
