@@ -18,7 +18,7 @@ class Examples:
     json: bool = False
     """Print JSON: how each was made, its figures, the sums of its files."""
     remake: Path | None = None
-    """Make the example again, in this new folder: a minute and a half. The package's own lies in
+    """Make the example again, in this new folder: a minute. The package's own lies in
     src/clearway/examples/data."""
 
     def run(self) -> None:
