@@ -1,6 +1,6 @@
 """Episodes of the generalist that failed, on one sheet: what it held, the target's picture, what looked most like it.
 
-    python docs/pictures/failures.py flats-validation docs/pictures/failures.jpg --goals 4 --count 4
+    python docs/pictures/failures.py flats-validation docs/pictures/failures.jpg
 
 Scenes with pictures, in order; of each the episode that took longest. The right pictures: the target's, and the one on
 the way whose evidence for the target was greatest although it was not there.
@@ -33,7 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", type=Path)
     parser.add_argument("path", type=Path, help="of the sheet")
-    parser.add_argument("--goals", type=int, default=4, help="of each scene")
+    parser.add_argument("--goals", type=int, default=10, help="of each scene")
     parser.add_argument("--count", type=int, default=4, help="of scenes")
     given = parser.parse_args()
     generalist = Generalist.shipped()
