@@ -86,7 +86,9 @@ def test_scenes_that_do_not_belong_together(clearway, dump, tmp_path):
         file["resnet_feature"] = kept
 
     first, second = dump(tmp_path / "one.h5"), dump(tmp_path / "two.h5", change=shorter)
-    assert clearway("train", first, second, "--out", tmp_path / "run").refusal("two", "20 features", "same encoder")
+    assert clearway("train", first, second, "--out", tmp_path / "run").refusal(
+        "two", "20 features", "encode FILES --encoder clearway "
+    )
 
 
 def test_a_scene_without_features_is_not_trained_on(clearway, dump, tmp_path):

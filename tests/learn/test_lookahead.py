@@ -109,8 +109,8 @@ def test_the_trainer_remembers_only_what_its_environments_did() -> None:
     taken = torch.zeros_like(trainer.observed.next_state, dtype=torch.bool)
     collect = trainer.collector.collect
 
-    def watched():
-        rollout = collect()
+    def watched(steps):
+        rollout = collect(steps)
         taken[rollout.history[:, :, -1], rollout.action] = True
         return rollout
 

@@ -23,6 +23,7 @@ from torch import Tensor
 from clearway.choices import FeatureStore
 from clearway.errors import RunError, SceneError
 from clearway.files import CACHE_VARIABLE, cache_dir
+from clearway.scenes.records import FILE_ENCODER
 from clearway.scenes.scene import Scene
 
 FEW_STATES = 16_384  # up to so many, whatever is computed of states is computed of all of them at once
@@ -65,8 +66,9 @@ def _identity(scene: Scene) -> str:
 
 
 def _remedy(scene: Scene) -> str:
-    """The command that gives scenes features of one encoder: that of this scene, else the default one."""
-    name = scene.encoder.name if scene.encoder else "clearway"
+    """The command that gives scenes features of one encoder: this scene's, or the default where that cannot be had."""
+    named = scene.encoder is not None and not scene.encoder.name.startswith(FILE_ENCODER)
+    name = scene.encoder.name if scene.encoder and named else "clearway"
     return f"Encode all of them together: clearway scenes encode FILES --encoder {name} --out FOLDER"
 
 
