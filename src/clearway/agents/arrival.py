@@ -7,7 +7,6 @@ Axis letters: B episodes, S states, F features.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -46,13 +45,13 @@ def likeness(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return (_of_length_one(first) * _of_length_one(second)).sum(axis=1)
 
 
-def arrival_of_json(kept: Mapping[str, object], feature_count: int) -> Arrival:
+def arrival_of_json(kept: object, feature_count: int) -> Arrival:
     """What `Arrival.to_json` gave, for features (B, F). Raises ValueError where it is something else."""
-    match dict(kept):
+    match kept:
         case {"threshold": float(threshold), "numbers": int(numbers), **more} if not more:
             if -1 <= threshold <= 1 and 0 < numbers <= feature_count:
                 return Arrival(threshold, numbers)
-    raise ValueError(f"arrival is {dict(kept)!r:.80}")
+    raise ValueError(f"arrival is {kept!s:.80}")
 
 
 def fitted_arrival(features: np.ndarray, numbers: int, quantile: float = QUANTILE) -> Arrival | None:

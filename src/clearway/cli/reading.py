@@ -57,7 +57,7 @@ def reading() -> ConstructorRegistry:
 def _with_config(command: StructConstructorSpec) -> StructConstructorSpec:
     """The command with the option --config, which `config.with_config` has done away with before anything is read."""
     kind = Annotated[Path | None, tyro.conf.arg(metavar=PLACEHOLDERS[Path], help_behavior_hint=_default_told)]
-    option = StructFieldSpec("config", kind, None, helptext=CONFIG_HELP)  # type: ignore[arg-type]
+    option = StructFieldSpec("config", kind, None, helptext=CONFIG_HELP)  # type: ignore[arg-type]  # Annotated
 
     def made(**values: Any) -> Any:
         values.pop("config", None)

@@ -50,5 +50,5 @@ def chosen_reward(name: str, parameters: RewardParameters, clip: bool | None = N
 
 def given_parameters(parameters: RewardParameters) -> dict[str, float]:
     """The parameters that are given, by name."""
-    values: dict[str, float | None] = asdict(parameters)  # type: ignore[call-overload]
+    values: dict[str, float | None] = asdict(parameters)  # type: ignore[call-overload]  # made above
     return {name: value for name, value in values.items() if value is not None}

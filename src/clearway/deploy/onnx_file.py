@@ -144,8 +144,8 @@ def _arrival_of(file: OnnxFile) -> Arrival | None:
     if kept is None:
         return None
     try:
-        return arrival_of_json(dict(kept), file.card.feature_count)  # type: ignore[call-overload]
-    except (ValueError, TypeError) as fault:
+        return arrival_of_json(kept, file.card.feature_count)
+    except ValueError as fault:
         raise DeployError(f"{file.source}: its metadata cannot be read ({fault}). {EXPORT_AGAIN}") from fault
 
 
