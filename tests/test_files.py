@@ -150,6 +150,16 @@ def test_a_folder_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
             raise AssertionError("never begun")
 
 
+def test_a_folder_that_cannot_be_made_is_named_as_it_was_asked_for(tmp_path: Path, monkeypatch) -> None:
+    def refuse(**where):
+        raise OSError(errno.EROFS, "no", str(tmp_path / ".page.part"))
+
+    monkeypatch.setattr(files.tempfile, "mkdtemp", refuse)
+    with pytest.raises(OSError) as refused, folder_written_whole(tmp_path / "page"):
+        raise AssertionError("never begun")
+    assert refused.value.filename == str(tmp_path / "page")
+
+
 def test_an_unfinished_folder_of_a_killed_process_goes(tmp_path: Path) -> None:
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()

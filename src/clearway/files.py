@@ -75,13 +75,18 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
     final = path.resolve()
     final.parent.mkdir(parents=True, exist_ok=True)
     _remove_leftovers(final.parent)
-    part = Path(tempfile.mkdtemp(prefix=f".{final.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=final.parent))
+    prefix = f".{final.name}.{_host()}-{os.getpid()}-"
     try:
-        yield part
-        part.chmod(0o777 & ~_umask())
-        if final.exists():
-            final.rmdir()
-        part.replace(final)
+        part = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=final.parent))
+    except OSError as fault:
+        raise OSError(fault.errno, os.strerror(fault.errno or 0), str(path)) from fault
+    try:
+        with _faults_named(part, path):
+            yield part
+            part.chmod(0o777 & ~_umask())
+            if final.exists():
+                final.rmdir()
+            part.replace(final)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

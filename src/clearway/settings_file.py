@@ -53,14 +53,14 @@ def read_settings(path: Path) -> dict[str, Any]:
         read = yaml.load(content.decode("utf-8"), _Loader)
     except yaml.MarkedYAMLError as fault:
         where = f", line {fault.problem_mark.line + 1}" if fault.problem_mark else ""
-        raise ClearwayError(f"{path}{where}: no YAML ({fault.problem}). Correct it") from fault
+        raise ClearwayError(f"{path}{where}: not read ({fault.problem}). Correct it") from fault
     except (yaml.YAMLError, ValueError, RecursionError, TypeError) as fault:
         reason = " ".join(str(fault).split())[:200]
-        raise ClearwayError(f"{path}: no YAML ({reason}). Correct it") from fault
+        raise ClearwayError(f"{path}: not read ({reason}). Correct it") from fault
     if read is None:
         return {}
     if not isinstance(read, dict) or not all(isinstance(key, str) for key in read):
-        raise ClearwayError(f"{path}: expected lines such as frames: 600000, a name of an option each. Correct it")
+        raise ClearwayError(f"{path}: expected an option a line, such as frames: 600000. Correct it")
     return read
 
 

@@ -69,6 +69,13 @@ def test_the_words_between_are_shared_out(config):
         with_config(["scenes", "import", "mjcf", "x.xml", "--config", str(inside)], Command)
 
 
+@pytest.mark.parametrize("words", [["--set", "width=8"], ["--set=width=8"]])
+def test_single_settings_of_the_command_line_come_after_those_of_the_file(config, words):
+    path = config("set: {envs: 200}")
+    found = with_config(["train", "x.h5", *words, "--config", str(path)], Command)
+    assert found == ["train", "x.h5", "--set", "envs=200", "width=8"]
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

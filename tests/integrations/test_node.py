@@ -178,6 +178,18 @@ def test_pictures_of_all_encodings_come_out_as_rgb(encoding) -> None:
     np.testing.assert_array_equal(raw_picture(message), wanted)
 
 
+def test_a_picture_of_huge_sides_is_one_line() -> None:
+    import struct
+    import zlib
+
+    from clearway_ros.pictures import PictureError, compressed_picture
+
+    header = b"IHDR" + struct.pack(">IIBBBBB", 60_000, 60_000, 8, 2, 0, 0, 0)
+    content = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header))
+    with pytest.raises(PictureError):
+        compressed_picture(Message(data=content))
+
+
 def test_a_compressed_picture_that_is_none_is_one_line() -> None:
     from clearway_ros.pictures import PictureError, compressed_picture
 

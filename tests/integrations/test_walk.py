@@ -1,6 +1,7 @@
 """When the robot looks, moves and stands still; above all, when it stands still."""
 
 import threading
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def test_it_moves_settles_and_looks_again() -> None:
     assert all(command.angular_rad_s == 0 for command in first)
     assert sum(command.linear_m_s for command in first) * TICK_S == pytest.approx(0.5, abs=0.02)
     robot.run(0.5)
-    assert robot.asked == pytest.approx([0, 3.3], abs=2 * TICK_S)  # 3 s of profile, 0.3 to settle
+    assert robot.asked == pytest.approx([0, 3.35], abs=2.1 * TICK_S)  # from the next tick 3 s of profile, 0.3 to settle
     assert moving(robot.run(1))[0].angular_rad_s > 0
     assert robot.walk.decisions == 2
 
@@ -159,6 +160,45 @@ def test_a_stop_does_not_wait_for_a_decision_which_is_then_not_carried_out() -> 
     assert moving(robot.sent) == [] and robot.walk.state == "looking"
 
 
+def test_a_stop_that_is_cleared_while_the_agent_thinks_makes_its_decision_void() -> None:
+    robot = Robot()
+
+    def stopped(picture):
+        robot.walk.stop(True)
+        robot.walk.stop(False)
+        assert robot.walk.clear(0.0)
+        return Action.MOVE_FORWARD, False
+
+    robot.walk._decide = stopped
+    robot.begin().walk.see(PICTURE, 0.0)
+    robot.walk.tick(0.0)
+    assert robot.walk.state == "looking"
+    robot.walk._decide = robot._decide
+    robot.walk.tick(0.05)
+    assert moving(robot.sent) == [] and robot.asked == []  # there is no new picture yet
+    assert moving(robot.run(0.2))
+
+
+def test_the_time_that_a_decision_takes_is_none_of_the_move() -> None:
+    robot = Robot().begin()
+    robot.walk.see(PICTURE, 0.0)
+    robot.walk.tick(0.0)
+    robot.now = 0.9  # it thought so long
+    commands = robot.run(3.2)
+    speeds = [command.linear_m_s for command in commands]
+    assert sum(speeds) * TICK_S == pytest.approx(0.5, abs=0.02)
+    assert max(after - before for before, after in pairwise(speeds)) < 0.03  # a ramp
+
+
+def test_odometry_that_is_no_number_tells_nothing() -> None:
+    from clearway_ros.motion import Pose
+
+    robot = Robot().begin()
+    robot.walk.feel(Pose(float("nan"), 0.0, 0.0), 0.0)
+    robot.run(0.2)
+    assert not robot.walk._motion.measured
+
+
 def test_a_target_that_changes_during_a_decision_makes_it_void() -> None:
     robot = Robot()
 
@@ -195,7 +235,7 @@ def test_odometry_measures_where_there_is_some_and_its_loss_ends_a_move() -> Non
     assert moving(robot.run(0.4))
     assert robot.walk._motion.measured
     robot.run(0.3)
-    assert robot.walk._motion is None and robot.walk.state == "looking"
+    assert robot.walk._motion is None and robot.walk.state == "looking" and robot.walk.given_up == 1
     robot.run(0.5)
     assert not robot.walk._motion.measured  # what is old tells nothing
 

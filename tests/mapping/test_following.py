@@ -118,6 +118,14 @@ def test_a_picture_stays_where_the_next_pose_follows_from_its_own(now, action):
     assert kept["mark"][before.index] == 7 and tuple(kept["taken"][0]) == before.index
 
 
+def test_a_picture_that_would_lie_outside_stays_where_it_is():
+    before, now = LatticePose(0, 4, 4), LatticePose(0, 0, 4)
+    kept = kept_at(before, 7)
+    assert not 0 <= now.moved(-1).row < 9
+    put_right(before, now, Action.MOVE_FORWARD, kept)
+    assert kept["mark"][before.index] == 7
+
+
 def visited(room: np.ndarray) -> np.ndarray:
     return np.argwhere(room >= SURE)
 

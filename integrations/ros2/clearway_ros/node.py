@@ -113,7 +113,10 @@ class ClearwayNode(Node):
         self.walk.stop()
 
     def _tick(self) -> None:
+        before = self.walk.given_up
         self.walk.tick(self._now_s())
+        if self.walk.given_up > before:
+            self.get_logger().warning("a step was given up: something is in the way, or odometry has gone")
         said = self.walk.state, self.walk.decisions
         if said != self._said:
             self._said = said
@@ -127,6 +130,7 @@ class ClearwayNode(Node):
         except clearway.ClearwayError as fault:
             self._complain(str(fault))
             return None
+        self._complaint = ""
         return action, self._navigator.arrived
 
     def _set_target(self, picture: np.ndarray) -> None:

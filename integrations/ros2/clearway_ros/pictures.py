@@ -40,7 +40,7 @@ def compressed_picture(message: Any) -> np.ndarray:
             if max(file.size) > MAX_SIDE:
                 raise PictureError(f"the picture is {file.width} x {file.height} pixels, at most {MAX_SIDE} a side")
             return np.asarray(file.convert("RGB"))
-    except (OSError, SyntaxError, ValueError) as fault:
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as fault:
         if isinstance(fault, PictureError):
             raise
         raise PictureError(f"the compressed picture cannot be read ({' '.join(str(fault).split())[:120]})") from fault

@@ -58,6 +58,7 @@ class Walk:
     Attributes:
         arrived: what the agent said at its last decision; None before it, and where it cannot tell.
         decisions: so many since the target was set.
+        given_up: so many steps since then that did not come to their end.
     """
 
     def __init__(
@@ -73,13 +74,14 @@ class Walk:
         self._stops_at_target = stops_at_target
         self._lock = Lock()
         self._state, self._stopped, self._pressed = STANDING, False, False
+        self._next: Action | None = None  # decided, and begun with the next tick: deciding took its time
         self._motion: Motion | None = None
         self._picture: tuple[float, np.ndarray] | None = None
         self._odometry: tuple[float, Pose] | None = None
         self._look_from_s = -math.inf
-        self._episode, self._at_rest = 0, True
+        self._episode, self._stops, self._at_rest = 0, 0, True
         self.arrived: bool | None = None
-        self.decisions = 0
+        self.decisions = self.given_up = 0
 
     @property
     def state(self) -> str:
@@ -91,14 +93,16 @@ class Walk:
         self._picture = now_s, picture
 
     def feel(self, at: Pose, now_s: float) -> None:
-        """Odometry has come in."""
-        self._odometry = now_s, at
+        """Odometry has come in; what is no number tells nothing."""
+        if all(map(math.isfinite, at)):
+            self._odometry = now_s, at
 
     def begin(self, now_s: float) -> None:
         """There is a target: an episode begins with the next picture."""
         with self._lock:
             self._episode += 1
-            self._state, self._motion, self.arrived, self.decisions = LOOKING, None, None, 0
+            self._state, self._next, self._motion = LOOKING, None, None
+            self.arrived, self.decisions, self.given_up = None, 0, 0
             self._look_from_s = now_s
             self._send(HALT)
 
@@ -107,7 +111,8 @@ class Walk:
         with self._lock:
             self._pressed = pressed
             if pressed:
-                self._stopped, self._motion = True, None
+                self._stopped, self._next, self._motion = True, None, None
+                self._stops += 1
                 self._send(HALT)
 
     def clear(self, now_s: float) -> bool:
@@ -127,37 +132,41 @@ class Walk:
         with self._lock:
             if decided is not None:
                 self._follow(*decided, now_s)
-            command = self._command(now_s)
+            command = HALT if decided is not None else self._command(now_s)
             if not (self._at_rest and self.state in (STANDING, ARRIVED)):  # others may drive the base then
                 self._send(command)
             self._at_rest = command == HALT
 
-    def _due_decision(self, now_s: float) -> tuple[int, Action, bool | None] | None:
-        """A decision by a picture that was taken after the last action, with the episode that it is of."""
-        seen, episode = self._picture, self._episode
+    def _due_decision(self, now_s: float) -> tuple[tuple[int, int], Action, bool | None] | None:
+        """A decision by a picture that was taken after the last action, with the episode and the stops before it."""
+        seen, asked = self._picture, (self._episode, self._stops)
         due = self._state == LOOKING and not self._stopped and self._sees(now_s)
         if not due or seen is None or seen[0] < self._look_from_s:
             return None
         told = self._decide(seen[1])
-        return None if told is None else (episode, *told)
+        return None if told is None else (asked, *told)
 
-    def _follow(self, episode: int, action: Action, arrived: bool | None, now_s: float) -> None:
-        """Begin what was decided, unless the target has changed meanwhile."""
+    def _follow(self, asked: tuple[int, int], action: Action, arrived: bool | None, now_s: float) -> None:
+        """Take up what was decided, unless the target has changed or a stop was pressed meanwhile."""
+        episode, stops = asked
         if episode != self._episode:
             return
         self.arrived, self.decisions = arrived, self.decisions + 1
         if arrived and self._stops_at_target:
             self._state = ARRIVED
-        elif self._stopped:  # pressed while the agent thought: the decision is not carried out
-            self._look_from_s = now_s
+        elif stops != self._stops:  # even if it is cleared already: there is to be a new look
+            self._look_from_s = max(self._look_from_s, math.nextafter(now_s, math.inf))
         else:
-            self._state, self._motion = MOVING, Motion(action, self._drive, now_s, self._at(now_s))
+            self._state, self._next = MOVING, action
 
     def _command(self, now_s: float) -> Command:
+        if self._next is not None:
+            self._next, self._motion = None, Motion(self._next, self._drive, now_s, self._at(now_s))
         if self._stopped or self._motion is None:
             return HALT
         command = self._motion.command(now_s, self._at(now_s)) if self._sees(now_s) else None
         if command is None:  # it has ended, or it is given up
+            self.given_up += self._motion.given_up
             self._motion, self._state, self._look_from_s = None, LOOKING, now_s + self._patience.settle_s
         return command or HALT
 

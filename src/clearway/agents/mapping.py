@@ -82,7 +82,7 @@ class MappingAgent:
     def _begin_anew(self, lost: np.ndarray, been: np.ndarray, after: State) -> None:
         """Forget where episodes (B,) bool that have nowhere left to go have been, and what blocked them.
 
-        The target is somewhere, so that some of it was wrong.
+        The target is somewhere, so that some of it was wrong. The pose in which it holds that it stands may be, too.
         """
         been[lost], after["shut"][lost] = False, False
         room = after["room"]

@@ -70,5 +70,9 @@ def _of_record(record: RunRecord) -> dict[str, Any]:
 
 def _given(options: Mapping[str, object]) -> dict[str, object]:
     """Options that say something; several words as a list."""
-    said = {name: value for name, value in options.items() if value not in (None, False, (), "")}
+    said = {
+        name: value
+        for name, value in options.items()
+        if value is not None and value is not False and value not in ((), "")
+    }
     return {name: list(value) if isinstance(value, tuple | list) else value for name, value in said.items()}

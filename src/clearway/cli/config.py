@@ -137,8 +137,12 @@ def _words_of(option: _Option) -> float:
 
 def _added(words: Sequence[str], name: str, values: Sequence[str]) -> list[str]:
     """The words with values before those that an option has there."""
-    place = list(words).index(f"--{name}") + 1 if f"--{name}" in words else None
-    return list(words) if place is None else [*words[:place], *values, *words[place:]]
+    for place, word in enumerate(words):
+        option, equals, own = word.partition("=")
+        if option == f"--{name}":
+            first = [own] if equals else []
+            return [*words[:place], option, *values, *first, *words[place + 1 :]]
+    return list(words)
 
 
 def _as_words(option: _Option, values: Sequence[str]) -> list[str]:

@@ -213,9 +213,9 @@ def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mappi
     mark, count = kept["mark"], int(kept["count"])
     turned = action in QUARTERS
     origins = [now.turned(-QUARTERS[action])] if turned else [now.moved(-STEPS[action]), now]
-    if before in origins:
+    origin, side = origins[0], mark.shape[-1]
+    if before in origins or not (0 <= origin.row < side and 0 <= origin.column < side):
         return
-    origin = origins[0]
     mark[origin.index], mark[before.index] = mark[before.index], 0
     if count and tuple(kept["taken"][count - 1]) == before.index:
         kept["taken"][count - 1] = origin.index
