@@ -43,6 +43,22 @@ def test_with_good_eyes_it_finds_every_target_with_hardly_a_collision(scene, wor
     assert table.false_arrivals is not None and (table.false_arrivals > 0).mean() < 0.1
 
 
+def test_who_holds_itself_for_shut_in_forgets_that_and_finds_its_target(scene, world):
+    agent = MappingAgent(PerfectSight(scene), settings=SETTINGS)
+    target = int(world.target_state[0])
+    here = int(np.flatnonzero((scene.components == 0) & (np.arange(scene.state_count) != target))[-1])
+    state = agent.reset({FEATURES: scene.features[[target]]}, np.zeros(1, np.uint64))
+    for step in range(200):
+        decisions, state = agent.act({FEATURES: scene.features[[here]]}, state)
+        if step == 0:
+            state["shut"][:] = True
+        following = scene.graph[here, decisions.action[0]]
+        here = here if following < 0 else int(following)
+        if here == target:
+            break
+    assert here == target
+
+
 def test_who_sees_no_obstacles_bumps_into_them(scene, world):
     blind = PerfectSight(scene)
     blind.stands = lambda features: np.zeros((len(features), 63), np.float32)

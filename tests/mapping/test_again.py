@@ -13,7 +13,7 @@ SETTINGS = MappingSettings(side_m=15.0)
 
 
 class Undecided(PerfectSight):
-    """Eyes that hold every move for blocked, and no two pictures for the same."""
+    """Eyes that hold every move for blocked."""
 
     def whereabouts(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         found = super().whereabouts(first, second)
@@ -21,10 +21,17 @@ class Undecided(PerfectSight):
         return found
 
 
-def walked(actions: list[Action], *, noise: bool) -> list[tuple[np.ndarray, int]]:
+class Telling(Undecided):
+    """Such eyes, which at least tell pictures of neighbouring cells apart."""
+
+    def description(self, features: np.ndarray) -> np.ndarray:
+        return super().description(features * np.array([6, 6, 1, 1], np.float32))
+
+
+def walked(actions: list[Action], *, noise: bool, eyes: type[PerfectSight] = Undecided) -> list[tuple[np.ndarray, int]]:
     """What a follower holds of itself after each step in a corridor: its cell, and whether pictures repeat."""
     scene = seen_perfectly(corridor_scene(6))
-    follower = Follower(Undecided(scene), SETTINGS)
+    follower = Follower(eyes(scene), SETTINGS)
     state, here, found = follower.begin(1), 0, []
     for step, action in enumerate([*actions, Action.TURN_RIGHT]):
         seen = scene.features[[here]] + (0.001 * step if noise else 0.0)
@@ -53,6 +60,11 @@ def test_where_a_pose_shows_another_picture_they_never_repeat_and_eyes_decide():
     found = walked([Action.TURN_RIGHT] * 4 + [Action.MOVE_FORWARD] * 2, noise=True)
     assert [repeats for _, repeats in found] == [0] * 4 + [NEVER] * 3
     assert np.abs(found[-1][0] - found[0][0]).sum() == 0, "these eyes hold every move for blocked"
+
+
+def test_as_long_as_nothing_is_known_of_pictures_another_one_outweighs_eyes_that_hold_a_move_for_blocked():
+    found = walked([Action.MOVE_FORWARD], noise=False, eyes=Telling)
+    assert np.abs(found[-1][0] - found[0][0]).sum() == 1
 
 
 def test_a_pose_that_shows_another_picture_says_so_even_where_they_came_again_before():
