@@ -162,7 +162,8 @@ def test_training_ends_with_the_number_of_solved_targets(clearway, trained, smal
     metrics = run / "metrics.jsonl"
     metrics.write_text(metrics.read_text().replace('"solved_targets": 0', f'"solved_targets": {solved}'))
     lines = clearway(*words).err.splitlines()
-    told = f"{run}: trained, {solved} of 5 targets solved. Next: clearway evaluate {run}{rows}"
+    short = " in its last episodes, of at most 40 steps each" if rows else ""
+    told = f"{run}: trained, {solved} of 5 targets solved{short}. Next: clearway evaluate {run}{rows}"
     assert lines[-2 if rows else -1] == told
     metrics.unlink()
     assert clearway(*words).err.endswith(f"{run}: trained. Next: clearway evaluate {run}\n")

@@ -37,7 +37,8 @@ def test_unsolved_targets_and_the_command_to_go_on(clearway, trained, small, tmp
     run = tmp_path / "a run"
     answer = clearway("train", trained.scene, "--out", run, "--targets", 26, 37, *small)
     before, last = answer.err.splitlines()[-2:]
-    assert before == f"{run}: trained, 0 of 2 targets solved. Next: clearway evaluate {run} --targets"
+    short = "in its last episodes, of at most 40 steps each"
+    assert before == f"{run}: trained, 0 of 2 targets solved {short}. Next: clearway evaluate {run} --targets"
     told, _, command = last.partition(". To go on: ")
     assert told == "not solved: bathroom_02=26,37"
     program, *words = shlex.split(command)

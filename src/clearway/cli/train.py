@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -187,7 +187,9 @@ def _say_trained(result: TrainResult, out: Path) -> None:
     used, asked = result.agent.frames, result.record.learner.frames
     further = f" on {used:,} frames ({used - asked:,} more than asked for: the last step or update is whole)"
     told = further if used > asked else ""
-    say(f"{out}: trained{told}, {solved} of {count} targets solved. Next: clearway evaluate {out}{each}")
+    limit = asdict(result.record.learner).get("step_limit")  # some algorithms have none
+    short = "" if solved == count or not limit else f" in its last episodes, of at most {limit} steps each"
+    say(f"{out}: trained{told}, {solved} of {count} targets solved{short}. Next: clearway evaluate {out}{each}")
     if result.unsolved and solved < count:
         frames = 2 * max(result.record.learner.frames, result.agent.frames)
         say(f"not solved: {_named(result.unsolved)}. To go on: {longer(sys.argv[1:], out, frames)}")
