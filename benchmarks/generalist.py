@@ -4,6 +4,7 @@
     python benchmarks/generalist.py rooms-test --tour 500               # and who goes by the tour's nearest pictures
     python benchmarks/generalist.py rooms-test --perturb all
     python benchmarks/generalist.py rooms-test --json record.json       # figures of every scene
+    python benchmarks/generalist.py rooms-test --eyes eyes --alone      # by eyes of one's own; see clearway pretrain
 
 Scenes are files or folders of them, with pictures. All agents walk to the same goals from the same starts. Intervals
 are of the mean over scenes, and so are differences, scene by scene; see `by_scene`.
@@ -23,6 +24,7 @@ import clearway
 from clearway.agents.generalist import Generalist
 from clearway.evaluation.goals import GoalEvaluation
 from clearway.learn.provenance import hardware, package_versions
+from clearway.perception import eyes
 
 CARELESS, RETRIEVAL = "collisions cost nothing", "nearest picture of the tour"
 
@@ -35,10 +37,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--tour", type=int, default=0, help="steps")
     parser.add_argument("--perturb", nargs="+", default=["none"])
+    parser.add_argument("--eyes", default=eyes.NAME, help="a folder of eyes; by default those that come along")
     parser.add_argument("--alone", action="store_true", help="without the other agents")
     parser.add_argument("--json", type=Path, help="where the record is written")
     args = parser.parse_args()
-    generalist = Generalist.shipped()
+    generalist = Generalist.by_eyes(eyes.from_record(eyes.find_record(args.eyes)))
     rivals = {CARELESS: replace(generalist, settings=replace(generalist.settings, collision_cost=0.0))}
     if args.tour:
         rivals[RETRIEVAL] = Retrieving(generalist.encoder, generalist.sight, generalist.settings)
@@ -54,7 +57,7 @@ def main() -> None:
     if RETRIEVAL in found:
         print_difference(own, found[RETRIEVAL], "spl", "SPL above the nearest picture's")
     if args.json:
-        record = {"asked": asked, "versions": package_versions(), "hardware": hardware()}
+        record = {"asked": asked, "eyes": args.eyes, "versions": package_versions(), "hardware": hardware()}
         args.json.write_text(json.dumps({**record, **{name: one.to_json() for name, one in found.items()}}) + "\n")
 
 
