@@ -23,6 +23,11 @@ def corridors() -> World:
     return make_world(scenes, {scene.name: (0, scene.state_count - 4) for scene in scenes})
 
 
+def states_of(world: World) -> torch.Tensor:
+    """(C,) states of each scene."""
+    return torch.diff(world.scene_offset)
+
+
 def test_every_cycle_deals_all_scenes_out_once_in_another_order() -> None:
     rotation = Rotation(scene_count=10, at_once=4, updates_each=5, seed=0)
     cycles = [[tuple(rotation.scenes(15 * cycle + 5 * n).tolist()) for n in range(3)] for cycle in range(4)]
@@ -75,8 +80,8 @@ def test_where_a_turn_ends_open_episodes_are_forgotten() -> None:
 
 def test_environments_are_shared_by_the_scenes_in_proportion_to_their_states() -> None:
     learner = small_learner(envs=40)
-    assert divided_envs(corridors(), learner, torch.tensor([0, 4])) == (12, 0, 0, 0, 28)
-    assert divided_envs(corridors(), replace(learner, envs_by="scenes"), torch.tensor([1, 2])) == (0, 20, 20, 0, 0)
+    assert divided_envs(states_of(corridors()), learner, torch.tensor([0, 4])) == (12, 0, 0, 0, 28)
+    assert divided_envs(states_of(corridors()), replace(learner, envs_by="scenes"), torch.tensor([1, 2])) == (0, 20, 20, 0, 0)
 
 
 @pytest.mark.parametrize("updates", [1, 3, 4, 7])
@@ -117,10 +122,10 @@ def test_every_set_has_environments_for_each_of_its_scenes() -> None:
     learner = replace(SOME, envs=8, scenes_at_once=4)
     for update in range(60):
         scenes = rotation.scenes(update)
-        counts = divided_envs(world, learner, scenes)
+        counts = divided_envs(states_of(world), learner, scenes)
         assert sum(counts) == 8
         assert [number for number, count in enumerate(counts) if count] == scenes.tolist()
-    assert divided_envs(world, learner, torch.arange(5)) == (1, 2, 1, 3, 1)
+    assert divided_envs(states_of(world), learner, torch.arange(5)) == (1, 2, 1, 3, 1)
 
 
 def test_minibatches_are_refused_at_the_start_where_some_set_would_have_too_few_rows() -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from clearway.learn.load import TrainedAgent
     from clearway.learn.run_folder import RunRecord
+    from clearway.learn.share import Share
     from clearway.learn.train import Learning
     from clearway.reward import Reward
     from clearway.world.world import World
@@ -125,6 +126,14 @@ class Learner:
             RunError: the seed or the settings do not fit the world.
         """
         raise NotImplementedError
+
+    def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Learning:
+        """The trainer of one of several workers, whose scenes are those of `world`; as `trainer`.
+
+        Raises:
+            RunError: the algorithm, or a setting, is not for several workers, or as of `trainer`.
+        """
+        raise RunError(f"{self.algorithm} is trained by one worker. Leave --workers out, or use ppo, a2c or bc")
 
     def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedAgent:
         """The agent of a run from the tensors of its checkpoint, after that many frames.

@@ -97,6 +97,8 @@ class LossSettings:
     sum_loss: bool
     barrier_weight: float = 0.0
     lookahead_weight: float = 0.0
+    row_count: int | None = None
+    """Rows that means are over, those of other workers among them; None: the batch's own."""
 
     @classmethod
     def after(cls, frames: int, learner: OnPolicy) -> LossSettings:
@@ -125,6 +127,10 @@ class LossTerms:
 
 def actor_critic_loss(output: Tensor, batch: Batch, settings: LossSettings) -> LossTerms:
     """The loss of network outputs (B, A + 1): action scores, then the value."""
+
+    def mean(values: Tensor) -> Tensor:
+        return values.mean() if settings.row_count is None else values.sum() / settings.row_count
+
     log_pi = torch.log_softmax(output[:, :ACTION_COUNT], 1)
     entropy = -(log_pi.exp() * log_pi).sum(1)
     ratio = (log_pi.gather(1, batch.action[:, None])[:, 0] - batch.log_prob).exp()
@@ -135,9 +141,9 @@ def actor_critic_loss(output: Tensor, batch: Batch, settings: LossSettings) -> L
     each = each - settings.barrier_weight * log_pi.mean(1)
     if batch.better is not None:
         each = each - settings.lookahead_weight * (batch.better * log_pi).sum(1)
-    total = each.sum() if settings.sum_loss else each.mean()
-    clipped = (ratio != limited).float().mean()
-    return LossTerms(total, policy.mean(), value.mean(), entropy.mean(), clipped)
+    total = each.sum() if settings.sum_loss else mean(each)
+    clipped = mean((ratio != limited).float())
+    return LossTerms(total, mean(policy), mean(value), mean(entropy), clipped)
 
 
 def loss_gradient(output: Tensor, batch: Batch, settings: LossSettings) -> tuple[LossTerms, Tensor]:

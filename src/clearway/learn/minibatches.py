@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 
 from clearway.learn.losses import Batch
+from clearway.learn.peers import ALONE, Peers
 from clearway.model.padding import Padding
 from clearway.model.sums import counted, sum_ascending
 
@@ -70,6 +71,7 @@ class Deck:
         batch: at least one row.
         state_count, target_count: of the world.
         row_step: of what a minibatch's numbers of pairs of a scene, and of histories, are multiples.
+        peers: other workers' rows are dealt into the same minibatches.
 
     Attributes:
         batch: its rows in the new order.
@@ -77,7 +79,9 @@ class Deck:
         first_of_history: (U,) int64, the first row of each history.
     """
 
-    def __init__(self, batch: Batch, state_count: int, target_count: int, row_step: int = 1) -> None:
+    def __init__(
+        self, batch: Batch, state_count: int, target_count: int, row_step: int = 1, peers: Peers = ALONE
+    ) -> None:
         self.row_step = row_step
         slots = batch.history.flip(1).T  # newest first: states are numbered by scene, so sorting keeps scenes together
         history, kinds = slots[0], state_count
@@ -92,6 +96,8 @@ class Deck:
         self.scene = torch.arange(len(rows_per_scene), device=pair.device).repeat_interleave(
             rows_per_scene, output_size=len(pair)
         )
+        counts = [int(count) for [count] in peers.told(len(self.first_of_history))]
+        self.all_histories, self.before = sum(counts), sum(counts[: peers.rank])  # of all workers, of those before
 
     def dealt(self, parts: int, generator: torch.Generator) -> list[Minibatch]:
         """Minibatches with every row in one of them, as many histories of each scene in each; shuffled anew.
@@ -99,13 +105,15 @@ class Deck:
         Fewer than `parts` where there are fewer histories.
         """
         first = self.first_of_history
-        shuffled = torch.randperm(len(first), generator=generator, device=first.device)
+        shuffled = torch.randperm(self.all_histories, generator=generator, device=first.device) - self.before
+        if len(first) < self.all_histories:
+            shuffled = shuffled[(shuffled >= 0) & (shuffled < len(first))]  # as one worker alone shuffles them
         order = shuffled[torch.argsort(self.scene[first][shuffled], stable=True)]
-        parts = min(parts, len(first))
+        parts = min(parts, self.all_histories)
         part_of = torch.empty_like(order)
-        part_of[order] = torch.arange(len(order), device=order.device) % parts
-        histories = [len(order) // parts + (number < len(order) % parts) for number in range(parts)]
-        return self._divided(part_of[self.history], histories)
+        part_of[order] = (self.before + torch.arange(len(order), device=order.device)) % parts
+        upto = [-(-(count - part) // parts) for part in range(parts) for count in (self.before, self.before + len(order))]
+        return self._divided(part_of[self.history], [last - first for first, last in zip(upto[::2], upto[1::2], strict=True)])
 
     def _divided(self, part: Tensor, histories_per_part: Sequence[int]) -> list[Minibatch]:
         """A minibatch of the rows of each part (B,) int64, of which every history's rows are the same.
@@ -154,12 +162,13 @@ def dealt_epochs(
     parts: int,
     row_step: int,
     generator: torch.Generator,
+    peers: Peers = ALONE,
 ) -> Iterator[list[Minibatch]]:
     """Every epoch's minibatches, see `Deck`; a batch that is learnt from whole, and once, stays as it is."""
     if epochs * parts == 1:
         yield [Minibatch.whole(batch)]
         return
-    deck = Deck(batch, state_count, target_count, row_step)
+    deck = Deck(batch, state_count, target_count, row_step, peers)
     for _ in range(epochs):
         yield deck.dealt(parts, generator)
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from clearway.choices import Goals, MatmulPrecision
+from clearway.errors import RunError
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 
 if TYPE_CHECKING:
+    from clearway.learn.share import Share
     from clearway.learn.trainer import Trainer
     from clearway.reward import Reward
     from clearway.world.world import World
@@ -144,3 +146,13 @@ class OnPolicy(OnFeatures, Learner):
         from clearway.learn.trainer import Trainer
 
         return Trainer(world, self, reward, seed)
+
+    def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Trainer:
+        """The trainer of one of several workers."""
+        from clearway.learn.trainer import Trainer
+
+        if self.scenes_at_once:
+            raise RunError("scenes_at_once: several workers walk all scenes at a time. Leave it out, or --workers")
+        if self.goals == "seen":
+            raise RunError("goals=seen: own goals are for one worker. Leave it out, or --workers")
+        return Trainer(world, self, reward, seed, share)

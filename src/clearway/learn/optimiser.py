@@ -99,13 +99,24 @@ def optimisers(network: SiameseActorCritic, kind: Literal["adam", "rmsprop"]) ->
 
 
 @torch.no_grad()
-def clip_gradients(gradients: Sequence[Tensor], limit: float, each_tensor: bool) -> Tensor:
+def clip_gradients(
+    gradients: Sequence[Tensor], limit: float, each_tensor: bool, own: int = 0, own_squares: Tensor | None = None
+) -> Tensor:
     """Scale gradients down, in place, to a norm of at most `limit`; returns the norm of all before that, a scalar.
 
     With `each_tensor` every one is clipped by itself, as TensorFlow's clip_by_norm in Zhu's code.
+
+    Args:
+        gradients: all that this worker has.
+        limit: the largest norm.
+        each_tensor: see above.
+        own: how many of the last ones no other worker has.
+        own_squares: a scalar, the squares of these and of the others' own, added up; None where nobody has any.
     """
     norms = torch.stack([torch.linalg.vector_norm(gradient) for gradient in gradients])
     norm = torch.linalg.vector_norm(norms)
+    if own_squares is not None:
+        norm = (norms[: len(norms) - own].square().sum() + own_squares).sqrt()
     for gradient, own in zip(gradients, norms, strict=True):
         gradient.mul_((limit / (own if each_tensor else norm).clamp_min(1e-12)).clamp(max=1.0))
     return norm

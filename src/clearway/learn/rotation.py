@@ -13,7 +13,6 @@ from torch import Tensor
 
 from clearway.errors import RunError
 from clearway.learn.on_policy import OnPolicy
-from clearway.world.world import World
 
 ROTATION_SALT = 1_000_033
 
@@ -48,14 +47,19 @@ class Rotation:
         return order[number * self.scene_count // self.sets : (number + 1) * self.scene_count // self.sets].sort()[0]
 
 
-def divided_envs(world: World, learner: OnPolicy, scenes: Tensor) -> tuple[int, ...]:
+def divided_envs(states: Tensor, learner: OnPolicy, scenes: Tensor) -> tuple[int, ...]:
     """Environments of each scene, (C,); 0 of all but `scenes`, which share them and have one each at least.
+
+    Args:
+        states: (C,) int64, of each scene.
+        learner: the settings.
+        scenes: int64, ascending.
 
     Raises:
         RunError: too few for the number of scenes or minibatches.
     """
     _check_envs(learner, len(scenes))
-    upto = (_shares(world, learner, scenes).cumsum(0) * learner.envs).round().long()
+    upto = (_shares(states, learner, scenes).cumsum(0) * learner.envs).round().long()
     counts = torch.diff(upto, prepend=upto.new_zeros(1))
     for scene in scenes[counts[scenes] == 0].tolist():  # rounded away
         counts[counts.argmax()] -= 1
@@ -70,7 +74,7 @@ def scene_of_envs(envs_per_scene: Sequence[int], device: torch.device) -> Tensor
     return torch.arange(len(counts), device=device).repeat_interleave(counts)
 
 
-def check_division(world: World, learner: OnPolicy, rotation: Rotation) -> None:
+def check_division(states: Tensor, learner: OnPolicy, rotation: Rotation) -> None:
     """Check that environments suffice for every set that the rotation could deal: the smallest scene with the largest.
 
     Raises:
@@ -78,17 +82,17 @@ def check_division(world: World, learner: OnPolicy, rotation: Rotation) -> None:
     """
     if rotation.sets == 1:
         return
-    order = torch.diff(world.scene_offset).cpu().argsort(descending=True)
-    most = -(-world.scene_count // rotation.sets)
+    order = states.argsort(descending=True)
+    most = -(-len(states) // rotation.sets)
     _check_envs(learner, most)
-    least = float(_shares(world, learner, torch.cat([order[: most - 1], order[-1:]]))[order[-1]])
+    least = float(_shares(states, learner, torch.cat([order[: most - 1], order[-1:]]))[order[-1]])
     _check_rows(learner, max(1, int(least * learner.envs)))  # rounded up it is more
 
 
-def _shares(world: World, learner: OnPolicy, scenes: Tensor) -> Tensor:
+def _shares(all_states: Tensor, learner: OnPolicy, scenes: Tensor) -> Tensor:
     """Share of the environments that each scene is due, (C,) float64; 0 of all but `scenes`."""
-    states = torch.zeros(world.scene_count, dtype=torch.float64)
-    states[scenes] = torch.diff(world.scene_offset).cpu().double()[scenes]
+    states = torch.zeros(len(all_states), dtype=torch.float64)
+    states[scenes] = all_states.double()[scenes]
     return states / states.sum() if learner.envs_by == "states" else (states > 0).double() / len(scenes)
 
 

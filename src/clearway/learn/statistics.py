@@ -10,6 +10,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from clearway.learn.peers import ALONE, Peers
+
 WINDOW = 20  # episodes of a target after which its success rate is taken anew
 EPISODES, REACHED, STEPS, COLLISIONS = range(4)
 
@@ -41,6 +43,7 @@ class EpisodeStatistics:
         env_count, target_count: N, M.
         device: of the counts.
         told: (M,) bool, the targets that `solved` and `take` tell of; all by default.
+        peers: what they tell is of the targets of all workers, who then ask alike.
 
     Attributes:
         open_steps, open_collisions: (N,) float64, of the episodes under way.
@@ -50,7 +53,15 @@ class EpisodeStatistics:
         recent_success: (M,) float64, success rate over the last window; 0 before the first.
     """
 
-    def __init__(self, env_count: int, target_count: int, device: torch.device, told: Tensor | None = None) -> None:
+    def __init__(
+        self,
+        env_count: int,
+        target_count: int,
+        device: torch.device,
+        told: Tensor | None = None,
+        peers: Peers = ALONE,
+    ) -> None:
+        self.peers = peers
         self.told = torch.ones(target_count, dtype=torch.bool, device=device) if told is None else told
         self.open_steps = torch.zeros(env_count, dtype=torch.float64, device=device)
         self.open_collisions = torch.zeros_like(self.open_steps)
@@ -84,12 +95,12 @@ class EpisodeStatistics:
     @property
     def solved(self) -> int:
         """Number of targets told of that every episode of the last window reached."""
-        return int((self.recent_success == 1)[self.told].sum())
+        return self._of_all(int((self.recent_success == 1)[self.told].sum()))
 
     @property
     def target_count(self) -> int:
         """Number of targets told of."""
-        return int(self.told.sum())
+        return self._of_all(int(self.told.sum()))
 
     @property
     def all_solved(self) -> bool:
@@ -97,14 +108,24 @@ class EpisodeStatistics:
         return self.solved == self.target_count
 
     def take(self) -> Tensor:
-        """The totals of the targets told of since the last call, (M, 4) or fewer; all start again from zero."""
+        """The totals of the targets told of since the last call, (M, 4) or fewer; all start again from zero.
+
+        Of several workers' targets they are added up, (1, 4).
+        """
         totals = self.totals[self.told]
         self.totals.zero_()
+        if self.peers.count > 1:
+            totals = totals.sum(0, keepdim=True)
+            self.peers.add_up(totals)
         return totals
+
+    def _of_all(self, count: int) -> int:
+        """A count of this worker's targets, with the others'."""
+        return int(sum(theirs for [theirs] in self.peers.told(count)))
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on from here."""
-        return {name: tensor for name, tensor in vars(self).items() if name != "told"}
+        return {name: tensor for name, tensor in vars(self).items() if name not in ("told", "peers")}
 
     def load_tensors(self, tensors: dict[str, Tensor]) -> None:
         """Go on from where `tensors` was called."""

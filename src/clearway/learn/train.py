@@ -30,9 +30,11 @@ from clearway.learn.figures import Figures
 from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
+from clearway.learn.peers import ALONE, Peers
 from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.seeds import check_seed
+from clearway.learn.share import Share
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.tracking import check_tracker, tracker_of
 from clearway.reward import Reward
@@ -118,13 +120,25 @@ class RunRequest:
         """The reward as training pays it, see `Learner.paid`."""
         return self.learner.paid(self.reward)
 
-    def trainer(self) -> Learning:
-        """A trainer at its first frame."""
+    def trainer(self, peers: Peers = ALONE) -> Learning:
+        """A trainer at its first frame; of several workers, that of this one, with its part of the scenes.
+
+        Raises:
+            RunError: the learner, its settings or the scenes are not for so many workers.
+        """
         device, reward = usable_device(self.device), self.paid  # before the scenes, which may take long
-        world = make_world(self.scenes, self.targets, self.zone_level, self.feature_store)
-        if self.takes is not None:
-            world = world.with_takes(self.takes)
-        return self.learner.trainer(world.to(device), reward, self.seed)
+        if peers.count == 1:
+            return self.learner.trainer(self._world(slice(None)).to(device), reward, self.seed)
+        sizes = [scene.state_count for scene in self.scenes], [len(self.targets[scene.name]) for scene in self.scenes]
+        share = Share.of(*sizes, peers)
+        return self.learner.part_trainer(self._world(share.own).to(device), reward, self.seed, share)
+
+    def _world(self, part: slice) -> World:
+        """The tables of a part of the scenes."""
+        scenes = self.scenes[part]
+        targets = {scene.name: self.targets[scene.name] for scene in scenes} if part.stop else self.targets
+        world = make_world(scenes, targets, self.zone_level, self.feature_store)
+        return world if self.takes is None else world.with_takes(self.takes[part])
 
 
 def train(

@@ -24,10 +24,10 @@ from clearway.learn.own_goals import OwnGoals, goal_world
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.rotation import Rotation, check_division, divided_envs, scene_of_envs
+from clearway.learn.share import HEADS, Share
 from clearway.learn.statistics import EpisodeStatistics
-from clearway.model.feature_map import network_input
 from clearway.model.lookup import Activations, LookupNetwork
-from clearway.model.network import NetworkShape, SiameseActorCritic
+from clearway.model.network import NetworkShape, SiameseActorCritic, grad_of
 from clearway.model.precision import factor_dtype
 from clearway.model.sums import counted
 from clearway.reward import Reward
@@ -57,13 +57,18 @@ class Trainer:
         learner: the settings, of PPO or A2C.
         reward: what is earned.
         seed: of parameters, environments, actions and shuffling.
+        share: what the world's scenes are of those of all workers; None: there is one worker.
 
     Raises:
         RunError: features are missing or not finite, or a scene has no environment or fewer rows than there are
             minibatches.
     """
 
-    def __init__(self, world: World, learner: OnPolicy, reward: Reward, seed: int) -> None:
+    def __init__(
+        self, world: World, learner: OnPolicy, reward: Reward, seed: int, share: Share | None = None
+    ) -> None:
+        self.share = share = share or Share.whole(world)
+        self.peers = share.peers
         self.world, self.learner, self.seed = world, learner, seed
         self.own_goals: OwnGoals | None = None
         if learner.goals == "seen":
@@ -71,12 +76,14 @@ class Trainer:
             self.own_goals = OwnGoals(world, self.world.target_state)
         self.frames, self.updates = 0, 0
         device = world.device
-        self.rotation = Rotation(world.scene_count, learner.scenes_at_once, learner.scene_updates, seed)
-        check_division(world, learner, self.rotation)
-        envs_per_scene = divided_envs(world, learner, self.rotation.scenes(0))
-        self.env_count, env_scene = sum(envs_per_scene), scene_of_envs(envs_per_scene, device)
-        self.feature_map, features = network_input(world, learner)
-        seeds = torch.arange(self.env_count, dtype=torch.int64, device=device) + (seed << 32)
+        self.rotation = Rotation(len(share.states), learner.scenes_at_once, learner.scene_updates, seed)
+        check_division(share.states, learner, self.rotation)
+        self.env_counts = divided_envs(share.states, learner, self.rotation.scenes(0))  # of all workers
+        envs_per_scene = self.env_counts[share.own]
+        self.env_count, env_scene = sum(self.env_counts), scene_of_envs(envs_per_scene, device)
+        self.feature_map, features = share.network_input(world, learner)
+        first_env = sum(self.env_counts[: share.first])
+        seeds = torch.arange(first_env, first_env + len(env_scene), dtype=torch.int64, device=device) + (seed << 32)
         choice = TargetChoice.by_scene(world, env_scene)
         told = None
         if self.own_goals:
@@ -85,21 +92,27 @@ class Trainer:
                 self.own_goals.weights(choice, torch.ones(world.target_count, dtype=torch.float64, device=device))
             )
         self.navigation = Navigation(
-            world, reward, seeds, choice=choice, step_limit=learner.step_limit, history_length=learner.history_length
+            world,
+            reward,
+            seeds,
+            choice=choice,
+            step_limit=learner.step_limit,
+            history_length=learner.history_length,
+            reward_dtype=torch.get_default_dtype(),
         )
-        heads = learner.head_count(world.scene_count)
+        heads = learner.head_count(len(share.states))
         shape = NetworkShape(heads, self.feature_map.input_count, learner.width, learner.history_length)
-        self.network = SiameseActorCritic(shape, seed).to(device)
+        self.network = share.own_network(SiameseActorCritic(shape, seed), learner.heads_by_scene).to(device)
         self.lookup = LookupNetwork(
             self.network,
             features,
             world.target_state * world.sightings,  # seen in the scene's own pictures
             factor_dtype(learner.matmul_precision, device),
-            most_seen=self.env_count * (learner.history_length + learner.rollout_steps),
+            most_seen=len(seeds) * (learner.history_length + learner.rollout_steps),
         )
         self.siamese_optimiser, self.optimiser = optimisers(self.network, learner.optimiser)
         self.observed = Observed(world)
-        self.statistics = EpisodeStatistics(self.env_count, world.target_count, device, told)
+        self.statistics = EpisodeStatistics(len(seeds), world.target_count, device, told, self.peers)
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.one_pass = learner.epochs * learner.minibatches == 1
         self.collector = Collector(
@@ -143,9 +156,7 @@ class Trainer:
         self._rebalance()
         result = {
             **self._loss_figures(steps, explained),
-            "hindsight_rows": len(batch) - rows,
-            "distinct_pairs": sum(step.pairs for step in steps) / sum(step.rows for step in steps),
-            "distinct_histories": sum(step.histories for step in steps) / sum(step.rows for step in steps),
+            **self._row_figures(steps, len(batch) - rows),
             "lr": lr,
             "entropy_weight": settings.entropy_weight,
         }
@@ -156,7 +167,7 @@ class Trainer:
 
     def _next_steps(self) -> int:
         """Steps of the next rollout; every scene has a row for every minibatch."""
-        learner, fewest = self.learner, min(count for count in self.collector.rows_per_scene if count)
+        learner, fewest = self.learner, min(count for count in self.env_counts if count)
         least = -(-learner.minibatches // fewest)
         return next_steps(self.frames, learner.frames, self.env_count, learner.rollout_steps, least)
 
@@ -169,7 +180,8 @@ class Trainer:
 
     def _seat(self, update: int) -> None:
         """Put the environments into the scenes of that update."""
-        counts = divided_envs(self.world, self.learner, self.rotation.scenes(update))
+        self.env_counts = divided_envs(self.share.states, self.learner, self.rotation.scenes(update))
+        counts = self.env_counts[self.share.own]
         self.navigation.choice.groups = scene_of_envs(counts, self.world.device)
         self.collector.rows_per_scene = counts
 
@@ -192,7 +204,8 @@ class Trainer:
             learner.gae_lambda,
         )
         value_target = advantage + value
-        explained = 1 - advantage.var(correction=0) / value_target.var(correction=0).clamp_min(1e-12)
+        variances = [self.peers.variance(values) for values in (advantage, value_target)]
+        explained = 1 - variances[0] / variances[1].clamp_min(1e-12)
         batch = Batch(
             as_rows(rollout.history),
             as_rows(rollout.target),
@@ -282,16 +295,25 @@ class Trainer:
             parts=learner.minibatches,
             row_step=self.lookup.row_step,
             generator=generator,
+            peers=self.peers,
         )
         steps: list[StepFigures] = []
         siamese_moved = False
         for minibatches in epochs:
+            row_counts = self._row_counts(minibatches)
             for number, part in enumerate(minibatches, start=1):
                 if steps:
                     self.lookup.refresh(siamese_weight=siamese_moved, few_rows=False)
                 siamese_moved = learner.siamese_step == "minibatch" or number == len(minibatches)
-                steps.append(self._step(part, kept, lr, settings, siamese_moved))
+                counted_over = replace(settings, row_count=row_counts[number - 1])
+                steps.append(self._step(part, kept, lr, counted_over, siamese_moved))
         return steps
+
+    def _row_counts(self, minibatches: list[Minibatch]) -> list[int | None]:
+        """Rows of all workers in each minibatch; None where there is one worker."""
+        if self.peers.count == 1:
+            return [None] * len(minibatches)
+        return [int(sum(counts)) for counts in zip(*self.peers.told(*(len(m.rows) for m in minibatches)), strict=True)]
 
     def _step(
         self, part: Minibatch, kept: Activations | None, lr: float, settings: LossSettings, siamese_moves: bool
@@ -305,20 +327,36 @@ class Trainer:
         if siamese_moves:
             self.lookup.siamese_gradient()
         gradients = self.network.layer_gradients()[0 if siamese_moves else 1 :]
-        norm = clip_gradients(gradients, learner.clip_norm, learner.clip_each_tensor)
+        own = self._add_up_gradients(siamese_moves)
+        norm = clip_gradients(gradients, learner.clip_norm, learner.clip_each_tensor, *own)
         self.optimiser.step(lr)
         if siamese_moves:
             self.siamese_optimiser.step(lr * learner.siamese_lr)
         return StepFigures(loss, norm, len(part.rows), part.pair_count, part.history_count)
 
+    def _add_up_gradients(self, siamese_moves: bool) -> tuple[int, Tensor | None]:
+        """Add up over workers; what `clip_gradients` has to know of those that only one of them has."""
+        if self.peers.count == 1:
+            return 0, None
+        return self.share.add_up_gradients(self.network, self.learner.heads_by_scene, siamese_moves)
+
+    def _row_figures(self, steps: list[StepFigures], hindsight_rows: int) -> Figures:
+        """Figures of what was learnt from, by all workers."""
+        own = [hindsight_rows, *(sum(getattr(step, name) for step in steps) for name in ("rows", "pairs", "histories"))]
+        hindsight, rows, pairs, histories = (int(sum(numbers)) for numbers in zip(*self.peers.told(*own), strict=True))
+        return {
+            "hindsight_rows": hindsight,
+            "distinct_pairs": pairs / rows,
+            "distinct_histories": histories / rows,
+        }
+
     def _loss_figures(self, steps: list[StepFigures], explained: Tensor) -> Figures:
         """Figures of the loss, read from the device at once: means over steps, and the explained variance."""
         names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
-        told = [
-            torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped, s.norm])
-            for s in steps
-        ]
-        *means, last = torch.cat([torch.stack(told).mean(0), explained[None]]).tolist()
+        told = torch.stack([torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped]) for s in steps])
+        self.peers.add_up(told)
+        norm = torch.stack([s.norm for s in steps])[:, None]
+        *means, last = torch.cat([torch.cat([told, norm], 1).mean(0), explained[None]]).tolist()
         figures = {**dict(zip(names, means, strict=True)), "explained_variance": last}
         if math.isinf(self.learner.ratio_clip):
             del figures["clipped"]
@@ -353,11 +391,13 @@ class Trainer:
         }
         if self.own_goals:
             parts["own_goals"] = {"known": self.own_goals.known}
-        return {name: tensor.detach() for name, tensor in joined(parts).items()}
+        own = {name: tensor.detach() for name, tensor in joined(parts).items()}
+        return self.share.joined(own, self.learner.heads_by_scene, self.world.sightings)
 
     @torch.no_grad()
     def load_tensors(self, tensors: dict[str, Tensor], frames: int, updates: int) -> None:
-        """Go on from where `tensors` was called, after that many frames and updates."""
+        """Go on from where `tensors` was called, after that many frames and updates, by however many workers."""
+        tensors = self.share.own_part(tensors, self.env_counts, self.learner.heads_by_scene, self.world.sightings)
         for name, parameter in self.network.named_parameters():
             parameter.copy_(tensors[f"network.{name}"])
         for optimiser in (self.siamese_optimiser, self.optimiser):
