@@ -10,14 +10,12 @@ import torch
 import torch.distributed as dist
 from torch import Tensor
 
-from clearway.errors import RunError
 from clearway.learn import trainer as trainer_module
 from clearway.learn.a2c import A2C
 from clearway.learn.bc import BC
 from clearway.learn.learner import Learner
-from clearway.learn.peers import Peers, divided
+from clearway.learn.peers import Peers
 from clearway.learn.presets import DEFAULT, PAPER_A2C
-from clearway.learn.q_learning import QLearning
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
 from helpers.made import corridor_scene, grid_scene

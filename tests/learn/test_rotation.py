@@ -81,7 +81,13 @@ def test_where_a_turn_ends_open_episodes_are_forgotten() -> None:
 def test_environments_are_shared_by_the_scenes_in_proportion_to_their_states() -> None:
     learner = small_learner(envs=40)
     assert divided_envs(states_of(corridors()), learner, torch.tensor([0, 4])) == (12, 0, 0, 0, 28)
-    assert divided_envs(states_of(corridors()), replace(learner, envs_by="scenes"), torch.tensor([1, 2])) == (0, 20, 20, 0, 0)
+    assert divided_envs(states_of(corridors()), replace(learner, envs_by="scenes"), torch.tensor([1, 2])) == (
+        0,
+        20,
+        20,
+        0,
+        0,
+    )
 
 
 @pytest.mark.parametrize("updates", [1, 3, 4, 7])

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_args
@@ -29,7 +30,8 @@ from clearway.learn.run_folder import RunRecord
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.learn.solved import unsolved_targets
 from clearway.learn.train import RunRequest
-from clearway.learn.train import train as train_run
+from clearway.learn.train import train as train_alone
+from clearway.learn.workers import train_by_workers
 from clearway.live.conditions import Perturbations
 from clearway.markdown import table_lines
 from clearway.plugins import find_plugin
@@ -105,6 +107,7 @@ def train(
     device: str = "cpu",
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
+    workers: int = 1,
     until_solved: bool = False,
     track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
@@ -136,6 +139,8 @@ def train(
         device: of torch, "cpu" or "cuda".
         feature_store: where features are kept: "memory", "float16" or "mapped", see `clearway.world.feature_store`.
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
+        workers: processes of this machine that train together, a scene each at least; by ppo, a2c and bc. A script that
+            asks for several does it below `if __name__ == "__main__":`. See docs/scale.md.
         until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target
             reached it.
         track: where figures are shown as they come, beside `metrics.jsonl`: "tensorboard", in the run folder, or
@@ -153,8 +158,8 @@ def train(
     if resume and out is None:
         raise ArgumentError("resume=True: expected the run folder to go on with. Give it as out")
     number = as_seed("seed", seed)
-    learner = chosen_learner(algorithm, frames, settings)
-    pairs = scenes_and_files(scenes, features_in_file=store != "memory")
+    learner, processes = chosen_learner(algorithm, frames, settings), as_whole("workers", workers, 1)
+    pairs = scenes_and_files(scenes, features_in_file=store != "memory" or processes > 1)
     loaded = [scene for scene, _ in pairs]
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
@@ -181,6 +186,7 @@ def train(
             perturb=_as_words(perturb),
             takes=takes,
             threads=threads,
+            workers=processes if processes > 1 else None,
             until="solved" if until_solved else None,
             track=track,
         )
@@ -190,6 +196,7 @@ def train(
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
+        train_run = train_alone if processes == 1 else partial(train_by_workers, workers=processes, threads=threads)
         folder = train_run(
             request,
             path,

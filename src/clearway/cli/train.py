@@ -70,6 +70,9 @@ class Train:
     """Of parameters, environments, actions and the choice of targets."""
     threads: int | None = None
     """Threads of torch, or processes of a3c. Results repeat bit for bit at one number of threads, and a3c's with 1."""
+    workers: int = 1
+    """Processes of this machine that train one agent together, a scene each at least; ppo, a2c, bc. The result is that
+    of one, up to rounding. One that dies is replaced. See docs/scale.md."""
     perturb: tuple[str, ...] = ()
     """Learn from perturbed pictures too: all, geometry, names, light=0.2, as of evaluate --goals. Every pose is seen in
     one of --takes pictures or the scene's own, another at each step. In rooms that can be built again; by ppo, a2c,
@@ -109,6 +112,7 @@ class Train:
             device=self.device,
             feature_store=self.feature_store,
             threads=self.threads,
+            workers=self.workers,
             until_solved=self.until == "solved",
             track=self.track,
             on_begin=self._begun,
@@ -138,6 +142,7 @@ class Train:
                 perturb=self.perturb,
                 takes=self.takes,
                 threads=self.threads,
+                workers=self.workers if self.workers > 1 else None,
                 until=self.until,
                 track=self.track,
             )

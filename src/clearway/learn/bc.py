@@ -62,6 +62,12 @@ class BC(OnFeatures, Learner):
         """A trainer at its first frame."""
         return Cloning(world, self, reward, seed)
 
+    def check_workers(self, states: Tensor) -> None:
+        """Raise RunError where there are fewer environments than scenes, which have so many states (C,)."""
+        if self.envs < len(states):
+            problem = f"{self.envs} environments for {len(states)} scenes"
+            raise RunError(f"{problem}. Give more environments (envs)")
+
     def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Cloning:
         """The trainer of one of several workers."""
         return Cloning(world, self, reward, seed, share)
@@ -85,8 +91,7 @@ class Cloning:
         self.share = share = share or Share.whole(world)
         self.peers = share.peers
         scenes = len(share.states)
-        if learner.envs < scenes:
-            raise RunError(f"{learner.envs} environments for {scenes} scenes. Give more environments (envs)")
+        learner.check_workers(share.states)
         self.feature_map, features = share.network_input(world, learner)
         self.world, self.learner = world, learner
         self.frames, self.updates = 0, 0
@@ -113,7 +118,12 @@ class Cloning:
         self.statistics = EpisodeStatistics(len(envs), world.target_count, world.device, peers=self.peers)
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.collector = Collector(
-            self.navigation, self.lookup, self.action_stream, self.envs_per_scene, learner.rollout_steps, keep_hidden=True
+            self.navigation,
+            self.lookup,
+            self.action_stream,
+            self.envs_per_scene,
+            learner.rollout_steps,
+            keep_hidden=True,
         )
         self.distances = world.distance_table()
         self.navigation.reset()

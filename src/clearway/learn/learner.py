@@ -127,13 +127,13 @@ class Learner:
         """
         raise NotImplementedError
 
-    def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Learning:
-        """The trainer of one of several workers, whose scenes are those of `world`; as `trainer`.
-
-        Raises:
-            RunError: the algorithm, or a setting, is not for several workers, or as of `trainer`.
-        """
+    def check_workers(self, states: Tensor) -> None:
+        """Raise RunError where several workers cannot train it on scenes of so many states (C,) int64."""
         raise RunError(f"{self.algorithm} is trained by one worker. Leave --workers out, or use ppo, a2c or bc")
+
+    def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Learning:
+        """The trainer of one of several workers, whose scenes are those of `world`; otherwise as `trainer`."""
+        raise NotImplementedError
 
     def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedAgent:
         """The agent of a run from the tensors of its checkpoint, after that many frames.

@@ -112,8 +112,12 @@ class Deck:
         parts = min(parts, self.all_histories)
         part_of = torch.empty_like(order)
         part_of[order] = (self.before + torch.arange(len(order), device=order.device)) % parts
-        upto = [-(-(count - part) // parts) for part in range(parts) for count in (self.before, self.before + len(order))]
-        return self._divided(part_of[self.history], [last - first for first, last in zip(upto[::2], upto[1::2], strict=True)])
+        upto = [
+            -(-(count - part) // parts) for part in range(parts) for count in (self.before, self.before + len(order))
+        ]
+        return self._divided(
+            part_of[self.history], [last - first for first, last in zip(upto[::2], upto[1::2], strict=True)]
+        )
 
     def _divided(self, part: Tensor, histories_per_part: Sequence[int]) -> list[Minibatch]:
         """A minibatch of the rows of each part (B,) int64, of which every history's rows are the same.

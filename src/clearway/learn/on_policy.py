@@ -6,11 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+import torch
+
 from clearway.choices import Goals, MatmulPrecision
 from clearway.errors import RunError
 from clearway.learn.learner import Learner, OnFeatures, geometric, linear
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from clearway.learn.share import Share
     from clearway.learn.trainer import Trainer
     from clearway.reward import Reward
@@ -147,12 +151,18 @@ class OnPolicy(OnFeatures, Learner):
 
         return Trainer(world, self, reward, seed)
 
-    def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Trainer:
-        """The trainer of one of several workers."""
-        from clearway.learn.trainer import Trainer
+    def check_workers(self, states: Tensor) -> None:
+        """Raise RunError where a setting is for one worker alone, or environments do not suffice."""
+        from clearway.learn.rotation import divided_envs
 
         if self.scenes_at_once:
             raise RunError("scenes_at_once: several workers walk all scenes at a time. Leave it out, or --workers")
         if self.goals == "seen":
             raise RunError("goals=seen: own goals are for one worker. Leave it out, or --workers")
+        divided_envs(states, self, torch.arange(len(states)))
+
+    def part_trainer(self, world: World, reward: Reward, seed: int, share: Share) -> Trainer:
+        """The trainer of one of several workers."""
+        from clearway.learn.trainer import Trainer
+
         return Trainer(world, self, reward, seed, share)

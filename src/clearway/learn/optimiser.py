@@ -116,7 +116,7 @@ def clip_gradients(
     norms = torch.stack([torch.linalg.vector_norm(gradient) for gradient in gradients])
     norm = torch.linalg.vector_norm(norms)
     if own_squares is not None:
-        norm = (norms[: len(norms) - own].square().sum() + own_squares).sqrt()
-    for gradient, own in zip(gradients, norms, strict=True):
-        gradient.mul_((limit / (own if each_tensor else norm).clamp_min(1e-12)).clamp(max=1.0))
+        norm = torch.sqrt(norms[: len(norms) - own].square().sum() + own_squares)
+    for gradient, length in zip(gradients, norms, strict=True):
+        gradient.mul_((limit / (length if each_tensor else norm).clamp_min(1e-12)).clamp(max=1.0))
     return norm

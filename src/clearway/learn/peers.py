@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
-import torch.distributed as dist
 from torch import Tensor
 
 
@@ -25,6 +24,7 @@ class Peers:
     Args:
         group: the process group; None: this worker is alone.
         device: where tensors lie that the group's backend can send.
+        name: where this worker is found, for people.
 
     Attributes:
         rank: number of this worker, from 0.
@@ -33,9 +33,10 @@ class Peers:
         waited_s: seconds spent on it so far, those of waiting for the others among them.
     """
 
-    def __init__(self, group: Any | None = None, device: torch.device | str = "cpu") -> None:
-        self.group, self.device = group, torch.device(device)
-        self.rank, self.count = (0, 1) if group is None else (group.rank(), group.size())
+    def __init__(self, group: Any | None = None, device: torch.device | str = "cpu", name: str = "here") -> None:
+        self.group, self.device, self.name = group, torch.device(device), name
+        self.rank: int = 0 if group is None else group.rank()
+        self.count: int = 1 if group is None else group.size()
         self.sent_bytes, self.waited_s = 0, 0.0
 
     @property

@@ -66,8 +66,7 @@ class Share:
         Raises:
             RunError: there are more workers than scenes.
         """
-        if len(states) < peers.count:
-            raise RunError(f"{peers.count} workers for {len(states)} scenes, which stay whole. Give fewer --workers")
+        check_scenes(len(states), peers.count)
         cuts = divided(states, peers.count)
         return cls(torch.tensor(states), tuple(targets), cuts[peers.rank], cuts[peers.rank + 1], peers)
 
@@ -197,6 +196,12 @@ class Share:
         if name == "observed.next_state":
             return torch.where(tensor == UNKNOWN, UNKNOWN, tensor + sign * states)
         return tensor
+
+
+def check_scenes(scenes: int, workers: int) -> None:
+    """Raise RunError where there are more workers than scenes."""
+    if scenes < workers:
+        raise RunError(f"{workers} workers for {scenes} scenes, which stay whole. Give fewer --workers")
 
 
 def _divided_by(name: str, heads_by_scene: bool) -> Rows | None:

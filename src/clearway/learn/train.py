@@ -7,7 +7,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -30,11 +30,12 @@ from clearway.learn.figures import Figures
 from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
+from clearway.learn.pace import Pace
 from clearway.learn.peers import ALONE, Peers
 from clearway.learn.progress import ProgressView, progress_view
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.seeds import check_seed
-from clearway.learn.share import Share
+from clearway.learn.share import Share, check_scenes
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.tracking import check_tracker, tracker_of
 from clearway.reward import Reward
@@ -120,6 +121,17 @@ class RunRequest:
         """The reward as training pays it, see `Learner.paid`."""
         return self.learner.paid(self.reward)
 
+    def check_workers(self, workers: int) -> None:
+        """Refuse what several workers cannot train, before any is started.
+
+        Raises:
+            RunError: the learner, its settings or the scenes are not for so many workers, or there is no such device.
+        """
+        usable_device(self.device)
+        states = [scene.state_count for scene in self.scenes]
+        check_scenes(len(states), workers)
+        self.learner.check_workers(torch.tensor(states))
+
     def trainer(self, peers: Peers = ALONE) -> Learning:
         """A trainer at its first frame; of several workers, that of this one, with its part of the scenes.
 
@@ -175,27 +187,71 @@ def train(
         other_bits = folder.begin(record_of(request), resume)
         if on_begin is not None:
             on_begin(out)
-        seconds = 0.0 if other_bits is None else _resumed(trainer, folder, other_bits)
+        told_of_other_bits(folder, request, other_bits)
+        seconds = 0.0 if other_bits is None else _resumed(trainer, folder)
         with (
             closing(trainer),
             progress_view(trainer.learner.frames, show_progress) as view,
             interruption() as interrupted,
         ):
-            _run(trainer, folder, view, interrupted, seconds, milestones, until_solved, track)
+            every_s = SECONDS_BETWEEN_CHECKPOINTS
+            run = Running(trainer, folder, view, interrupted, milestones, until_solved, track, ALONE, every_s)
+            run.go_on(seconds)
     return folder
 
 
-def _resumed(trainer: Learning, folder: RunFolder, other_bits: Sequence[str]) -> float:
-    """Load the newest checkpoint; returns the seconds trained so far.
+def train_part(
+    request: RunRequest,
+    folder: RunFolder,
+    peers: Peers,
+    *,
+    show_progress: bool,
+    until_solved: bool,
+    track: TrackerName | None,
+    checkpoint_s: float,
+) -> None:
+    """Train as one of several workers, from the newest checkpoint of a run that has been begun, if it has one.
 
-    Warns:
-        UserWarning: there is more to train, in another way than the run began, see `RunRecord.other_bits`.
+    Args:
+        request, folder: what to train, where; a folder that all workers see.
+        peers: the workers.
+        show_progress, until_solved, track: as of `train`.
+        checkpoint_s: seconds between checkpoints.
+
+    Raises:
+        RunError, KeyboardInterrupt: as of `train`.
+        LostPeer: another worker ended, or does not answer.
     """
+    trainer = request.trainer(peers)
+    with folder.held() if peers.leads else nullcontext():
+        seconds = 0.0
+        if any(folder.checkpoints.glob("frames-*")):
+            seconds = _resumed(trainer, folder, peers)
+        elif peers.leads:
+            folder.forget_metrics_after(-1)
+        found = [frames for [frames] in peers.told(trainer.frames)]
+        if len(set(found)) > 1:
+            problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
+            raise RunError(f"{problem}. Give a folder that all machines share as --out")
+        with (
+            progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
+            interruption() as interrupted,
+        ):
+            run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s)
+            run.go_on(seconds)
+
+
+def told_of_other_bits(folder: RunFolder, request: RunRequest, other_bits: Sequence[str] | None) -> None:
+    """Warn where there is more to train, in another way than the run began, see `RunRecord.other_bits`."""
+    if other_bits and read_progress(newest_checkpoint(folder.checkpoints)).frames < request.learner.frames:
+        told = f"{folder.path}: goes on with {', '.join(other_bits)}"
+        warnings.warn(f"{told}; results will not be those of an uninterrupted run", stacklevel=3)
+
+
+def _resumed(trainer: Learning, folder: RunFolder, peers: Peers = ALONE) -> float:
+    """Load the newest checkpoint; returns the seconds trained so far."""
     checkpoint = newest_checkpoint(folder.checkpoints)
     progress = read_progress(checkpoint)
-    if other_bits and progress.frames < trainer.learner.frames:
-        told = f"{folder.path}: goes on with {', '.join(other_bits)}"
-        warnings.warn(f"{told}; results will not be those of an uninterrupted run", stacklevel=2)
     tensors = {**read_training(checkpoint), **read_network(checkpoint)}
     try:
         trainer.load_tensors(tensors, progress.frames, progress.updates)
@@ -204,69 +260,100 @@ def _resumed(trainer: Learning, folder: RunFolder, other_bits: Sequence[str]) ->
         raise RunError(
             f"{checkpoint}: does not fit its run ({reason}). Remove it, to go on from the one before, or train again"
         ) from error
-    folder.forget_metrics_after(progress.frames)
+    if peers.leads:
+        folder.forget_metrics_after(progress.frames)
     return progress.seconds
 
 
-def _run(
-    trainer: Learning,
-    folder: RunFolder,
-    view: ProgressView,
-    interrupted: threading.Event,
-    seconds: float,
-    milestones: Sequence[int],
-    until_solved: bool,
-    track: TrackerName | None,
-) -> None:
-    """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
+@dataclass
+class Running:
+    """A training under way, of this worker: updates, rows of metrics, milestones, checkpoints.
 
-    A run that is finished already is left as it is.
+    With several workers all of them come by the same lines, and the first writes.
+
+    Attributes:
+        trainer, folder, view, interrupted, milestones, until_solved, track: as of `train`.
+        peers: the workers.
+        checkpoint_s: seconds between checkpoints.
     """
 
-    def done() -> bool:
-        return trainer.finished or (until_solved and trainer.statistics.all_solved)
+    trainer: Learning
+    folder: RunFolder
+    view: ProgressView
+    interrupted: threading.Event
+    milestones: Sequence[int]
+    until_solved: bool
+    track: TrackerName | None
+    peers: Peers
+    checkpoint_s: float
 
-    if done():
-        return
-    settings = folder.read_record().to_json() if track else {}
-    log = MetricsLog(folder.metrics_path, tracker_of(track, folder.path, settings, folder.metrics(), seconds))
-    seen, rows = trainer.frames, _rows_due(trainer)
-    saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
-    update: Figures | None = None
+    def go_on(self, seconds: float) -> None:
+        """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
 
-    def tell() -> None:
-        """Keep the milestones gone by, and write the row that is due."""
-        nonlocal seen, rows
-        for milestone in milestones:
-            if seen < milestone <= trainer.frames:
-                _save_agent(trainer, folder.milestone(milestone), seconds)
-        stopped = seen < trainer.frames and not trainer.finished and done()  # its last row is due with no frame
-        if update is not None and (_rows_due(trainer) > rows or stopped):
-            log.write(metrics_row(trainer, update, seconds))
-            rows = _rows_due(trainer)
-        seen = trainer.frames
+        A run that is finished already is left as it is. `seconds`: trained so far.
+        """
+        if self._done():
+            return
+        log = self._log(seconds)
+        try:
+            self._train(log, seconds)
+        finally:
+            if log:
+                log.close()
+        if not self._done():
+            raise KeyboardInterrupt
 
-    try:
-        while not done() and not interrupted.is_set():
+    def _done(self) -> bool:
+        return self.trainer.finished or (self.until_solved and self.trainer.statistics.all_solved)
+
+    def _log(self, seconds: float) -> MetricsLog | None:
+        """Where rows are written; None at workers that do not."""
+        if not self.peers.leads:
+            return None
+        folder = self.folder
+        settings = folder.read_record().to_json() if self.track else {}
+        tracker = tracker_of(self.track, folder.path, settings, folder.metrics(), seconds)
+        return MetricsLog(folder.metrics_path, tracker)
+
+    def _train(self, log: MetricsLog | None, seconds: float) -> None:
+        trainer, pace = self.trainer, Pace(self.peers)
+        seen, rows = trainer.frames, _rows_due(trainer)
+        saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
+        update: Figures | None = None
+
+        def tell() -> None:
+            """Keep the milestones gone by, and write the row that is due."""
+            nonlocal seen, rows
+            for milestone in self.milestones:
+                if seen < milestone <= trainer.frames:
+                    _save_agent(trainer, self.folder.milestone(milestone), seconds)
+            stopped = seen < trainer.frames and not trainer.finished and self._done()  # its last row is due, no frame
+            if update is not None and (_rows_due(trainer) > rows or stopped):
+                row = metrics_row(trainer, update, seconds) | pace.figures()
+                if log:
+                    log.write(row)
+                rows = _rows_due(trainer)
+            seen = trainer.frames
+
+        stops = False
+        while not self._done() and not stops:
             started = time.monotonic()
-            update = trainer.update()
+            with pace.measured():
+                update = trainer.update()
             seconds += time.monotonic() - started
-            saves = time.monotonic() - saved_at > SECONDS_BETWEEN_CHECKPOINTS
-            if saves or trainer.finished or any(seen < milestone <= trainer.frames for milestone in milestones):
+            late = time.monotonic() - saved_at > self.checkpoint_s
+            stops, saves = self.peers.any(self.interrupted.is_set(), late and self.peers.leads)
+            if saves or trainer.finished or any(seen < milestone <= trainer.frames for milestone in self.milestones):
                 trainer.tensors()  # A3C's workers walk on until then; what is told and what is saved must agree
             tell()
-            view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
+            self.view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
             if saves:
-                save(trainer, folder, seconds)
+                save(trainer, self.folder, seconds, self.peers)
                 saved_at, saved_frames = time.monotonic(), trainer.frames
         trainer.tensors()
         tell()
         if saved_frames != trainer.frames:
-            save(trainer, folder, seconds)
-    finally:
-        log.close()
-    if not done():
-        raise KeyboardInterrupt
+            save(trainer, self.folder, seconds, self.peers)
 
 
 def _rows_due(trainer: Learning) -> int:
@@ -274,9 +361,11 @@ def _rows_due(trainer: Learning) -> int:
     return trainer.frames * ROWS_A_RUN // trainer.learner.frames
 
 
-def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
-    """Write a checkpoint of the trainer as it stands."""
+def save(trainer: Learning, folder: RunFolder, seconds: float, peers: Peers = ALONE) -> None:
+    """Write a checkpoint of the trainer as it stands; of several workers the first does."""
     tensors = trainer.tensors()
+    if not peers.leads:
+        return
     training = {key: value for key, value in tensors.items() if not _acts(trainer, key)}
     progress = Progress(trainer.frames, trainer.updates, seconds)
     write_checkpoint(folder.checkpoints, _agent(trainer, tensors), training, progress)

@@ -24,10 +24,10 @@ from clearway.learn.own_goals import OwnGoals, goal_world
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
 from clearway.learn.rotation import Rotation, check_division, divided_envs, scene_of_envs
-from clearway.learn.share import HEADS, Share
+from clearway.learn.share import Share
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.model.lookup import Activations, LookupNetwork
-from clearway.model.network import NetworkShape, SiameseActorCritic, grad_of
+from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
 from clearway.model.sums import counted
 from clearway.reward import Reward
@@ -64,9 +64,7 @@ class Trainer:
             minibatches.
     """
 
-    def __init__(
-        self, world: World, learner: OnPolicy, reward: Reward, seed: int, share: Share | None = None
-    ) -> None:
+    def __init__(self, world: World, learner: OnPolicy, reward: Reward, seed: int, share: Share | None = None) -> None:
         self.share = share = share or Share.whole(world)
         self.peers = share.peers
         self.world, self.learner, self.seed = world, learner, seed
@@ -353,7 +351,9 @@ class Trainer:
     def _loss_figures(self, steps: list[StepFigures], explained: Tensor) -> Figures:
         """Figures of the loss, read from the device at once: means over steps, and the explained variance."""
         names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
-        told = torch.stack([torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped]) for s in steps])
+        told = torch.stack(
+            [torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped]) for s in steps]
+        )
         self.peers.add_up(told)
         norm = torch.stack([s.norm for s in steps])[:, None]
         *means, last = torch.cat([torch.cat([told, norm], 1).mean(0), explained[None]]).tolist()

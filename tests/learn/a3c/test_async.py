@@ -202,9 +202,11 @@ def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -
     assert are_gone_soon(workers)
     trainer = a3c_request(10_000_000).trainer()
     folder = RunFolder(tmp_path)
-    other_bits = folder.begin(record_of(a3c_request(10_000_000)), resume=True)
+    request = a3c_request(10_000_000)
+    other_bits = folder.begin(record_of(request), resume=True)
     with pytest.warns(UserWarning, match="threads 1 instead of 2"):
-        train._resumed(trainer, folder, other_bits)
+        train.told_of_other_bits(folder, request, other_bits)
+    train._resumed(trainer, folder)
     assert trainer.frames == read_progress(newest_checkpoint(folder.checkpoints)).frames > 0
 
 

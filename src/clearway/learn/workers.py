@@ -1,0 +1,202 @@
+"""Several processes of this machine train one agent: started, watched and replaced by PyTorch's elastic agent.
+
+The parent checks the request and begins the run folder. The workers (`Peers`) train; the first of them writes. Where
+one is killed or hangs, all are started again from the newest checkpoint, and rows of metrics after it are dropped:
+nothing is learnt twice. Errors of our own end the training, since another try would meet them again.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from datetime import timedelta
+from pathlib import Path
+
+import torch
+
+from clearway.children import end_with_parent
+from clearway.choices import TrackerName
+from clearway.errors import ClearwayError, RunError
+from clearway.learn.peers import LostPeer, Peers
+from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.tracking import check_tracker
+from clearway.learn.train import SECONDS_BETWEEN_CHECKPOINTS, RunRequest, set_threads, told_of_other_bits, train_part
+
+RESTARTS = 100  # of one training, after which it is given up
+PATIENCE = timedelta(minutes=5)  # for another worker to answer, after which it counts as lost
+FAILED = "failed"  # key of the store under which an error's words are told to the others
+INTERRUPTED = "interrupted"
+LOST = 3  # exit code
+
+
+@dataclass(frozen=True)
+class Task:
+    """What every worker is to do; arguments as of `train`."""
+
+    request: RunRequest
+    out: Path
+    parent: int
+    path: Sequence[str]
+    show_progress: bool
+    until_solved: bool
+    track: TrackerName | None
+    threads: int
+    checkpoint_s: float
+
+
+def train_by_workers(
+    request: RunRequest,
+    out: Path,
+    workers: int,
+    *,
+    resume: bool = False,
+    show_progress: bool = False,
+    until_solved: bool = False,
+    track: TrackerName | None = None,
+    on_begin: Callable[[Path], None] | None = None,
+    threads: int | None = None,
+    checkpoint_s: float = SECONDS_BETWEEN_CHECKPOINTS,
+) -> RunFolder:
+    """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
+
+    Args:
+        request: what to train. Features of scenes are best left in their files: every worker then reads its own alone.
+        out: the run folder.
+        workers: how many.
+        resume, show_progress, until_solved, track, on_begin: as of `train.train`.
+        threads: of torch in each worker; None: the machine's, divided among them.
+        checkpoint_s: seconds between checkpoints.
+
+    Raises:
+        RunError, KeyboardInterrupt: as of `train.train`; or workers were lost again and again.
+    """
+    check_tracker(track)
+    request.check_workers(workers)
+    folder = RunFolder(out)
+    with folder.held():
+        record = record_of(request)
+        record = replace(record, hardware={**record.hardware, "workers": workers})
+        told_of_other_bits(folder, request, folder.begin(record, resume))
+        if on_begin is not None:
+            on_begin(out)
+    task = Task(
+        replace(request, scenes=[replace(s, observations=None, top_view=None, further=()) for s in request.scenes]),
+        out,
+        os.getpid(),
+        sys.path,
+        show_progress,
+        until_solved,
+        track,
+        threads or max(1, torch.get_num_threads() // workers),
+        checkpoint_s,
+    )
+    outcomes = _launched(task, workers)
+    failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
+    if failed:
+        raise RunError(str(failed[0]))
+    if INTERRUPTED in outcomes:
+        raise KeyboardInterrupt
+    return folder
+
+
+def _launched(task: Task, workers: int) -> list[str | None]:
+    """What `work` gave in each process.
+
+    Raises:
+        RunError: workers were lost more than `RESTARTS` times.
+        KeyboardInterrupt: the user interrupted, and the workers have saved and ended.
+    """
+    from torch.distributed.elastic.multiprocessing import DefaultLogsSpecs
+    from torch.distributed.elastic.multiprocessing.api import SignalException
+    from torch.distributed.elastic.multiprocessing.errors import ChildFailedError
+    from torch.distributed.launcher.api import LaunchConfig, elastic_launch
+
+    logging.getLogger("torch.distributed.elastic").setLevel(logging.ERROR)
+    if sys.platform == "linux":
+        os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")  # nothing leaves this machine
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with tempfile.TemporaryDirectory(prefix="clearway-") as logs:
+        config = LaunchConfig(
+            min_nodes=1,
+            max_nodes=1,
+            nproc_per_node=workers,
+            logs_specs=DefaultLogsSpecs(log_dir=logs),
+            run_id="clearway",
+            rdzv_backend="c10d",
+            rdzv_endpoint="localhost:0",
+            local_addr="localhost",
+            max_restarts=RESTARTS,
+            monitor_interval=0.1,
+            signals_to_handle="SIGTERM,SIGINT",
+        )
+        try:
+            outcomes = elastic_launch(config, work)(task)
+        except SignalException as error:
+            raise KeyboardInterrupt from error
+        except ChildFailedError as error:
+            rank, failure = error.get_first_failure()
+            reason = f"worker {rank} ended with exit code {failure.exitcode}"
+            raise RunError(
+                f"{task.out}: workers were lost {RESTARTS} times ({reason}). Look for what ends them"
+            ) from error
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+    return [outcomes[rank] for rank in sorted(outcomes)]
+
+
+def work(task: Task) -> str | None:
+    """Train as one of several workers.
+
+    Returns:
+        None; `INTERRUPTED`; or the words of the error, a worker's own or another's, that ended the training.
+
+    Raises:
+        LostPeer: another worker ended or does not answer, so that all are started again.
+    """
+    import torch.distributed as dist
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's; the parent passes it on as SIGTERM
+    end_with_parent(task.parent)
+    set_threads(task.threads)
+    cuda = torch.device(task.request.device).type == "cuda"
+    rank, local = int(os.environ["RANK"]), int(os.environ["LOCAL_RANK"])
+    if cuda:
+        torch.cuda.set_device(local)
+    restarts = int(os.environ["TORCHELASTIC_RESTART_COUNT"])
+    if restarts and rank == 0:
+        told = f"training: a worker was lost ({restarts} of at most {RESTARTS} times)"
+        print(f"{told}; all go on from the newest checkpoint", file=sys.stderr, flush=True)
+    server = dist.TCPStore(os.environ["MASTER_ADDR"], int(os.environ["MASTER_PORT"]), is_master=False)
+    store = dist.PrefixStore(f"clearway {restarts}", server)
+    count = int(os.environ["WORLD_SIZE"])
+    dist.init_process_group("nccl" if cuda else "gloo", store=store, rank=rank, world_size=count, timeout=PATIENCE)
+    peers = Peers(
+        dist.group.WORLD, f"cuda:{local}" if cuda else "cpu", f"{socket.gethostname()}, process {os.getpid()}"
+    )
+    try:
+        train_part(
+            replace(task.request, device=f"cuda:{local}") if cuda else task.request,
+            RunFolder(task.out),
+            peers,
+            show_progress=task.show_progress,
+            until_solved=task.until_solved,
+            track=task.track,
+            checkpoint_s=task.checkpoint_s,
+        )
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except ClearwayError as error:
+        store.set(FAILED, str(error))
+        return str(error)
+    except LostPeer:
+        if not store.check([FAILED]):
+            sys.exit(LOST)  # without a word: the parent starts all again
+        return store.get(FAILED).decode()
+    return None

@@ -1,0 +1,121 @@
+"""Workers that are killed: training goes on, nothing is learnt twice, and no process is left."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import RunError
+from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
+from clearway.learn.presets import PAPER_A3C
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.workers import train_by_workers
+from helpers import killed_workers
+from helpers.small_runs import equal_bits, small_learner, small_request
+
+KILLS = int(os.environ.get("CLEARWAY_KILLS", "10"))
+PATIENCE_S = 60.0
+
+
+def started(folder: Path) -> subprocess.Popen[str]:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-m", "helpers.killed_workers", str(folder)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+def workers_of(parent: int) -> list[int]:
+    """Process ids of a training's workers."""
+    try:
+        children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+        return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    except FileNotFoundError:
+        return []
+
+
+def wait_until(condition: object, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():  # type: ignore[operator]
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def frames_of(folder: RunFolder) -> int:
+    found = sorted(path.name for path in folder.checkpoints.glob("frames-*"))
+    return int(found[-1].removeprefix("frames-")) if found else 0
+
+
+def gone(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+
+
+def without_times(folder: RunFolder) -> list[dict[str, float]]:
+    left_out = {"seconds", "slowest_worker", "slowest_factor"}
+    return [{name: value for name, value in row.items() if name not in left_out} for row in folder.metrics()]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the workers in /proc")
+def test_workers_killed_again_and_again_learn_the_same_bits(tmp_path: Path) -> None:
+    whole, killed = RunFolder(tmp_path / "whole"), RunFolder(tmp_path / "killed")
+    undisturbed = started(whole.path)
+    _, errors = undisturbed.communicate(timeout=120)
+    assert undisturbed.returncode == 0 and not errors
+
+    moments, process = random.Random(1), started(killed.path)
+    for number in range(KILLS):
+        wait_until(lambda pid=process.pid: len(workers_of(pid)) == killed_workers.WORKERS, process)
+        if number % 3:  # else at any moment from the start of their processes on
+            before = frames_of(killed)
+            wait_until(lambda before=before: frames_of(killed) > before, process)
+        time.sleep(moments.uniform(0, 0.1))
+        workers = workers_of(process.pid)
+        if number == KILLS // 2:  # the parent: its workers end with it, and the run is taken up again
+            process.kill()
+            process.communicate()
+            deadline = time.monotonic() + 10
+            while not all(map(gone, workers)):
+                assert time.monotonic() < deadline
+                time.sleep(0.01)
+            process = started(killed.path)
+        else:
+            os.kill(moments.choice(workers), signal.SIGKILL)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors and "go on from the newest checkpoint" in errors
+
+    ends = [newest_checkpoint(folder.checkpoints) for folder in (whole, killed)]
+    assert [read_progress(end).updates for end in ends] == [killed_workers.UPDATES] * 2
+    assert equal_bits(*[read_network(end) for end in ends])
+    assert equal_bits(*[read_training(end) for end in ends])
+    assert without_times(whole) == without_times(killed)
+
+
+def test_what_several_workers_cannot_train_is_refused_before_a_folder_is_made(tmp_path: Path) -> None:
+    refused = {
+        "3 workers for 2 scenes": (small_request(), 3),
+        "a3c is trained by one worker": (small_request(learner=small_learner(PAPER_A3C)), 2),
+        "scenes_at_once": (small_request(learner=small_learner(scenes_at_once=1)), 2),
+        "goals=seen": (small_request(learner=small_learner(goals="seen")), 2),
+    }
+    for told, (request, workers) in refused.items():
+        with pytest.raises(RunError, match=told):
+            train_by_workers(request, tmp_path / "run", workers)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.slow
+def test_an_error_of_one_worker_ends_all_with_its_words(tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(lr_start=1e30))
+    began = time.monotonic()
+    with pytest.raises(RunError, match="Training stopped; lower the learning rate"):
+        train_by_workers(request, tmp_path / "run", 2, threads=1)
+    assert time.monotonic() - began < PATIENCE_S
