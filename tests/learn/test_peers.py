@@ -88,9 +88,48 @@ LEARNERS = {
 
 
 @pytest.mark.usefixtures("doubles")
-@pytest.mark.parametrize("name", LEARNERS)
-@pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "workers"),
+    [("ppo", 2), ("a2c", 2), ("bc", 2)]
+    + [pytest.param(name, n, marks=pytest.mark.slow) for name, n in [("paper", 2), *((one, 4) for one in LEARNERS)]],
+)
 def test_workers_together_learn_what_one_learns_alone(name: str, workers: int) -> None:
     request = four_scenes(LEARNERS[name])
-    one = trained(request, Peers())
+    start, one = trained(request, Peers(), 0)[1], trained(request, Peers())
+    assert not torch.allclose(start["network.fusion_weight"], one[1]["network.fusion_weight"], atol=1e-3)
     assert_same(one, by_workers(workers, lambda peers: trained(request, peers))[0])
+
+
+@pytest.mark.usefixtures("doubles")
+def test_what_some_workers_began_others_go_on_with() -> None:
+    request = four_scenes(LEARNERS["a2c"])
+    whole, half = trained(request, Peers(), 8), by_workers(2, lambda peers: trained(request, peers, 4)[1])[0]
+
+    def went_on(peers: Peers) -> tuple[Told, dict[str, Tensor]]:
+        trainer = request.trainer(peers)
+        trainer.load_tensors(half, 4 * 16 * 8, 4)
+        figures = [trainer.update() | {"solved": trainer.statistics.solved} for _ in range(4)]
+        return figures, trainer.tensors()
+
+    for workers in (1, 3):
+        later = by_workers(workers, went_on)[0] if workers > 1 else went_on(Peers())
+        assert_same((whole[0][4:], whole[1]), later)
+
+
+def test_scenes_are_divided_by_size_in_their_order() -> None:
+    assert divided([10, 10, 10, 10], 2) == [0, 2, 4]
+    assert divided([30, 10, 10, 10], 2) == [0, 1, 4]
+    assert divided([1, 1, 100], 3) == [0, 1, 2, 3]
+    assert divided([100, 1, 1], 3) == [0, 1, 2, 3]
+    assert divided([5, 5, 5], 1) == [0, 3]
+
+
+def test_a_lost_worker_is_noticed() -> None:
+    def leaves(peers: Peers) -> str:
+        if peers.rank:
+            return "left"
+        with pytest.raises(LostPeer):
+            peers.told(1.0)
+        return "noticed"
+
+    assert by_workers(2, leaves) == ["noticed", "left"]
