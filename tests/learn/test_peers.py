@@ -14,7 +14,7 @@ from clearway.learn import trainer as trainer_module
 from clearway.learn.a2c import A2C
 from clearway.learn.bc import BC
 from clearway.learn.learner import Learner
-from clearway.learn.peers import Peers
+from clearway.learn.peers import LostPeer, Peers, divided
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
