@@ -29,6 +29,7 @@ class Peers:
     Attributes:
         rank: number of this worker, from 0.
         count: number of workers.
+        messages: how many so far.
         sent_bytes: what was given to be sent so far, once a message, however the backend sends it.
         waited_s: seconds spent on it so far, those of waiting for the others among them.
     """
@@ -37,7 +38,7 @@ class Peers:
         self.group, self.device, self.name = group, torch.device(device), name
         self.rank: int = 0 if group is None else group.rank()
         self.count: int = 1 if group is None else group.size()
-        self.sent_bytes, self.waited_s = 0, 0.0
+        self.messages, self.sent_bytes, self.waited_s = 0, 0, 0.0
 
     @property
     def leads(self) -> bool:
@@ -117,6 +118,7 @@ class Peers:
             begin().wait()
         except RuntimeError as error:  # of whatever backend
             raise LostPeer(f"worker {self.rank}: {str(error).splitlines()[0]}") from error
+        self.messages += 1
         self.sent_bytes += message.numel() * message.element_size()
         self.waited_s += time.monotonic() - started
 
