@@ -13,10 +13,12 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import torch
 
@@ -27,6 +29,9 @@ from clearway.learn.peers import LostPeer, Peers
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.tracking import check_tracker
 from clearway.learn.train import SECONDS_BETWEEN_CHECKPOINTS, RunRequest, set_threads, told_of_other_bits, train_part
+
+if TYPE_CHECKING:
+    import torch.distributed as dist
 
 RESTARTS = 100  # of one training, after which it is given up
 PATIENCE = timedelta(minutes=5)  # for another worker to answer, after which it counts as lost
@@ -42,12 +47,27 @@ class Task:
     request: RunRequest
     out: Path
     parent: int
-    path: Sequence[str]
     show_progress: bool
     until_solved: bool
     track: TrackerName | None
     threads: int
     checkpoint_s: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """Which worker a process is.
+
+    Attributes:
+        rank, count: its number, from 0, of how many.
+        local: its number on its machine, and of its GPU.
+        restarts: how often all were started again before.
+    """
+
+    rank: int
+    count: int
+    local: int
+    restarts: int
 
 
 def train_by_workers(
@@ -61,6 +81,7 @@ def train_by_workers(
     track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
     threads: int | None = None,
+    ray: str | None = None,
     checkpoint_s: float = SECONDS_BETWEEN_CHECKPOINTS,
 ) -> RunFolder:
     """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
@@ -71,6 +92,8 @@ def train_by_workers(
         workers: how many.
         resume, show_progress, until_solved, track, on_begin: as of `train.train`.
         threads: of torch in each worker; None: the machine's, divided among them.
+        ray: a Ray cluster whose nodes the workers run on, see `ray_cluster.connected`; None: this machine. All nodes
+            see the run folder and the scene files under the same paths.
         checkpoint_s: seconds between checkpoints.
 
     Raises:
@@ -89,14 +112,18 @@ def train_by_workers(
         replace(request, scenes=[replace(s, observations=None, top_view=None, further=()) for s in request.scenes]),
         out,
         os.getpid(),
-        sys.path,
         show_progress,
         until_solved,
         track,
         threads or max(1, torch.get_num_threads() // workers),
         checkpoint_s,
     )
-    outcomes = _launched(task, workers)
+    if ray is None:
+        outcomes = _launched(task, workers)
+    else:
+        from clearway.learn.workers_on_ray import launched_on_ray
+
+        outcomes = launched_on_ray(task, workers, ray)
     failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
     if failed:
         raise RunError(str(failed[0]))
@@ -142,49 +169,70 @@ def _launched(task: Task, workers: int) -> list[str | None]:
         except ChildFailedError as error:
             rank, failure = error.get_first_failure()
             reason = f"worker {rank} ended with exit code {failure.exitcode}"
-            raise RunError(
-                f"{task.out}: workers were lost {RESTARTS} times ({reason}). Look for what ends them"
-            ) from error
+            raise given_up(task, reason) from error
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
     return [outcomes[rank] for rank in sorted(outcomes)]
 
 
+def given_up(task: Task, reason: str) -> RunError:
+    """The error of a training whose workers were lost too often, and how the last one was."""
+    return RunError(f"{task.out}: workers were lost {RESTARTS} times ({reason}). Look for what ends them")
+
+
 def work(task: Task) -> str | None:
-    """Train as one of several workers.
+    """Train in a process that the elastic agent started; returns what `trained` does."""
+    import torch.distributed as dist
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's; the parent passes it on as SIGTERM
+    end_with_parent(task.parent)
+    environment = os.environ
+    place = Place(
+        int(environment["RANK"]),
+        int(environment["WORLD_SIZE"]),
+        int(environment["LOCAL_RANK"]),
+        int(environment["TORCHELASTIC_RESTART_COUNT"]),
+    )
+    try:
+        store = dist.TCPStore(environment["MASTER_ADDR"], int(environment["MASTER_PORT"]), is_master=False)
+        return trained(task, place, store)
+    except LostPeer:
+        sys.exit(LOST)  # without a word: the agent starts all again
+
+
+def trained(task: Task, place: Place, server: dist.Store) -> str | None:
+    """Train as one of several workers, who meet at a store.
 
     Returns:
         None; `INTERRUPTED`; or the words of the error, a worker's own or another's, that ended the training.
 
     Raises:
-        LostPeer: another worker ended or does not answer, so that all are started again.
+        LostPeer: another worker ended or does not answer, so that all are to be started again.
     """
     import torch.distributed as dist
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's; the parent passes it on as SIGTERM
-    end_with_parent(task.parent)
     set_threads(task.threads)
     cuda = torch.device(task.request.device).type == "cuda"
-    rank, local = int(os.environ["RANK"]), int(os.environ["LOCAL_RANK"])
+    device = f"cuda:{place.local}" if cuda else "cpu"
     if cuda:
-        torch.cuda.set_device(local)
-    restarts = int(os.environ["TORCHELASTIC_RESTART_COUNT"])
-    if restarts and rank == 0:
-        told = f"training: a worker was lost ({restarts} of at most {RESTARTS} times)"
+        torch.cuda.set_device(place.local)
+    if place.restarts and place.rank == 0:
+        told = f"training: a worker was lost ({place.restarts} of at most {RESTARTS} times)"
         print(f"{told}; all go on from the newest checkpoint", file=sys.stderr, flush=True)
-    server = dist.TCPStore(os.environ["MASTER_ADDR"], int(os.environ["MASTER_PORT"]), is_master=False)
-    store = dist.PrefixStore(f"clearway {restarts}", server)
-    count = int(os.environ["WORLD_SIZE"])
-    dist.init_process_group("nccl" if cuda else "gloo", store=store, rank=rank, world_size=count, timeout=PATIENCE)
-    peers = Peers(
-        dist.group.WORLD, f"cuda:{local}" if cuda else "cpu", f"{socket.gethostname()}, process {os.getpid()}"
-    )
+    store = dist.PrefixStore(f"clearway {place.restarts}", server)
+    try:
+        dist.init_process_group(
+            "nccl" if cuda else "gloo", store=store, rank=place.rank, world_size=place.count, timeout=PATIENCE
+        )
+    except RuntimeError as error:  # of whatever backend
+        raise LostPeer(str(error)) from error
+    name = f"{socket.gethostname()}, process {os.getpid()}"
     try:
         train_part(
-            replace(task.request, device=f"cuda:{local}") if cuda else task.request,
+            replace(task.request, device=device),
             RunFolder(task.out),
-            peers,
+            Peers(dist.group.WORLD, device, name),
             show_progress=task.show_progress,
             until_solved=task.until_solved,
             track=task.track,
@@ -192,11 +240,12 @@ def work(task: Task) -> str | None:
         )
     except KeyboardInterrupt:
         return INTERRUPTED
-    except ClearwayError as error:
-        store.set(FAILED, str(error))
-        return str(error)
     except LostPeer:
         if not store.check([FAILED]):
-            sys.exit(LOST)  # without a word: the parent starts all again
+            raise
         return store.get(FAILED).decode()
+    except Exception as error:  # whatever it is, another try would meet it again
+        told = str(error) if isinstance(error, ClearwayError) else traceback.format_exc()
+        store.set(FAILED, told)
+        return told
     return None
