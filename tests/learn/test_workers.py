@@ -15,7 +15,9 @@ from clearway.learn.checkpoint import newest_checkpoint, read_network, read_prog
 from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
+from clearway.scenes.thor_v1 import write_scene
 from helpers import killed_workers
+from helpers.made import corridor_scene
 from helpers.small_runs import equal_bits, small_learner, small_request
 
 KILLS = int(os.environ.get("CLEARWAY_KILLS", "10"))
@@ -119,3 +121,37 @@ def test_an_error_of_one_worker_ends_all_with_its_words(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="Training stopped; lower the learning rate"):
         train_by_workers(request, tmp_path / "run", 2, threads=1)
     assert time.monotonic() - began < PATIENCE_S
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_a_run_that_one_worker_ends(tmp_path: Path) -> None:
+    scenes, out = [tmp_path / f"{name}.h5" for name in ("one", "two")], tmp_path / "run"
+    for scene in scenes:
+        write_scene(corridor_scene(5), scene)
+    small = ["--frames", "8000", "--set", "envs=20", "rollout_steps=8", "width=16", "--threads", "1", "--resume"]
+    command = [sys.executable, "-m", "clearway", "train", *map(str, scenes), "--out", str(out), *small]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen([*command, "--workers", "2"], stderr=subprocess.PIPE, text=True, env=environment) as process:
+        wait_until((out / "metrics.jsonl").exists, process)
+        workers = workers_of(process.pid)
+        for pid in (*workers, process.pid):  # as a terminal does
+            os.kill(pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130, errors
+    assert errors.rstrip().endswith("interrupted") and "Traceback" not in errors
+    assert len(workers) == 2 and all(map(gone, workers))
+    assert 0 < frames_of(RunFolder(out)) < 8000
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S)
+    assert done.returncode == 0, done.stderr
+    assert frames_of(RunFolder(out)) == 8000
+
+
+@pytest.mark.slow
+def test_workers_on_ray_learn_what_processes_learn(tmp_path: Path) -> None:
+    pytest.importorskip("ray")
+    request = small_request(learner=small_learner(frames=1_600))
+    folders = [
+        train_by_workers(request, tmp_path / name, 2, threads=1, ray=ray)
+        for name, ray in (("here", None), ("ray", "local"))
+    ]
+    assert equal_bits(*[read_training(newest_checkpoint(folder.checkpoints)) for folder in folders])
