@@ -68,15 +68,17 @@ class Peers:
         """For each flag, whether it is set at any worker."""
         return [any(theirs) for theirs in zip(*self.told(*flags), strict=True)]
 
-    def variance(self, values: Tensor) -> Tensor:
-        """The variance of all workers' values together, a scalar; without Bessel's correction."""
+    def variances(self, *values: Tensor) -> list[Tensor]:
+        """The variance of each kind of values, all workers' together, scalars; without Bessel's correction."""
         if self.count == 1:
-            return values.var(correction=0)
-        sums = torch.stack([torch.ones_like(values).sum(), values.sum()]).double()
-        self.add_up(sums)
-        squares = (values.double() - sums[1] / sums[0]).square().sum()
+            return [each.var(correction=0) for each in values]
+        counts = torch.tensor([each.numel() for each in values], dtype=torch.float64, device=self.device)
+        sums = torch.stack([each.double().sum() for each in values])
+        self.add_up(counts, sums)
+        means = (sums / counts).unbind()
+        squares = torch.stack([(each.double() - mean).square().sum() for each, mean in zip(values, means, strict=True)])
         self.add_up(squares)
-        return (squares / sums[0]).to(values.dtype)
+        return list((squares / counts).to(values[0].dtype).unbind())
 
     def from_leader(self, tensor: Tensor) -> Tensor:
         """The leader's tensor, written to those of the others, of the same shape and dtype."""

@@ -46,6 +46,7 @@ class EpisodeStatistics:
         peers: what they tell is of the targets of all workers, who then ask alike.
 
     Attributes:
+        target_count: number of targets told of.
         open_steps, open_collisions: (N,) float64, of the episodes under way.
         totals: (M, 4) float64, ended episodes, those that reached the target, their steps and collisions, since the
             last `take`.
@@ -63,6 +64,7 @@ class EpisodeStatistics:
     ) -> None:
         self.peers = peers
         self.told = torch.ones(target_count, dtype=torch.bool, device=device) if told is None else told
+        self.target_count = self._of_all(int(self.told.sum()))
         self.open_steps = torch.zeros(env_count, dtype=torch.float64, device=device)
         self.open_collisions = torch.zeros_like(self.open_steps)
         self.totals = torch.zeros(target_count, 4, dtype=torch.float64, device=device)
@@ -98,11 +100,6 @@ class EpisodeStatistics:
         return self._of_all(int((self.recent_success == 1)[self.told].sum()))
 
     @property
-    def target_count(self) -> int:
-        """Number of targets told of."""
-        return self._of_all(int(self.told.sum()))
-
-    @property
     def all_solved(self) -> bool:
         """Every target told of is solved."""
         return self.solved == self.target_count
@@ -125,7 +122,7 @@ class EpisodeStatistics:
 
     def tensors(self) -> dict[str, Tensor]:
         """All that `load_tensors` needs to go on from here."""
-        return {name: tensor for name, tensor in vars(self).items() if name not in ("told", "peers")}
+        return {name: here for name, here in vars(self).items() if isinstance(here, Tensor) and name != "told"}
 
     def load_tensors(self, tensors: dict[str, Tensor]) -> None:
         """Go on from where `tensors` was called."""

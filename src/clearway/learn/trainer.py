@@ -202,8 +202,8 @@ class Trainer:
             learner.gae_lambda,
         )
         value_target = advantage + value
-        variances = [self.peers.variance(values) for values in (advantage, value_target)]
-        explained = 1 - variances[0] / variances[1].clamp_min(1e-12)
+        left, all_of_it = self.peers.variances(advantage, value_target)
+        explained = 1 - left / all_of_it.clamp_min(1e-12)
         batch = Batch(
             as_rows(rollout.history),
             as_rows(rollout.target),
