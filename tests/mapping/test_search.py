@@ -12,7 +12,9 @@ SIDE = 9
 START, END = LatticePose(0, 3, 4), LatticePose(0, 5, 4)
 
 
-def steps(room: np.ndarray, *, shut: tuple[int, int, int] | None = None, cost: float = 4.0) -> Action:
+def steps(
+    room: np.ndarray, *, shut: tuple[int, int, int] | None = None, cost: float = 4.0, toured: bool = False
+) -> Action:
     """The first action to the end, which was seen, in a room of log-odds (SIDE, SIDE)."""
     evidence = np.zeros((1, 4, SIDE, SIDE), np.float32)
     evidence[0][END.index] = 30.0
@@ -22,20 +24,28 @@ def steps(room: np.ndarray, *, shut: tuple[int, int, int] | None = None, cost: f
     done = np.zeros(evidence.shape, bool)
     done[0][START.index] = True
     settings = MappingSettings(collision_cost=cost)
-    action, _ = search_steps([START], evidence, done, room[None], closed, settings)
+    action, _ = search_steps([START], evidence, done, room[None], closed, settings, toured=toured)
     return Action(int(action[0]))
 
 
-def doubtful_ahead() -> np.ndarray:
-    """Free, but for the cell ahead, which is free or not."""
+def doubtful_ahead(held: float = -1.0) -> np.ndarray:
+    """Free, but for the cell ahead, of which log-odds are held."""
     room = np.full((SIDE, SIDE), SURE, np.float32)
-    room[4, 4] = 0.0
+    room[4, 4] = held
     return room
 
 
 def test_it_goes_round_what_may_block_where_collisions_cost_much():
     assert steps(doubtful_ahead(), cost=1.0) == Action.MOVE_FORWARD
     assert steps(doubtful_ahead(), cost=20.0) in (Action.TURN_LEFT, Action.TURN_RIGHT)
+
+
+def test_without_a_tour_cells_that_were_only_seen_cost_what_they_turn_out_to_be():
+    turned = (Action.TURN_LEFT, Action.TURN_RIGHT)
+    even, likely, tried = doubtful_ahead(0.0), doubtful_ahead(4.0), doubtful_ahead(SURE)
+    assert steps(even, cost=20.0) == Action.MOVE_FORWARD and steps(even, cost=20.0, toured=True) in turned
+    assert steps(likely, cost=200.0) in turned and steps(likely, cost=200.0, toured=True) == Action.MOVE_FORWARD
+    assert steps(tried, cost=200.0) == Action.MOVE_FORWARD
 
 
 def test_no_way_leads_where_a_move_was_blocked_or_a_body_cannot_stand():

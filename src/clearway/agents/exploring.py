@@ -53,7 +53,8 @@ class Explorer:
         seen = self._features(observation)
         poses, after = self._follower.follow(seen, state)
         been = been_now(state["been"], poses)
-        action, _ = search_steps(poses, _unlike(been), been, after["room"], after["shut"], self._settings, in_view=0.0)
+        news, room, shut = _unlike(been), after["room"], after["shut"]
+        action, _ = search_steps(poses, news, been, room, shut, self._settings, in_view=0.0, toured=True)
         return Decisions(action), {**after, "been": been, "action": action}
 
 

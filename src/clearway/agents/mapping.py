@@ -74,7 +74,9 @@ class MappingAgent:
         likely = probabilities(np.where(state["been"], IMPOSSIBLE, goal), after["room"])
         there = np.array([likely[row][pose.index] for row, pose in enumerate(poses)])
         been = been_now(state["been"], poses)  # an episode that goes on has not arrived
-        action, lost = search_steps(poses, goal, been, after["room"], after["shut"], self._settings)
+        action, lost = search_steps(
+            poses, goal, been, after["room"], after["shut"], self._settings, toured=self._has_toured
+        )
         self._begin_anew(lost, been, after)
         decisions = Decisions(action, arrived=there > self._settings.arrived)
         return decisions, {**after, "target": state["target"], "goal": goal, "been": been, "action": action}

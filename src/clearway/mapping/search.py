@@ -10,13 +10,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from clearway.mapping.beliefs import IMPOSSIBLE, LatticePose, likeliest
+from clearway.mapping.beliefs import IMPOSSIBLE, SEEN, LatticePose, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS
 from clearway.mapping.routes import FAR, first_action, shifted, ways_from
 from clearway.mapping.settings import MappingSettings
 
 DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body can hardly stand
 NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
+MOST_FREE = 0.95  # probability, at most, that a body can stand in a cell that was only seen
+TURNS_OUT, TURNS_OUT_AT_0 = 1.8, 1.53  # log-odds per log-odds held, and where 0 is held, of such cells in `validation`
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
 IN_VIEW, VIEW_ALONG, VIEW_ACROSS = 0.1, 7, 3  # likewise, of what is within so many cells: eyes compare these well
 TRUST = 0.5  # share of the evidence for a pose by which ways are chosen; arriving goes by all of it
@@ -40,6 +42,8 @@ def search_steps(
     shut: np.ndarray,
     settings: MappingSettings,
     in_view: float = IN_VIEW,
+    *,
+    toured: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The next actions (B,) int64, and whether nothing was left (B,) bool to which a way leads.
 
@@ -50,8 +54,9 @@ def search_steps(
         room, shut: see `Follower.begin`.
         settings: what ways cost.
         in_view: share of what is likely in view of a pose that counts as its own: 0 where poses are to be come to.
+        toured: cells cost what is held of them, as after a tour; else, if only seen, what such cells turn out to be.
     """
-    price = _entering(room, shut, settings.collision_cost)
+    price = _entering(_as_held(room) if toured else _as_it_turns_out(room), room, shut, settings.collision_cost)
     cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
@@ -63,9 +68,19 @@ def search_steps(
     return np.array(found, np.int64), lost
 
 
-def _entering(room: np.ndarray, shut: np.ndarray, collision_cost: float) -> np.ndarray:
-    """(B, 4, G, G) cost of entering each cell along each direction."""
-    free = 1 / (1 + np.exp(-room))
+def _as_held(room: np.ndarray) -> np.ndarray:
+    """Probability that a body can stand in a cell, by log-odds held of it."""
+    return 1 / (1 + np.exp(-room))
+
+
+def _as_it_turns_out(room: np.ndarray) -> np.ndarray:
+    """How often a body can stand in a cell of which so much is held; of one that was only seen it is never certain."""
+    seen = np.minimum(_as_held(TURNS_OUT * room + TURNS_OUT_AT_0), MOST_FREE)
+    return np.where(np.abs(room) > SEEN, _as_held(room), seen)
+
+
+def _entering(free: np.ndarray, room: np.ndarray, shut: np.ndarray, collision_cost: float) -> np.ndarray:
+    """(B, 4, G, G) cost of entering each cell along each direction; `free`: probability of each (B, G, G)."""
     price = 1 + collision_cost * (1 - free) + DOUBT_COST * (1 - free) ** DOUBT_POWER
     price = np.where(room < NO_ROOM, FAR, price)
     closed = np.stack([shifted(shut[:, d], AHEAD[d], True) for d in range(HEADINGS)], axis=1)
