@@ -306,6 +306,13 @@ class Running:
     def _done(self) -> bool:
         return self.trainer.finished or (self.until_solved and self.trainer.statistics.all_solved)
 
+    def _save(self, seconds: float) -> None:
+        """Write a checkpoint; other workers give their part of it."""
+        if self.peers.leads:
+            save(self.trainer, self.folder, seconds)
+        else:
+            self.trainer.tensors()
+
     def _log(self, seconds: float) -> MetricsLog | None:
         """Where rows are written; None at workers that do not."""
         if not self.peers.leads:
@@ -335,7 +342,7 @@ class Running:
                 rows = _rows_due(trainer)
             seen = trainer.frames
 
-        stops = False
+        [stops] = self.peers.any(self.interrupted.is_set())
         while not self._done() and not stops:
             started = time.monotonic()
             with pace.measured():
@@ -348,12 +355,12 @@ class Running:
             tell()
             self.view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
             if saves:
-                save(trainer, self.folder, seconds, self.peers)
+                self._save(seconds)
                 saved_at, saved_frames = time.monotonic(), trainer.frames
         trainer.tensors()
         tell()
         if saved_frames != trainer.frames:
-            save(trainer, self.folder, seconds, self.peers)
+            self._save(seconds)
 
 
 def _rows_due(trainer: Learning) -> int:
@@ -361,11 +368,9 @@ def _rows_due(trainer: Learning) -> int:
     return trainer.frames * ROWS_A_RUN // trainer.learner.frames
 
 
-def save(trainer: Learning, folder: RunFolder, seconds: float, peers: Peers = ALONE) -> None:
-    """Write a checkpoint of the trainer as it stands; of several workers the first does."""
+def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
+    """Write a checkpoint of the trainer as it stands."""
     tensors = trainer.tensors()
-    if not peers.leads:
-        return
     training = {key: value for key, value in tensors.items() if not _acts(trainer, key)}
     progress = Progress(trainer.frames, trainer.updates, seconds)
     write_checkpoint(folder.checkpoints, _agent(trainer, tensors), training, progress)
