@@ -74,8 +74,8 @@ def section(setting: Setting) -> Section:
         text=(
             f"Two controls beside the paper's rewards. {DEARER}: every step costs what it costs a random walk under "
             f"the collision-aware reward ({mean_cost(setting):g}). {SHUFFLED}: the collision-aware reward with the "
-            "zones of the poses shuffled. If zones are what makes learning faster, the collision-aware agents settle sooner "
-            "than both; if dear steps are, the controls settle as soon."
+            "zones of the poses shuffled. If zones are what makes learning faster, the collision-aware agents settle "
+            "sooner than both; if dear steps are, the controls settle as soon."
         ),
         tables=(*tables, settled),
         claims=tuple(replace(claim, further=True) for claim in (*sooner, *_claims(setting, groups))),
