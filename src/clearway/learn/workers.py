@@ -144,7 +144,9 @@ def _launched(task: Task, workers: int) -> list[str | None]:
     from torch.distributed.elastic.multiprocessing.errors import ChildFailedError
     from torch.distributed.launcher.api import LaunchConfig, elastic_launch
 
-    logging.getLogger("torch.distributed.elastic").setLevel(logging.ERROR)
+    for name in logging.root.manager.loggerDict:  # each has a level of its own, and tells of deaths at length
+        if name.startswith("torch.distributed.elastic"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     if sys.platform == "linux":
         os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")  # nothing leaves this machine
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
