@@ -9,7 +9,7 @@ from clearway.learn.train import RunRequest
 from clearway.learn.workers import train_by_workers
 from helpers.small_runs import small_learner, small_request
 
-UPDATES = 150
+UPDATES = 80
 WORKERS = 2
 
 

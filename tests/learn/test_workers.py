@@ -144,14 +144,3 @@ def test_ctrl_c_leaves_a_run_that_one_worker_ends(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S)
     assert done.returncode == 0, done.stderr
     assert frames_of(RunFolder(out)) == 8000
-
-
-@pytest.mark.slow
-def test_workers_on_ray_learn_what_processes_learn(tmp_path: Path) -> None:
-    pytest.importorskip("ray")
-    request = small_request(learner=small_learner(frames=1_600))
-    folders = [
-        train_by_workers(request, tmp_path / name, 2, threads=1, ray=ray)
-        for name, ray in (("here", None), ("ray", "local"))
-    ]
-    assert equal_bits(*[read_training(newest_checkpoint(folder.checkpoints)) for folder in folders])

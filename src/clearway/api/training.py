@@ -108,7 +108,6 @@ def train(
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
     workers: int = 1,
-    ray: str | None = None,
     until_solved: bool = False,
     track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
@@ -142,8 +141,6 @@ def train(
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         workers: processes of this machine that train together, a scene each at least; by ppo, a2c and bc. A script that
             asks for several does it below `if __name__ == "__main__":`. See docs/scale.md.
-        ray: the workers run on a Ray cluster: "local", "auto" (one found here) or its address. All its nodes see the
-            scene files and `out` under the same paths.
         until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target
             reached it.
         track: where figures are shown as they come, beside `metrics.jsonl`: "tensorboard", in the run folder, or
@@ -162,7 +159,6 @@ def train(
         raise ArgumentError("resume=True: expected the run folder to go on with. Give it as out")
     number = as_seed("seed", seed)
     learner, processes = chosen_learner(algorithm, frames, settings), as_whole("workers", workers, 1)
-    cluster = None if ray is None else as_word("ray", ray)
     pairs = scenes_and_files(scenes, features_in_file=store != "memory" or processes > 1)
     loaded = [scene for scene, _ in pairs]
     chosen = chosen_targets(loaded, targets, number)
@@ -200,8 +196,8 @@ def train(
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
-        together = partial(train_by_workers, workers=processes, threads=threads, ray=cluster)
-        train_run = train_alone if processes == 1 and cluster is None else together
+        together = partial(train_by_workers, workers=processes, threads=threads)
+        train_run = train_alone if processes == 1 else together
         folder = train_run(
             request,
             path,

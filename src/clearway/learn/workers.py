@@ -81,7 +81,6 @@ def train_by_workers(
     track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
     threads: int | None = None,
-    ray: str | None = None,
     checkpoint_s: float = SECONDS_BETWEEN_CHECKPOINTS,
 ) -> RunFolder:
     """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
@@ -92,8 +91,6 @@ def train_by_workers(
         workers: how many.
         resume, show_progress, until_solved, track, on_begin: as of `train.train`.
         threads: of torch in each worker; None: the machine's, divided among them.
-        ray: a Ray cluster whose nodes the workers run on, see `ray_cluster.connected`; None: this machine. All nodes
-            see the run folder and the scene files under the same paths.
         checkpoint_s: seconds between checkpoints.
 
     Raises:
@@ -118,12 +115,7 @@ def train_by_workers(
         threads or max(1, torch.get_num_threads() // workers),
         checkpoint_s,
     )
-    if ray is None:
-        outcomes = _launched(task, workers)
-    else:
-        from clearway.learn.workers_on_ray import launched_on_ray
-
-        outcomes = launched_on_ray(task, workers, ray)
+    outcomes = _launched(task, workers)
     failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
     if failed:
         raise RunError(str(failed[0]))
