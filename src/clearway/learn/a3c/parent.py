@@ -6,6 +6,7 @@ To `learn.train` it is a trainer like the synchronous one: `update` lets the wor
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -174,6 +175,7 @@ class AsyncTrainer:
             for number, workers in enumerate(parts):
                 ours, theirs = context.Pipe()
                 assignment = Assignment(
+                    os.getpid(),
                     number,
                     tuple(workers.tolist()),
                     self.world.scene_names,

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from clearway.children import end_with_parent
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import Round, WorkerGroup
 from clearway.learn.a3c.shared import SharedTensors
@@ -47,6 +48,7 @@ class Assignment:
     """What a process is to do.
 
     Attributes:
+        parent: process id of who started it.
         number: of the process, from 0.
         workers: numbers of its workers, their targets ascending.
         scene_names, learner, reward, seed: see there.
@@ -54,6 +56,7 @@ class Assignment:
             worker), "frames" (frames used so far by each process, and before this start at the end).
     """
 
+    parent: int
     number: int
     workers: tuple[int, ...]
     scene_names: tuple[str, ...]
@@ -80,6 +83,7 @@ class Assignment:
 
 def work(assignment: Assignment, connection: Connection) -> None:
     """Run a worker process."""
+    end_with_parent(assignment.parent)
     torch.set_num_threads(1)
     group = assignment.group()
     try:
