@@ -17,6 +17,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
+from multiprocessing.context import SpawnProcess
 
 ORPHANED = 1  # exit code; nobody is left to see it
 LOOKS_EVERY_S = 1.0
@@ -56,6 +57,22 @@ def _watch(parent: int) -> None:
 def _end_if_orphaned(parent: int) -> None:
     if os.getppid() != parent:  # it is somebody else's child by now
         os._exit(ORPHANED)
+
+
+class ChildProcess(SpawnProcess):
+    """A process of `multiprocessing` that ends with its parent as `end_with_parent` says.
+
+    It does from the first moment on, though it may take seconds to import what it is to run.
+    """
+
+    def __reduce__(self) -> tuple:
+        """In the child the function is called before the state, and what that names, is read."""
+        return _begun, (type(self), os.getpid()), self.__dict__
+
+
+def _begun(kind: type[ChildProcess], parent: int) -> ChildProcess:
+    end_with_parent(parent)
+    return kind.__new__(kind)
 
 
 def limit(*, memory_bytes: int | None = None, seconds: int | None = None) -> None:

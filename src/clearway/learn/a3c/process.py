@@ -1,7 +1,6 @@
 """A worker process: rounds of its workers, until its parent says otherwise, closes the connection or dies.
 
-The parent sends PAUSE and GO; the process sends `WorkerReport`s and PAUSED. It never outlives its parent: a report or a
-command finds the connection closed.
+The parent sends PAUSE and GO; the process sends `WorkerReport`s and PAUSED. It ends with its parent: `ChildProcess`.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.children import end_with_parent
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import Round, WorkerGroup
 from clearway.learn.a3c.shared import SharedTensors
@@ -48,7 +46,6 @@ class Assignment:
     """What a process is to do.
 
     Attributes:
-        parent: process id of who started it.
         number: of the process, from 0.
         workers: numbers of its workers, their targets ascending.
         scene_names, learner, reward, seed: see there.
@@ -56,7 +53,6 @@ class Assignment:
             worker), "frames" (frames used so far by each process, and before this start at the end).
     """
 
-    parent: int
     number: int
     workers: tuple[int, ...]
     scene_names: tuple[str, ...]
@@ -83,7 +79,6 @@ class Assignment:
 
 def work(assignment: Assignment, connection: Connection) -> None:
     """Run a worker process."""
-    end_with_parent(assignment.parent)
     torch.set_num_threads(1)
     group = assignment.group()
     try:
