@@ -56,7 +56,7 @@ def served(monkeypatch) -> list[str]:
     """Tokens of the services that would have run."""
     tokens: list[str] = []
     monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Sums())
-    monkeypatch.setattr("clearway.serve.run.run_service", lambda agent, listener, token, limits: tokens.append(token))
+    monkeypatch.setattr("clearway.serve.run.run_service", lambda agent, listener, given, limits: tokens.append(given))
     return tokens
 
 

@@ -8,14 +8,15 @@ from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.protection import protected
 from clearway.serve.service import Service
-from helpers.serving import TOKEN, grey
+from helpers.serving import OWNER, TOKEN, TOKENS, grey
 from helpers.sums import Sums
 
 HEADERS = {"Authorization": f"Bearer {TOKEN}"}
-SERVICE = Service(Sums(), Limits(sessions=5000, body_bytes=20_000, idle_s=86_400.0))  # longer than any run of the tests
-APP = protected(make_app(SERVICE), SERVICE, TOKEN)
+LIMITS = Limits(sessions=5000, body_bytes=20_000, idle_s=86_400.0)  # longer than any run of the tests
+SERVICE = Service(Sums(), LIMITS, TOKENS)
+APP = protected(make_app(SERVICE), SERVICE)
 SCHEMA = schemathesis.openapi.from_asgi("/openapi.json", APP, headers=HEADERS)
-KNOWN = SERVICE.sessions.open("sampled", 0)
+KNOWN = SERVICE.sessions.open(OWNER, "sampled", 0, 5000)
 SUPPRESSED = list(HealthCheck)
 
 

@@ -30,17 +30,18 @@ from helpers.sums import Sums, plain
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
 HEAD = f"Host: x\r\nAuthorization: Bearer {TOKEN}\r\n".encode()
 PATIENT_S = 60  # for what must happen, on a busy machine
-PROGRAM = f"""
+PROGRAM = """
 import json, sys
 from clearway.serve.limits import Limits
 from clearway.serve.run import run_service
 from clearway.web.local import listening, port_of
+from helpers.serving import TOKENS
 from helpers.sums import Sums
 
 asked = json.loads(sys.argv[1])
 listener = listening(0)
 print(port_of(listener), flush=True)
-run_service(Sums(asked.pop("seconds", 0)), listener, {TOKEN!r}, Limits(**asked))
+run_service(Sums(asked.pop("seconds", 0)), listener, TOKENS, Limits(**asked))
 print("ended", flush=True)
 """
 

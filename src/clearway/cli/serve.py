@@ -10,10 +10,8 @@ from typing import Annotated
 import tyro
 
 from clearway.cli.console import stderr_console
-from clearway.errors import ClearwayError
 
 TOKEN_VARIABLE = "CLEARWAY_TOKEN"
-FEWEST_TOKEN_LETTERS = 16
 NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 
 
@@ -46,15 +44,13 @@ class Serve:
         from clearway.serve.limits import Limits
         from clearway.serve.run import run_service, servable_agent
         from clearway.serve.sessions import state_bytes
+        from clearway.serve.tokens import ALONE, Tokens, checked_token
         from clearway.web.guard import new_token
         from clearway.web.local import address_of, listening
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
         own = os.environ.get(TOKEN_VARIABLE)
-        token = own or new_token()
-        if len(token) < FEWEST_TOKEN_LETTERS or not (token.isascii() and token.isprintable()) or " " in token:
-            problem = f"the variable {TOKEN_VARIABLE} holds no token of at least {FEWEST_TOKEN_LETTERS} plain letters"
-            raise ClearwayError(f"{problem}. Choose another, or unset it for a random one")
+        token = checked_token(own or new_token(), f"the variable {TOKEN_VARIABLE}")
         console = stderr_console()
 
         def say(line: str) -> None:
@@ -71,4 +67,4 @@ class Serve:
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6
                 say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
-            run_service(agent, listener, token, limits)
+            run_service(agent, listener, Tokens([(ALONE, token)]), limits)

@@ -11,27 +11,33 @@ from typing import Any
 from clearway.serve.faults import Fault
 from clearway.serve.metrics import Metrics
 from clearway.serve.service import Service
-from clearway.web.guard import HEADERS, Application, Receive, Scope, Send, same_token
+from clearway.serve.tokens import OWNER, Tokens
+from clearway.web.guard import HEADERS, Application, Receive, Scope, Send
 
 OPEN_PATHS = ("/health", "/ready")  # say nothing but whether the service is up
 UNKNOWN = "unknown"
 
 
-def protected(app: Application, service: Service, token: str) -> Application:
-    """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted."""
+def protected(app: Application, service: Service) -> Application:
+    """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted.
+
+    It finds the name of the token in the scope, under `OWNER`.
+    """
     limits, metrics = service.limits, service.metrics
 
     async def guard(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
-            if _authorised(scope, token):
-                return await app(scope, receive, send)
+            if (owner := _owner(scope, service.tokens)) is not None:
+                return await app({**scope, OWNER: owner}, receive, send)
             return await _refuse_socket(send)
         if scope["type"] != "http":
             return await app(scope, receive, send)
         begun, exchange = time.perf_counter(), _Exchange(scope, receive, send, limits.body_bytes)
         try:
-            if scope["path"] not in OPEN_PATHS and not _authorised(scope, token):
-                raise _unauthorised()
+            if scope["path"] not in OPEN_PATHS:
+                scope[OWNER] = _owner(scope, service.tokens)
+                if scope[OWNER] is None:
+                    raise _unauthorised()
             exchange.check_length()
             async with asyncio.timeout(limits.deadline_s):
                 await app(scope, exchange.receive, exchange.send)
@@ -121,9 +127,10 @@ def _header(scope: Scope, wanted: bytes) -> str | None:
     return next((value.decode("latin-1") for name, value in scope["headers"] if name.lower() == wanted), None)
 
 
-def _authorised(scope: Scope, token: str) -> bool:
+def _owner(scope: Scope, tokens: Tokens) -> str | None:
+    """The name of the request's token; None where it has none that is right."""
     scheme, _, given = (_header(scope, b"authorization") or "").partition(" ")
-    return scheme.lower() == "bearer" and same_token(given.strip(), token)
+    return tokens.owner_of(given.strip()) if scheme.lower() == "bearer" else None
 
 
 async def _refuse_socket(send: Send) -> None:

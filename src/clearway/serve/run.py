@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import logging
 import socket
-import warnings
 from collections.abc import Callable
 from pathlib import Path
-
-from PIL import Image
 
 from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import open_agent
@@ -17,6 +14,7 @@ from clearway.serve.connections import impatient
 from clearway.serve.limits import Limits
 from clearway.serve.protection import protected
 from clearway.serve.service import Service
+from clearway.serve.tokens import Tokens
 from clearway.web.local import serve
 
 OTHER_FILES = 200  # beside connections that a service may open
@@ -64,25 +62,25 @@ def allowed_connections(wanted: int) -> int:
     return allowed
 
 
-def run_service(agent: DeployedAgent, listener: socket.socket, token: str, limits: Limits) -> None:
+def run_service(agent: DeployedAgent, listener: socket.socket, tokens: Tokens, limits: Limits) -> None:
     """Answer until told to end (SIGINT, SIGTERM); requests under way are answered, streams are closed.
 
     Args:
         agent: is asked.
         listener: from `web.local.listening`; closed at the end.
-        token: that every request must hold.
+        tokens: one of which every request must hold.
         limits: what is allowed.
 
     Raises:
         DeployError: the agent takes no pictures.
     """
-    service = Service(agent, limits)
-    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `decoding` refuses by a limit of our own
+    service = Service(agent, limits, tokens)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     http, sockets = impatient(limits.patience_s)
     serve(
-        protected(make_app(service), service, token),
+        protected(make_app(service), service),
         listener,
+        lifespan="on",
         http=http,
         ws=sockets,
         ws_max_size=limits.body_bytes,
