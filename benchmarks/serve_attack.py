@@ -25,7 +25,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -91,7 +91,9 @@ def served(agent: str) -> Iterator[str]:
         tokens.write_text("".join(f"{name} {token}\n" for name, token in TOKENS.items()), encoding="utf-8")
         tokens.chmod(0o600)
         words = [sys.executable, "-m", "clearway", "serve", agent, "--tokens", str(tokens)]
-        with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "500"}) as process:
+        with subprocess.Popen(
+            words, stderr=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "500"}
+        ) as process:
             try:
                 assert process.stderr is not None
                 line = process.stderr.readline()
@@ -109,7 +111,9 @@ def attacking(url: str, hostile: list[bytes], per_s: float) -> Iterator[None]:
     if not per_s:
         yield
         return
-    process = multiprocessing.get_context("spawn").Process(target=attack, args=(url, TOKENS, hostile, per_s, os.getpid()))
+    process = multiprocessing.get_context("spawn").Process(
+        target=attack, args=(url, TOKENS, hostile, per_s, os.getpid())
+    )
     process.start()
     time.sleep(3)  # until it has begun
     try:
@@ -142,10 +146,8 @@ async def sent(http: httpx.AsyncClient, token: str, path: str, content: bytes) -
     """One hostile picture."""
     kind = "image/webp" if content.startswith(b"RIFF") else "image/jpeg"
     headers = {"authorization": f"Bearer {token}", "content-type": kind}
-    try:
+    with suppress(httpx.HTTPError):  # the service may refuse it as it likes
         await http.put(f"{path}/target", content=content, headers=headers)
-    except httpx.HTTPError:
-        pass  # the service may refuse it as it likes
 
 
 async def opened(http: httpx.AsyncClient, token: str, target: bytes | None) -> str:

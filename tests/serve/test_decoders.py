@@ -180,7 +180,7 @@ def test_none_is_left_once_they_are_closed() -> None:
 
 
 PROGRAM = """
-import asyncio, sys
+import asyncio, signal, sys
 from clearway.serve.decoders import Decoders, Standing
 from clearway.serve.limits import Limits
 from helpers.serving import grey
@@ -192,6 +192,7 @@ async def main():
     print(*(decoder._process.pid for decoder in decoders._quick.decoders), flush=True)
     await asyncio.sleep(60)
 
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup starts programs that ignore it
 asyncio.run(main())
 """
 

@@ -19,7 +19,7 @@ NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 class Serve:
     """Serve a trained agent over HTTP and WebSocket: pictures in, actions out.
 
-    Every request needs the token that is printed; the variable CLEARWAY_TOKEN sets one of your own.
+    Every request needs the token that is printed; the variable CLEARWAY_TOKEN sets one of your own, --tokens several.
 
     Example: clearway serve runs/bathroom --port 8000
     """
@@ -32,6 +32,8 @@ class Serve:
     """Address to listen on. The default is reached from this machine alone; before others, put a proxy with TLS."""
     port: int = 0
     """Port to listen on; 0 for any that is free."""
+    tokens: Path | None = None
+    """File of tokens, a name and a token a line, instead of the one that is printed; clients share by name."""
     sessions: int = 1000
     """Sessions that may be open at a time."""
     idle_s: float = 600.0
@@ -44,13 +46,17 @@ class Serve:
         from clearway.serve.limits import Limits
         from clearway.serve.run import run_service, servable_agent
         from clearway.serve.sessions import state_bytes
-        from clearway.serve.tokens import ALONE, Tokens, checked_token
+        from clearway.serve.tokens import ALONE, Tokens, checked_token, read_tokens
         from clearway.web.guard import new_token
         from clearway.web.local import address_of, listening
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
         own = os.environ.get(TOKEN_VARIABLE)
-        token = checked_token(own or new_token(), f"the variable {TOKEN_VARIABLE}")
+        if self.tokens is not None:
+            tokens = read_tokens(self.tokens)
+        else:
+            token = checked_token(own or new_token(), f"the variable {TOKEN_VARIABLE}")
+            tokens = Tokens([(ALONE, token)])
         console = stderr_console()
 
         def say(line: str) -> None:
@@ -59,7 +65,7 @@ class Serve:
         agent = servable_agent(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener:
             say(f"scene {agent.card.scene}: {address_of(listener, self.host)}")
-            if not own:
+            if self.tokens is None and not own:
                 say(f"token: {token}")
             if not agent.card.tells_arrival:
                 say("arrived is null in all answers: an earlier clearway exported this file. Export it again")
@@ -67,4 +73,4 @@ class Serve:
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6
                 say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
-            run_service(agent, listener, Tokens([(ALONE, token)]), limits)
+            run_service(agent, listener, tokens, limits)

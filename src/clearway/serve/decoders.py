@@ -102,9 +102,13 @@ class Decoder:
             self._connection.close()
 
     def close(self) -> None:
-        """Kill it, and start it no more."""
+        """Kill it, and start it no more; who waits for its answer gets an error."""
         self._closed = True
-        self.end()
+        if self.begun_s is None:
+            self.end()
+        elif self._process is not None:
+            self._process.kill()
+            self._process.wait()
 
     async def decode(self, content: bytes, seconds: float, patience_s: float) -> np.ndarray:
         """The picture, (height, width, 3) uint8.

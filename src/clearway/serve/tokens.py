@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -54,11 +56,10 @@ def read_tokens(path: Path) -> Tokens:
     """The tokens of a file: a name and a token a line; empty lines and those that begin with # say nothing.
 
     Raises:
-        ClearwayError: it cannot be read, is readable by others, or says something else.
+        ClearwayError: it cannot be read, others may read it, or it says something else.
     """
-    text = read_regular(path, MOST_BYTES).decode("utf-8", "replace")
     named = []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(_text(path).splitlines(), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
@@ -68,3 +69,22 @@ def read_tokens(path: Path) -> Tokens:
     if not named:
         raise ClearwayError(f"{path}: no tokens in it. Write a name and a token a line")
     return Tokens(named)
+
+
+def _text(path: Path) -> str:
+    """What a regular file says, which only its owner may read."""
+    try:
+        with open(
+            path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
+        ) as file:  # waits for no pipe
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise ClearwayError(f"{path}: is no regular file. Name a file of tokens")
+            if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+                raise ClearwayError(f"{path}: others may read or change it. Forbid it them: chmod 600 {path}")
+            content = file.read(MOST_BYTES + 1)
+    except OSError as fault:
+        raise ClearwayError(f"{path}: cannot be read ({fault.strerror}). Name a file of tokens") from fault
+    if len(content) > MOST_BYTES:
+        raise ClearwayError(f"{path}: is larger than {MOST_BYTES >> 20} MiB. Name a file of tokens")
+    return content.decode("utf-8", "replace")
