@@ -80,6 +80,17 @@ def test_tokens_of_a_file_are_not_said(clearway, served, tmp_path):
     assert clearway("serve", "x.onnx", "--tokens", tmp_path).refusal("cannot be read")
 
 
+def test_before_others_it_needs_a_token_of_one_s_own_and_warns_without_tls(clearway, monkeypatch, served):
+    monkeypatch.delenv("CLEARWAY_TOKEN", raising=False)
+    assert clearway("serve", "x.onnx", "--host", "0.0.0.0").refusal("--host 0.0.0.0", "Set CLEARWAY_TOKEN")
+    assert not served
+    monkeypatch.setenv("CLEARWAY_TOKEN", "a-token-of-one-s-own")
+    assert "WARNING: NOT ENCRYPTED" in clearway("serve", "x.onnx", "--host", "0.0.0.0").err
+    assert "WARNING" not in clearway("serve", "x.onnx").err
+    assert clearway("serve", "x.onnx", "--tls-cert", "x.pem").refusal("go together")
+    assert "without a token: port" in clearway("serve", "x.onnx", "--health-port", "0").err
+
+
 def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, served):
     line = "arrived is null in all answers: an earlier clearway exported this file. Export it again"
     assert line in clearway("serve", "x.onnx").err.replace("\n", " ")

@@ -118,7 +118,7 @@ def make_app(service: Service) -> FastAPI:
         """Figures for Prometheus."""
         return Response(service.metrics.text(), media_type="text/plain; version=0.0.4")
 
-    @app.get("/agent", dependencies=token, responses=_faults("unauthorised"))
+    @app.get("/agent", dependencies=token, responses=_faults("unauthorised", "too_many_attempts"))
     async def agent() -> AgentDescription:
         """What the agent is."""
         card = service.card
@@ -174,8 +174,15 @@ def make_app(service: Service) -> FastAPI:
     return app
 
 
-OPENING: tuple[Code, ...] = ("unauthorised", "invalid_request", "too_many_sessions", "body_too_large", "too_slow")
-CLOSING: tuple[Code, ...] = ("unauthorised", "no_such_session", "invalid_request")
+OPENING: tuple[Code, ...] = (
+    "unauthorised",
+    "too_many_attempts",
+    "invalid_request",
+    "too_many_sessions",
+    "body_too_large",
+    "too_slow",
+)
+CLOSING: tuple[Code, ...] = ("unauthorised", "too_many_attempts", "no_such_session", "invalid_request")
 PICTURE: tuple[Code, ...] = (
     *CLOSING,
     "unsupported_picture",
@@ -203,7 +210,9 @@ def _faults(*codes: Code) -> dict[int | str, dict[str, Any]]:
     return found
 
 
-_METRICS = _faults("unauthorised") | {200: {"description": "Figures", "content": {"text/plain": {}}}}
+_METRICS = _faults("unauthorised", "too_many_attempts") | {
+    200: {"description": "Figures", "content": {"text/plain": {}}}
+}
 
 
 @asynccontextmanager

@@ -45,6 +45,12 @@ class Limits:
     """Pictures that go through the model together."""
     connections: int = 1500
     """That are open at a time."""
+    strangers: int = 100
+    """Connections of an address on which no right token has come yet; the oldest makes room for the next."""
+    wrong_tokens: int = 20
+    """Of an address in a minute; beyond, only tokens are looked at that have come from there before."""
+    bodies_bytes: int = 256 << 20
+    """Of all requests under way together; owners of tokens share it."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

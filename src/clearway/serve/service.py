@@ -14,6 +14,7 @@ from clearway.agents.selection import most_probable
 from clearway.deploy.agent import DeployedAgent, aspect_problem
 from clearway.deploy.navigator import Decision, Selection, arrival_of, check_selection, decision_of
 from clearway.errors import DeployError
+from clearway.serve.attempts import Attempts
 from clearway.serve.batching import Batcher
 from clearway.serve.decoders import Decoders
 from clearway.serve.faults import Fault
@@ -50,6 +51,8 @@ class Service:
             raise DeployError(f"{problem}, so that it takes no pictures. Export it with its encoder")
         self.card, self.limits, self.tokens, self.sessions = agent.card, limits, tokens, Sessions(limits)
         self.decoders = Decoders(limits)
+        self.attempts = Attempts(limits.wrong_tokens)
+        self._bodies = Counter[str]()  # bytes of requests under way, by owner
         self._pictures = Counter[str]()  # under way, by owner
         self.metrics = Metrics(lambda: len(self.sessions), lambda: self.waiting, lambda: self.decoders.replaced)
         self.batcher = Batcher(agent, limits, self.metrics.computed)
@@ -93,6 +96,17 @@ class Service:
             if session.selection == "argmax":
                 decisions = most_probable(decisions)
             return Answer(decision_of(decisions), arrival_of(decisions), session.steps)
+
+    def hold_bytes(self, owner: str, count: int) -> None:
+        """Count bytes of a body that arrives. Raises Fault where the bodies under way are too large together."""
+        most = self.limits.bodies_bytes
+        if self._bodies.total() + count > most or self._bodies[owner] + count > self.tokens.share(most):
+            raise Fault("overloaded", "too many large requests are under way. Try again")
+        self._bodies[owner] += count
+
+    def free_bytes(self, owner: str, count: int) -> None:
+        """The request whose body was counted is over."""
+        self._bodies[owner] -= count
 
     @contextmanager
     def _place(self, owner: str) -> Iterator[None]:
