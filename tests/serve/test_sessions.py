@@ -53,6 +53,11 @@ def test_no_more_sessions_than_allowed_and_room_again_when_one_goes() -> None:
 
 def test_names_of_sessions_cannot_be_guessed() -> None:
     sessions = Sessions(Limits())
+    own = sessions.open(OWNER, "sampled", None, 1000)
+    for ask in (sessions.get, sessions.close):
+        with pytest.raises(Fault, match="no such session"):
+            ask(own.id, "another")
+    assert sessions.get(own.id, OWNER) is own
     names = {sessions.open(OWNER, "sampled", None, 1000).id for _ in range(200)}
     assert len(names) == 200
     assert {len(name) for name in names} == {22}  # 128 bits

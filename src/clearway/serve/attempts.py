@@ -29,7 +29,7 @@ class Attempts:
 
     def may_try(self, address: str, token: str) -> bool:
         """Whether a token of this address is to be looked at."""
-        return self._count(address) < self._most or (address, _digest(token)) in self._right
+        return self._count(address) + 1 <= self._most or (address, _digest(token)) in self._right
 
     def note(self, address: str, token: str, right: bool) -> None:
         """Keep what came of it."""

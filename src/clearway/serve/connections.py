@@ -8,14 +8,13 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
-from collections import OrderedDict
 from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from clearway.serve.tokens import OWNER
+from clearway.serve.tokens import KNOWN
 
 KEEP_ALIVE_S = 75  # of an idle connection; longer than clients and proxies commonly keep theirs
 
@@ -38,24 +37,25 @@ class Strangers:
 
     def __init__(self, most: int, trusted: str | None) -> None:
         self._most, self._trusted = most, trusted
-        self._open: dict[str, OrderedDict[asyncio.Transport, None]] = {}
+        self._open: dict[str, dict[ImpatientHttp, None]] = {}
 
-    def add(self, address: str, transport: asyncio.Transport) -> None:
+    def add(self, connection: ImpatientHttp) -> None:
         """Count a new connection; the oldest of its address is cut off where there are too many."""
-        if address == self._trusted:
+        if connection.address == self._trusted:
             return
-        found = self._open.setdefault(address, OrderedDict())
-        found[transport] = None
-        if len(found) > self._most:
-            reset(found.popitem(last=False)[0])
+        found = self._open.setdefault(connection.address, {})
+        found[connection] = None
+        oldest = next((other for other in found if not other.is_known), None)
+        if len(found) > self._most and oldest is not None:
+            reset(oldest.transport)
+            self.remove(oldest)
 
-    def remove(self, address: str, transport: asyncio.Transport) -> None:
+    def remove(self, connection: ImpatientHttp) -> None:
         """Count it no more: it is closed, or a right token has come."""
-        found = self._open.get(address)
-        if found is not None:
-            found.pop(transport, None)
-            if not found:
-                del self._open[address]
+        found = self._open.get(connection.address, {})
+        found.pop(connection, None)
+        if not found:
+            self._open.pop(connection.address, None)
 
 
 class _Impatient(asyncio.Protocol):
@@ -89,15 +89,18 @@ class ImpatientHttp(_Impatient, H11Protocol):
 
     strangers: Strangers
     health_port: int | None = None
+    address = ""
+    is_known = False  # a right token has come on it
     _headers: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
         """Begin to wait for headers."""
         super().connection_made(transport)
-        self._address = self.client[0] if self.client else ""
+        self.address = self.client[0] if self.client else ""
         if self.health_port is not None and self.server is not None and self.server[1] == self.health_port:
             self.limit_concurrency = None  # whoever watches the service is answered however busy it is
-        self.strangers.add(self._address, transport)
+        self.app_state = {**self.app_state, KNOWN: self._become_known}  # every request's scope has it, under "state"
+        self.strangers.add(self)
         self._await_headers()
 
     def data_received(self, data: bytes) -> None:
@@ -109,29 +112,27 @@ class ImpatientHttp(_Impatient, H11Protocol):
         elif self._headers is None and self.conn.trailing_data[0]:
             self._await_headers()
 
+    def _become_known(self) -> None:
+        self.is_known = True
+        self.strangers.remove(self)
+
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing any more."""
         self._have_headers()
-        self.strangers.remove(self._address, self.transport)
+        self.strangers.remove(self)
         super().connection_lost(exc)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         """Leave the connection to the WebSocket's class."""
         self._have_headers()
-        self.strangers.remove(self._address, self.transport)
+        self.strangers.remove(self)
         super().handle_websocket_upgrade(event)
-
-    def on_response_complete(self) -> None:
-        """Whoever has sent a right token is no stranger."""
-        if self.scope.get(OWNER) is not None:
-            self.strangers.remove(self._address, self.transport)
-        super().on_response_complete()
 
     def timeout_keep_alive_handler(self) -> None:
         """Uvicorn calls it `patience_s` after an answer: who has left it unread is cut off, owners may stay idle."""
         if self.transport.get_write_buffer_size():
             reset(self.transport)
-        elif self.scope.get(OWNER) is None:
+        elif not self.is_known:
             super().timeout_keep_alive_handler()
         else:
             end = super().timeout_keep_alive_handler

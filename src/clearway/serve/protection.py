@@ -11,7 +11,7 @@ from typing import Any
 from clearway.serve.faults import Fault
 from clearway.serve.metrics import Metrics
 from clearway.serve.service import Service
-from clearway.serve.tokens import OWNER
+from clearway.serve.tokens import KNOWN, OWNER
 from clearway.web.guard import HEADERS, Application, Receive, Scope, Send
 
 OPEN_PATHS = ("/health", "/ready")  # say nothing but whether the service is up
@@ -152,6 +152,8 @@ def _owner(scope: Scope, service: Service) -> str:
     service.attempts.note(address, token, owner is not None)
     if owner is None:
         raise _unauthorised()
+    if known := scope.get("state", {}).get(KNOWN):
+        known()
     return owner
 
 

@@ -11,6 +11,7 @@ from clearway.errors import ClearwayError
 from clearway.web.guard import same_token
 
 OWNER = "clearway.owner"  # in the scope of a request: the name of its token
+KNOWN = "clearway.known"  # in the state of a request: to be called once its token was right
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
 MOST_BYTES = 1 << 20  # of a file of tokens
