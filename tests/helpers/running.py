@@ -23,11 +23,15 @@ from clearway.web.local import listening, port_of
 from helpers.serving import TOKENS
 from helpers.sums import Sums
 
+def to_stderr(line):
+    print(line, file=sys.stderr, flush=True)
+
 asked = json.loads(sys.argv[1])
 listener, health = listening(0), listening(0) if asked.pop("health", False) else None
 print(port_of(listener), port_of(health) if health else 0, flush=True)
 certificate, key = asked.pop("tls", (None, None))
-network = Network(listener, health, certificate and Path(certificate), key and Path(key), asked.pop("proxy", None))
+proxy, log = asked.pop("proxy", None), asked.pop("log", None) and to_stderr
+network = Network(listener, health, certificate and Path(certificate), key and Path(key), proxy, log)
 path = asked.pop("tokens", None)
 tokens = read_tokens(Path(path)) if path else TOKENS
 with rotating(tokens, path and Path(path)):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import socket
+import sys
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +51,8 @@ class Serve:
     """Port for /health, /ready and /metrics alone, without a token; by default the service's own answers them."""
     trusted_proxy: str | None = None
     """Address of a proxy before the service, whose X-Forwarded-For says who asks; nobody else's is believed."""
+    log_requests: bool = False
+    """Write a line of JSON to standard error for every answer, twenty a second at most."""
     sessions: int = 1000
     """Sessions that may be open at a time."""
     idle_s: float = 600.0
@@ -97,7 +101,8 @@ class Serve:
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6
                 say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
-            network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy)
+            log = functools.partial(print, file=sys.stderr, flush=True) if self.log_requests else None
+            network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy, log)
             with rotating(tokens, self.tokens):
                 run_service(agent, network, tokens, limits)
 

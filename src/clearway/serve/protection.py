@@ -8,6 +8,7 @@ import time
 from collections.abc import MutableMapping
 from typing import Any
 
+from clearway.serve.access_log import AccessLog
 from clearway.serve.faults import Fault
 from clearway.serve.metrics import Metrics
 from clearway.serve.service import Service
@@ -19,11 +20,13 @@ WATCHED = (*OPEN_PATHS, "/metrics")
 UNKNOWN = "unknown"
 
 
-def protected(app: Application, service: Service, health_port: int | None = None) -> Application:
+def protected(
+    app: Application, service: Service, health_port: int | None = None, log: AccessLog | None = None
+) -> Application:
     """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted.
 
     It finds the name of the token in the scope, under `OWNER`. Where there is a `health_port`, what `WATCHED` names is
-    answered there, without a token, and nothing else; and nowhere else.
+    answered there, without a token, and nothing else; and nowhere else. `log` is told of every answer.
     """
     limits, metrics = service.limits, service.metrics
 
@@ -60,7 +63,11 @@ def protected(app: Application, service: Service, health_port: int | None = None
         finally:
             exchange.free()
             route = getattr(scope.get("route"), "path", UNKNOWN)
-            metrics.answered(route, exchange.status, time.perf_counter() - begun)
+            seconds = time.perf_counter() - begun
+            metrics.answered(route, exchange.status, seconds)
+            if log is not None:
+                session = scope.get("path_params", {}).get("session_id")
+                log.note(_address(scope), scope.get(OWNER), session, route, exchange.status, seconds)
 
     return guard
 
@@ -140,10 +147,14 @@ def _header(scope: Scope, wanted: bytes) -> str | None:
     return next((value.decode("latin-1") for name, value in scope["headers"] if name.lower() == wanted), None)
 
 
+def _address(scope: Scope) -> str:
+    return str((scope.get("client") or ("",))[0])
+
+
 def _owner(scope: Scope, service: Service) -> str:
     """The name of the request's token. Raises Fault where it has none that is right, or had too many wrong ones."""
     scheme, _, given = (_header(scope, b"authorization") or "").partition(" ")
-    address, token = (scope.get("client") or ("",))[0], given.strip()
+    address, token = _address(scope), given.strip()
     if scheme.lower() != "bearer" or not token:
         raise _unauthorised()
     if not service.attempts.may_try(address, token):

@@ -15,6 +15,7 @@ from types import FrameType
 from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import open_agent
 from clearway.errors import ClearwayError
+from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
 from clearway.serve.connections import Strangers, impatient
 from clearway.serve.limits import Limits
@@ -77,6 +78,7 @@ class Network:
         health: another one, for health and metrics alone, without a token; None: the first answers them.
         certificate, key: files in PEM for TLS; None: none.
         proxy: address of a proxy whose X-Forwarded-For is believed.
+        log: takes a line for every answer; None: none is written.
     """
 
     listener: socket.socket
@@ -84,6 +86,7 @@ class Network:
     certificate: Path | None = None
     key: Path | None = None
     proxy: str | None = None
+    log: Callable[[str], object] | None = None
 
     def listeners(self) -> list[socket.socket]:
         """Both, or the one."""
@@ -147,13 +150,16 @@ def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: 
     health_port = port_of(network.health) if network.health else None
     http, sockets = impatient(limits.patience_s, Strangers(limits.strangers, network.proxy), health_port)
     tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
+    logging.getLogger("uvicorn.error").addFilter(Sparing())
     serve(
-        protected(make_app(service), service, health_port),
+        protected(make_app(service), service, health_port, AccessLog(network.log) if network.log else None),
         *network.listeners(),
         **tls,
         proxy_headers=network.proxy is not None,
         forwarded_allow_ips=network.proxy,
         lifespan="on",
+        log_config=None,
         http=http,
         ws=sockets,
         ws_max_size=limits.body_bytes,
