@@ -1,10 +1,15 @@
-"""Processes started with signals held never get them, the first one neither."""
+"""Children end with their parent, within their own limits, and hear nothing of the terminal while signals are held."""
 
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="has no such signals")
+linux = pytest.mark.skipif(sys.platform != "linux", reason="counts on prctl and on a limit of address space")
 
 PROGRAM = """
 import multiprocessing, signal
@@ -24,8 +29,59 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="has no signal masks")
+@posix
 def test_the_first_child_gets_no_interrupt_either(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(PROGRAM)
     said = subprocess.run([sys.executable, tmp_path / "program.py"], capture_output=True, text=True, check=True)
     assert said.stdout == "[2] 0\n"  # SIGINT is held in the child, nothing in the parent any more
+
+
+PARENT = """
+import os, subprocess, sys
+subprocess.Popen([sys.executable, "-c", sys.argv[1].format(parent=os.getpid())]).wait()
+"""
+CHILD = """
+import sys
+from clearway import children
+sys.platform = {platform!r}
+children.LOOKS_EVERY_S = 0.1
+children.end_with_parent({{parent}})
+print("ready", flush=True)
+import time
+time.sleep(60)
+"""
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGHUP])
+@pytest.mark.parametrize("platform", [pytest.param("linux", marks=linux), "darwin"])
+def test_a_child_ends_with_its_parent_however_that_ends(platform: str, number: signal.Signals) -> None:
+    words = [sys.executable, "-c", PARENT, CHILD.format(platform=platform)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None and parent.stdout.readline() == "ready\n"
+        parent.send_signal(number)
+        began = time.monotonic()
+        assert parent.stdout.read() == ""  # until nobody has it open any more
+        assert time.monotonic() - began < 5
+
+
+@posix
+def test_a_child_whose_parent_is_gone_already_ends_at_once() -> None:
+    program = "from clearway.children import end_with_parent\nend_with_parent(1)\nprint('still here')"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "")
+
+
+@posix
+def test_a_child_that_computes_for_too_long_is_ended_by_the_system() -> None:
+    """In one long call of C, where no thread of Python would get to see the time."""
+    program = "from clearway.children import limit\nlimit(seconds=1)\nprint(sum(range(10**13)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=30)
+    assert done.returncode == -signal.SIGALRM
+
+
+@linux
+def test_a_child_gets_no_more_memory_than_its_limit() -> None:
+    program = "from clearway.children import limit\nlimit(memory_bytes=1 << 28)\nbytearray(1 << 28)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stderr.endswith("MemoryError\n")

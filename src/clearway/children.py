@@ -1,11 +1,96 @@
-"""Child processes that do not hear what the terminal sends to the whole group."""
+"""Child processes: none outlives its parent, each has limits of its own, and the terminal's signals may be held.
+
+A child says so itself, first of all:
+
+    end_with_parent(parent)  # the parent's process id, told by the parent
+    limit(memory_bytes=1 << 30, seconds=60)
+"""
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
+import sys
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
+from multiprocessing.context import SpawnProcess
+
+ORPHANED = 1  # exit code; nobody is left to see it
+LOOKS_EVERY_S = 1.0
+PR_SET_PDEATHSIG = 1  # of Linux's prctl
+
+
+def end_with_parent(parent: int) -> None:
+    """End this process when its parent ends, however that ends and whatever this one is busy with.
+
+    On Linux the system kills it, and takes the thread that started it for the parent: let a child be started by a
+    thread that lives as long. Elsewhere a thread of this process looks for the parent every second. No effect on
+    Windows, where a child has to notice that its pipe is closed.
+
+    Args:
+        parent: its process id; it may be gone already.
+
+    Raises:
+        OSError: the system refuses.
+    """
+    if sys.platform == "win32":
+        return
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None, use_errno=True)
+        if libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0) != 0:
+            raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) failed")
+    else:
+        threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    _end_if_orphaned(parent)
+
+
+def _watch(parent: int) -> None:
+    while True:
+        time.sleep(LOOKS_EVERY_S)
+        _end_if_orphaned(parent)
+
+
+def _end_if_orphaned(parent: int) -> None:
+    if os.getppid() != parent:  # it is somebody else's child by now
+        os._exit(ORPHANED)
+
+
+class ChildProcess(SpawnProcess):
+    """A process of `multiprocessing` that ends with its parent as `end_with_parent` says.
+
+    It does from the first moment on, though it may take seconds to import what it is to run.
+    """
+
+    def __reduce__(self) -> tuple:
+        """In the child the function is called before the state, and what that names, is read."""
+        return _begun, (type(self), os.getpid()), self.__dict__
+
+
+def _begun(kind: type[ChildProcess], parent: int) -> ChildProcess:
+    end_with_parent(parent)
+    return kind.__new__(kind)
+
+
+def limit(*, memory_bytes: int | None = None, seconds: int | None = None) -> None:
+    """Bound this process: allocations beyond the memory fail, and once the time is over the system ends it by SIGALRM.
+
+    Args:
+        memory_bytes: of address space, on Linux; None: no bound.
+        seconds: from now, whatever it is busy with, not on Windows; None: no bound.
+    """
+    if memory_bytes is not None and sys.platform == "linux":
+        import resource
+
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        most = memory_bytes if hard == resource.RLIM_INFINITY else min(memory_bytes, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    if seconds is not None and sys.platform != "win32":
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(seconds)
 
 
 @contextmanager

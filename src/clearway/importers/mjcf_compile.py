@@ -17,6 +17,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clearway.children import limit
 from clearway.errors import SceneError
 
 if TYPE_CHECKING:
@@ -27,7 +28,10 @@ if TYPE_CHECKING:
 MEMORY_LIMIT_BYTES = 8 << 30  # of the process's address space
 MODEL_LIMIT_BYTES = 1 << 30  # of the compiled model
 TIME_LIMIT_S = 300
-COMMAND = "import sys; sys.path[:] = {path!r}; from clearway.importers.mjcf_compile import main; main()"
+COMMAND = (
+    "import sys; sys.path[:] = {path!r}; from clearway.children import end_with_parent; end_with_parent({parent}); "
+    "from clearway.importers.mjcf_compile import main; main()"
+)
 REFUSED = 3
 MESSAGE_LENGTH = 300
 REMEDY = "Correct the model; the files that it names must lie where it says"
@@ -44,11 +48,12 @@ def compiled(path: Path, agent: AgentShape) -> mujoco.MjModel:
     if not path.is_file():
         raise SceneError(path, "there is no such file", "Check the path")
     search = [folder or os.getcwd() for folder in sys.path]
-    job = json.dumps({"path": str(path.resolve()), "agent": asdict(agent), "memory_bytes": MEMORY_LIMIT_BYTES})
+    limits = {"memory_bytes": MEMORY_LIMIT_BYTES, "seconds": TIME_LIMIT_S}
+    job = json.dumps({"path": str(path.resolve()), "agent": asdict(agent), "limits": limits})
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo leaves a log of warnings where it runs
         try:
             done = subprocess.run(
-                [sys.executable, "-c", COMMAND.format(path=search), job],
+                [sys.executable, "-c", COMMAND.format(path=search, parent=os.getpid()), job],
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 cwd=folder,
@@ -77,7 +82,7 @@ def main() -> None:
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as output:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what MuJoCo prints must not mix with the model
         job = json.loads(sys.argv[1])
-        _limit_memory(job["memory_bytes"])
+        limit(**job["limits"])
         import mujoco
 
         from clearway.rooms.obstacles import AgentShape, add_body
@@ -96,14 +101,6 @@ def main() -> None:
             print(f"{error}" or type(error).__name__, file=sys.stderr, flush=True)
             sys.exit(REFUSED)
         output.write(binary_model(model))
-
-
-def _limit_memory(limit_bytes: int) -> None:
-    """Bound the process's address space, where the system can."""
-    if sys.platform == "linux":
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (limit_bytes, limit_bytes))
 
 
 if __name__ == "__main__":

@@ -25,7 +25,10 @@ from clearway.spread.worker import packed, read_message, write_message
 from clearway.spread.workers import Part, Result, Tool, Work
 
 GRACE_S = 60.0  # for processes to end when they are told to: training saves a checkpoint first
-COMMAND = "import sys; sys.path[:] = {path!r}; from clearway.spread.worker import main; main()"
+COMMAND = (
+    "import sys; sys.path[:] = {path!r}; from clearway.children import end_with_parent; end_with_parent({parent}); "
+    "from clearway.spread.worker import main; main()"
+)
 
 
 class _Died(Exception):
@@ -136,7 +139,7 @@ class _Process:
         path = [folder or os.getcwd() for folder in sys.path]
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", COMMAND.format(path=path)],
+                [sys.executable, "-c", COMMAND.format(path=path, parent=os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=messages,

@@ -12,12 +12,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
 
 import torch
 from torch import Tensor
 
-from clearway.children import signals_held
+from clearway.children import ChildProcess, signals_held
 from clearway.errors import RunError
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.group import WorkerGroup
@@ -65,7 +64,7 @@ class AsyncTrainer:
         self.statistics = EpisodeStatistics(learner.envs, world.target_count, world.device)
         self.process_count = min(processes, learner.envs)
         self.shared = self._new_shared(features)
-        self._processes: list[SpawnProcess] = []
+        self._processes: list[ChildProcess] = []
         self._connections: list[Connection] = []
         self._paused = False
         self._figures: list[Figures] = []
@@ -182,7 +181,7 @@ class AsyncTrainer:
                     self.seed,
                     self.shared,
                 )
-                process = context.Process(target=work, args=(assignment, theirs), name=f"a3c-{number}", daemon=True)
+                process = ChildProcess(target=work, args=(assignment, theirs), name=f"a3c-{number}", daemon=True)
                 self._connections.append(ours)
                 try:
                     process.start()

@@ -1,7 +1,6 @@
 """A worker process: rounds of its workers, until its parent says otherwise, closes the connection or dies.
 
-The parent sends PAUSE and GO; the process sends `WorkerReport`s and PAUSED. It never outlives its parent: a report or a
-command finds the connection closed.
+The parent sends PAUSE and GO; the process sends `WorkerReport`s and PAUSED. It ends with its parent: `ChildProcess`.
 """
 
 from __future__ import annotations
