@@ -33,7 +33,7 @@ def object_store() -> Iterator[str]:
 
 @pytest.fixture
 def s3(object_store: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[str, bytes], None]]:
-    """An object store with the empty bucket "rooms", and an empty cache; yields what puts a file there: key, content."""
+    """An object store with the empty bucket "rooms", and an empty cache; yields what puts a file there by its key."""
     from s3fs import S3FileSystem
 
     environment = {

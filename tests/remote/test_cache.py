@@ -87,7 +87,7 @@ def test_what_another_process_has_fetched_stays(web: str, monkeypatch: pytest.Mo
     end_process()
     other.lock.release()  # as the system does when a process is killed
     fetched([f"{web}/c.h5"], SUFFIXES)
-    assert kept() == "bc"
+    assert kept() in ("ac", "bc")  # those two came together
     assert not other.path.exists()
     end_process()
 

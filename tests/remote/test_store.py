@@ -18,8 +18,9 @@ SUFFIXES = (".h5",)
 def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     yield
-    left = [path.name for path in (tmp_path / "cache/remote").glob("*") if not path.name.startswith((".leases", ".cache"))]
-    assert all((tmp_path / "cache/remote" / name / "address.txt").exists() for name in left)
+    left = [path for path in (tmp_path / "cache/remote").glob("*") if not path.name.startswith(".")]
+    assert all((path / "address.txt").exists() for path in left)
+    assert not list((tmp_path / "cache/remote").glob("*.part"))
 
 
 def told(address: str) -> str:

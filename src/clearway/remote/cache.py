@@ -1,4 +1,4 @@
-"""Files from elsewhere on this machine: fetched whole or not at all, the least recently used removed to stay in a limit.
+"""Files from elsewhere on this machine: fetched whole or not at all, within a limit, the least recently used out first.
 
 A file lies in a folder of its own in the cache folder, under `remote`, whose name is made of its address, version and
 size; beside it `address.txt`. What a living process has fetched stays: each holds a lease, a list of its files with a

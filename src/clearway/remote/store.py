@@ -158,7 +158,7 @@ def _told(fault: Exception, seconds: float) -> str:
     if isinstance(cause, FileNotFoundError) or getattr(cause, "status", None) == 404:
         return "there is nothing there. Check the address"
     if any(word in kind for word in _CREDENTIALS) or getattr(cause, "status", None) in (401, 403):
-        return f"may not be opened ({reason}). Check the credentials and their rights, see docs/scale.md"
+        return f"may not be opened ({reason}). Check the credentials and their rights, see docs/scenes.md"
     if isinstance(cause, TimeoutError) or "Timeout" in kind:
         return f"no answer in {seconds:.0f} s. Check the network and the server, then try again"
     return f"cannot be reached or read ({reason}). Check the address and the network, then try again"
