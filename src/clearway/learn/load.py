@@ -13,6 +13,7 @@ from clearway.agents.agent import Agent
 from clearway.agents.by_pose import PoseAgent, network_on_poses
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
+from clearway.learn.described import described
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord, scene_digest
@@ -58,6 +59,9 @@ class TrainedNetwork:
     network: SiameseActorCritic
     feature_map: FeatureMap
     frames: int
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def on_poses(self, world: World) -> PoseAgent:
         """Its agent on the grid, in a world with the run's scenes. Raises RunError as `lookup` does."""
