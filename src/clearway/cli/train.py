@@ -33,7 +33,7 @@ class Train:
     """
 
     files: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """Scene files, or folders of them."""
+    """Scene files, or folders of them; here, or at s3://..., gs://... or https://..."""
     out: Path | None = None
     """The run folder; by default a new one, runs/ROOM-REWARD-ALGORITHM-sSEED."""
     targets: tuple[str, ...] = ()
