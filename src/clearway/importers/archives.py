@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 import struct
 import tempfile
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from clearway.errors import SceneError
+from clearway.regular_files import opened
 
 ZIP_SUFFIX = ".zip"
 MAX_MEMBERS = 10_000
@@ -63,9 +65,10 @@ def unpacked(paths: Sequence[Path], suffixes: Sequence[str]) -> Iterator[list[Pa
 def _unpack(path: Path, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     folder.mkdir()
     try:
-        with zipfile.ZipFile(path) as archive:
+        with opened(path) as file, zipfile.ZipFile(file) as archive:
             members = _wanted(path, archive, suffixes)
-            left = min(MAX_BYTES, BLOCK_BYTES + MAX_RATIO * path.stat().st_size)  # members may share their bytes
+            size = os.fstat(file.fileno()).st_size
+            left = min(MAX_BYTES, BLOCK_BYTES + MAX_RATIO * size)  # members may share their bytes
             for member in members:
                 left -= _copy(path, archive, member, folder / PurePosixPath(member.filename).name, left)
     except _FAULTS as fault:

@@ -15,7 +15,7 @@ def read_json(path: Path) -> Any:
     Raises:
         SceneError: there is no such file, it is too large, or not JSON.
     """
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Give the whole folder of the data set")
     try:
         return files.read_json(path)

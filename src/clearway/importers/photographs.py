@@ -14,6 +14,7 @@ from PIL import Image, ImageOps
 
 from clearway.errors import SceneError
 from clearway.importers.picture_limits import check_picture_size
+from clearway.regular_files import opened
 from clearway.scenes.file_pictures import file_stamp
 from clearway.scenes.memory_limits import array_limit
 
@@ -99,7 +100,7 @@ def photographs(paths: Sequence[Path], height_px: int = HEIGHT_PX, width_px: int
 def _opened(path: Path) -> Image.Image:
     """The picture as it is meant to be seen, not unpacked where it would be too large."""
     try:
-        with Image.open(path, formats=FORMATS) as picture:
+        with opened(path) as file, Image.open(file, formats=FORMATS) as picture:
             most = min(MAX_PICTURE_PIXELS, array_limit(path) // PIXEL_BYTES)
             if math.prod(picture.size) > most:
                 problem = f"has {picture.size[0]} x {picture.size[1]} pixels, more than {most:,} for a file of its size"

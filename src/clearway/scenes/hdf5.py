@@ -18,6 +18,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.files import parse_json, written_whole
+from clearway.regular_files import check_regular
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
@@ -58,9 +59,10 @@ def opened(path: Path) -> Iterator[h5py.File]:
     """The HDF5 file at `path`, open for reading. Raises SceneError where it is missing or not HDF5."""
     if path.is_dir():
         raise SceneError(path, "is a folder", "Name a scene file in it")
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
     with faults_named(path, problem="cannot be opened as HDF5"):
+        check_regular(path)
         if not h5py.is_hdf5(path):
             raise SceneError(path, "is not an HDF5 file", "Give a scene file in the thor_v1 format")
         file = h5py.File(path, "r")
