@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 from clearway.regular_files import opened
 
 ZIP_SUFFIX = ".zip"
@@ -72,8 +72,7 @@ def _unpack(path: Path, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
             for member in members:
                 left -= _copy(path, archive, member, folder / PurePosixPath(member.filename).name, left)
     except _FAULTS as fault:
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
-        raise SceneError(path, f"cannot be unpacked ({reason})", GET_ANOTHER) from fault
+        raise SceneError(path, f"cannot be unpacked ({reason_of(fault)})", GET_ANOTHER) from fault
     return sorted(folder.iterdir())
 
 

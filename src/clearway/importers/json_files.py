@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from clearway import files
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 
 
 def read_json(path: Path) -> Any:
@@ -20,5 +20,4 @@ def read_json(path: Path) -> Any:
     try:
         return files.read_json(path)
     except (OSError, ValueError) as fault:
-        reason = " ".join(str(fault).split())[:200]
-        raise SceneError(path, f"cannot be read as JSON ({reason})", "Get another copy") from fault
+        raise SceneError(path, f"cannot be read as JSON ({reason_of(fault)})", "Get another copy") from fault

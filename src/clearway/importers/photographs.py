@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageOps
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 from clearway.importers.picture_limits import check_picture_size
 from clearway.regular_files import opened
 from clearway.scenes.file_pictures import file_stamp
@@ -114,8 +114,7 @@ def _opened(path: Path) -> Image.Image:
         raise
     except (*_FAULTS, Image.DecompressionBombError) as fault:
         kinds = ", ".join(FORMATS)
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
-        raise SceneError(path, f"cannot be read as a picture ({reason})", f"Give one of {kinds}") from fault
+        raise SceneError(path, f"cannot be read as a picture ({reason_of(fault)})", f"Give one of {kinds}") from fault
 
 
 def _photograph(path: Path, height_px: int, width_px: int) -> np.ndarray:

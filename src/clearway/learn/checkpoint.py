@@ -25,7 +25,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save_file
 from torch import Tensor
 
-from clearway.errors import RunError
+from clearway.errors import RunError, reason_of
 from clearway.files import read_json
 from clearway.regular_files import read_bytes, sha256_of
 
@@ -129,7 +129,7 @@ def _read_tensors(path: Path, name: str) -> dict[str, Tensor]:
             raise _Damaged(f"{path / name}: has changed while it was read. Use another checkpoint")
         return load(content)
     except (OSError, SafetensorError) as error:
-        raise _Damaged(f"{path / name}: cannot be read ({error}). Use another checkpoint") from error
+        raise _Damaged(f"{path / name}: cannot be read ({reason_of(error)}). Use another checkpoint") from error
 
 
 def checkpoints(folder: Path) -> list[Path]:

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.errors import ClearwayError, RunError
+from clearway.errors import ClearwayError, RunError, reason_of
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
@@ -269,7 +269,7 @@ class RunFolder:
                 f"{self.path}: no run here ({RUN_FILE} is missing). Name a folder that clearway train made"
             ) from error
         except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
-            raise RunError(f"{path}: not readable ({error}). Restore it or train again") from error
+            raise RunError(f"{path}: not readable ({reason_of(error)}). Restore it or train again") from error
         if found > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
@@ -293,7 +293,7 @@ class RunFolder:
             lines = read_bytes(self.metrics_path, MAX_METRICS_BYTES).splitlines(keepends=True)
         except OSError as error:
             raise RunError(
-                f"{self.metrics_path}: not readable ({error.strerror}). Restore it or train again"
+                f"{self.metrics_path}: not readable ({reason_of(error)}). Restore it or train again"
             ) from error
         return [self._row(number, line) for number, line in enumerate(lines, 1) if line.endswith(b"\n")]
 

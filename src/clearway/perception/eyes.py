@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clearway.errors import EncoderError
+from clearway.errors import EncoderError, reason_of
 from clearway.files import json_text, read_json, written_whole
 from clearway.perception.encoder import IDENTITY_LETTERS, NetworkEncoder
 from clearway.perception.preprocess import Preprocessing
@@ -162,7 +162,7 @@ def read_card(folder: Path) -> EyesCard:
             f"{folder}: no eyes here ({CARD_FILE} is missing). Give what clearway pretrain made"
         ) from fault
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise EncoderError(f"{path}: damaged ({' '.join(str(fault).split())[:200]}). Get the eyes again") from fault
+        raise EncoderError(f"{path}: damaged ({reason_of(fault)}). Get the eyes again") from fault
 
 
 def read_eyes(folder: Path) -> Eyes:
@@ -182,8 +182,7 @@ def read_eyes(folder: Path) -> Eyes:
         counts = {name: tensor for name, tensor in eyes.state_dict().items() if name.endswith("num_batches_tracked")}
         eyes.load_state_dict({**counts, **state})
     except (OSError, SafetensorError, RuntimeError) as fault:
-        reason = " ".join(str(fault).split())[:200]
-        raise EncoderError(f"{path}: cannot be read ({reason}). Get the eyes again") from fault
+        raise EncoderError(f"{path}: cannot be read ({reason_of(fault)}). Get the eyes again") from fault
     return eyes.eval().requires_grad_(False)
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 from clearway.regular_files import opened, read_text
 from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan, grid_from_above
 
@@ -106,7 +106,7 @@ def _read_plan(
 
 
 def _check_file(path: Path) -> None:
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
     if path.suffix not in SUFFIXES:
         problem = f"its name ends in '{path.suffix}', expected {' or '.join(SUFFIXES)}"
@@ -125,9 +125,8 @@ def _faults_named(path: Path, dataset: str = "") -> Iterator[None]:
     try:
         yield
     except (*_FAULTS, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error) as fault:
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         remedy = "Make the file again or get another copy"
-        raise SceneError(path, f"cannot be read ({reason})", remedy, dataset) from fault
+        raise SceneError(path, f"cannot be read ({reason_of(fault)})", remedy, dataset) from fault
 
 
 def _read_array(path: Path, archive: zipfile.ZipFile, name: str) -> np.ndarray:

@@ -16,7 +16,7 @@ from types import EllipsisType
 import h5py
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 from clearway.files import parse_json, written_whole
 from clearway.regular_files import check_regular
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
@@ -50,8 +50,7 @@ def faults_named(source: Path, dataset: str = "", problem: str = "cannot be read
     try:
         yield
     except _FAULTS as fault:
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
-        raise SceneError(source, f"{problem} ({reason})", MAKE_AGAIN, dataset) from fault
+        raise SceneError(source, f"{problem} ({reason_of(fault)})", MAKE_AGAIN, dataset) from fault
 
 
 @contextmanager
@@ -80,8 +79,7 @@ def written(path: Path) -> Iterator[h5py.File]:
         with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
             yield file
     except (OSError, RuntimeError) as fault:  # HDF5 raises the second where the disk fills up as a file is closed
-        reason = getattr(fault, "strerror", None) or " ".join(str(fault).split())
-        problem = f"cannot be written ({reason})"
+        problem = f"cannot be written ({reason_of(fault)})"
         raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
 
 
