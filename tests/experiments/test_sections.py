@@ -12,7 +12,18 @@ from clearway.choices import ExperimentName
 from clearway.evaluation.episode_files import read_episodes
 from clearway.evaluation.episodes import EpisodeTable, episode_starts
 from clearway.evaluation.optimum import world_yardsticks
-from clearway.experiments import analysis, fig3, fig5, fig6, generalisation, hard_tables, job, navigation_tables, table1
+from clearway.experiments import (
+    analysis,
+    fig3,
+    fig5,
+    fig6,
+    generalisation,
+    hard_tables,
+    job,
+    memory,
+    navigation_tables,
+    table1,
+)
 from clearway.experiments.analysis import pareto_front
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.groups import Scores, compared
@@ -208,9 +219,11 @@ def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Secti
 
 def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
-    assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2  # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled
+    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step
+    assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2 + 4 + 5 * 2
     assert len({claim.text for section in ("table2", "table3") for claim in sections[section].claims}) == 2 * 2 * 5
-    assert all(claim.text.startswith(("paper: ", "paper, unclipped: ", "default: ")) for claim in claims)
+    learners = ("paper: ", "paper, unclipped: ", "default: ", "q-learning: ", "bc: ")
+    assert all(claim.text.startswith(learners) for claim in claims)
 
 
 def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
@@ -365,13 +378,26 @@ def test_figure_6_says_how_well_the_trained_targets_were_learnt(setting: Setting
     assert row["sc on trained targets"] == pytest.approx(np.mean([table.reached.mean() for table in tables]))
 
 
+def test_memory_says_what_a_map_holds_of_the_frames_it_was_learnt_in(sections: dict[str, Section]) -> None:
+    section = sections["memory"]
+    (table,), (figure,) = section.tables, section.figures
+    (line,) = figure.series
+    assert list(line.x) == sorted(line.x) and line.y[0] < line.y[-1] == 1.0
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    by_frames = [row["steps"] for row in rows if row["agent"] == memory.PLANNER]
+    best = min(row["steps"] for row in rows)
+    assert by_frames[-1] == best and by_frames[0] > best  # nobody takes fewer than the shortest paths
+    assert {"q-learning", "bc", "default", "paper", "random walk"} < {row["agent"] for row in rows}
+    assert all(claim.further for claim in section.claims)
+
+
 def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[str, Section]) -> None:
     further = [claim.text for claim in sections["table1"].claims if claim.further]
     assert "default: fewer collisions than with a penalty for bumping" in further
     assert "paper, unclipped: fewer collisions than with the shortest-path reward" in further
     assert "paper: fewer collisions than with the shortest-path reward" not in further
     summary = report._summary(list(sections.values()))
-    assert [len(table.rows) for table in summary] == [30, 14]
+    assert [len(table.rows) for table in summary] == [30, 28]
 
 
 def test_a_report_takes_with_it_what_one_that_was_cut_off_left(

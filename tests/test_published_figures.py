@@ -1,0 +1,76 @@
+"""What docs/seeing.md says of the generalist is what its records come to."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.evaluation.bootstrap import RESAMPLES, intervals
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = (DOCS / "seeing.md").read_text(encoding="utf-8")
+COLUMNS = ("success", "success_4x", "spl", "collisions")
+SHARES = ("success", "success_4x", "spl")
+THIRD, FOURTH = "generalist-test-third.json", "generalist-test-fourth.json"
+ROWS = [
+    (THIRD, "rooms", "generalist", "| no tour | 100 % | 93.3"),
+    (THIRD, "rooms", "collisions cost nothing", "| no tour, collisions cost nothing | 100 % | 92.5"),
+    (THIRD, "rooms", "random", "| random walk | 72.5"),
+    (THIRD, "rooms-tour", "generalist", "| after a tour of 500 steps | 100 % | 99.9"),
+    (THIRD, "rooms-perturbed", "generalist", "| no tour | 99.5"),
+    (THIRD, "flats", "generalist", "| flats, no tour | 86.2"),
+    (THIRD, "flats-tour", "generalist", "| flats, after a tour of 500 steps | 97.7"),
+    (THIRD, "real", "generalist", "| real plans, no tour |"),
+    (FOURTH, "rooms", "generalist", "| rooms, no tour | 100 % (99.8-100) | 92.8"),
+    (FOURTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing |"),
+    (FOURTH, "flats", "generalist", "| flats, no tour, now |"),
+    (FOURTH, "validation-rooms", "generalist", "| validation rooms, no tour |"),
+    (FOURTH, "validation-rooms-perturbed", "generalist", "| validation rooms, everything perturbed, no tour |"),
+    (FOURTH, "validation-rooms-perturbed-tour", "generalist", "| validation rooms, everything perturbed, after"),
+    (FOURTH, "validation-flats", "generalist", "| validation flats, no tour |"),
+    (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
+]
+
+
+def scenes_of(record: str, part: str, agent: str) -> list[dict[str, float]]:
+    return json.loads((DOCS / "figures" / record).read_text(encoding="utf-8"))[part][agent]["scenes"]
+
+
+def numbers(cell: str) -> list[str]:
+    """Those of "93.3 % (92.1-94.4)", as they are written."""
+    return re.findall(r"\d+(?:\.\d+)?", cell)
+
+
+def ends(values: np.ndarray) -> tuple[float, float]:
+    """Of the mean over scenes, which are drawn anew."""
+    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    low, high = intervals(values[rows].mean(axis=1))
+    return float(low), float(high)
+
+
+def expect(written: str, value: float, what: str) -> None:
+    """A figure is written to its last digit."""
+    digits = len(written.partition(".")[2])
+    assert abs(float(written) - value) <= 0.5001 * 10**-digits, f"{what}: written {written}, recorded {value}"
+
+
+@pytest.mark.parametrize(("record", "part", "agent", "row"), ROWS)
+def test_a_row_of_the_page_is_what_the_record_comes_to(record: str, part: str, agent: str, row: str) -> None:
+    lines = [line for line in PAGE.splitlines() if line.startswith(row)]
+    assert lines, f"a row begins with {row}"
+    cells = lines[0].strip("|").split("|")[1:]
+    scenes = scenes_of(record, part, agent)
+    for name, cell in zip(COLUMNS, cells, strict=False):
+        values = np.array([scene[name] for scene in scenes]) * (100 if name in SHARES else 1)
+        mean, *interval = numbers(cell)
+        expect(mean, float(values.mean()), f"{name} in {row}")
+        for written, value in zip(interval, ends(values), strict=bool(interval)):
+            expect(written, value, f"interval of {name} in {row}")
+
+
+def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
+    expect("93.3", 93.34, "near")
+    with pytest.raises(AssertionError, match=r"written 93\.3, recorded 93\.36"):
+        expect("93.3", 93.36, "far")
