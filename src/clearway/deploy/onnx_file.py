@@ -20,6 +20,7 @@ from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.deploy.agent import sight_of
 from clearway.deploy.card import ARRIVAL, EXPORT_AGAIN, SIAMESE, Card, card_from_json
 from clearway.errors import DeployError
+from clearway.regular_files import read_bytes
 
 CARD_KEY, CHECKSUM_KEY = "clearway", "clearway.sha256"
 MAX_BYTES = 1 << 31  # of one ONNX file, by its format
@@ -151,9 +152,7 @@ def _arrival_of(file: OnnxFile) -> Arrival | None:
 
 def _content(path: Path) -> bytes:
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise DeployError(f"{path}: larger than an ONNX file can be. {EXPORT_AGAIN}")
-        return path.read_bytes()
+        return read_bytes(path, MAX_BYTES)
     except OSError as fault:
         raise DeployError(f"{path}: cannot be read ({fault.strerror}). Check the path") from fault
 

@@ -19,12 +19,14 @@ from typing import Any
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.files import json_text, read_json, written_whole
 from clearway.markdown import table_lines
+from clearway.regular_files import read_bytes
 from clearway.scenes.scene import Scene
 from clearway.viz.html import rendered_html
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
 
 HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
 LONG_TEXT = 60  # letters; a column with more is broken into lines
+MAX_PICTURE_BYTES = 64 * 1024**2  # of a figure
 SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
 
 
@@ -204,7 +206,7 @@ def _section(folder: Path, section: Section) -> dict[str, Any]:
 
 
 def _encoded(folder: Path, name: str) -> str:
-    return base64.b64encode((folder / FIGURES / f"{name}.png").read_bytes()).decode()
+    return base64.b64encode(read_bytes(folder / FIGURES / f"{name}.png", MAX_PICTURE_BYTES)).decode()
 
 
 def _shown(table: ReportTable) -> ShownTable:
