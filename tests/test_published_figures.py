@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "seeing.md").read_text(encoding="utf-8")
 COLUMNS = ("success", "success_4x", "spl", "collisions")
 SHARES = ("success", "success_4x", "spl")
-THIRD = "generalist-test-third.json"
+THIRD, FOURTH = "generalist-test-third.json", "generalist-test-fourth.json"
 ROWS = [
     (THIRD, "rooms", "generalist", "| no tour | 100 % | 93.3"),
     (THIRD, "rooms", "collisions cost nothing", "| no tour, collisions cost nothing | 100 % | 92.5"),
@@ -23,6 +23,13 @@ ROWS = [
     (THIRD, "flats", "generalist", "| flats, no tour | 86.2"),
     (THIRD, "flats-tour", "generalist", "| flats, after a tour of 500 steps | 97.7"),
     (THIRD, "real", "generalist", "| real plans, no tour |"),
+    (FOURTH, "rooms", "generalist", "| rooms, no tour | 100 % (99.8-100) | 92.8"),
+    (FOURTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing |"),
+    (FOURTH, "flats", "generalist", "| flats, no tour, now |"),
+    (FOURTH, "validation-rooms", "generalist", "| validation rooms, no tour |"),
+    (FOURTH, "validation-rooms-perturbed", "generalist", "| validation rooms, everything perturbed, no tour |"),
+    (FOURTH, "validation-rooms-perturbed-tour", "generalist", "| validation rooms, everything perturbed, after"),
+    (FOURTH, "validation-flats", "generalist", "| validation flats, no tour |"),
     (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
 ]
 

@@ -36,8 +36,9 @@ def test_a_container_file_copies_what_there_is_and_what_the_package_needs(path) 
     assert {"pyproject.toml", "src", project["project"]["readme"], "LICENSE", *included} <= set(copied)
     taken = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
     assert set(copied) <= taken
-    extras = re.findall(r'"\.\[(\w+)\]"', path.read_text())
-    assert extras and set(extras) <= set(project["project"]["optional-dependencies"])
+    extras = re.findall(r'"\.\[(\w+)\]"|locked/(?:torch-cpu|(\w+))\.txt', path.read_text())
+    extras = {name for pair in extras for name in pair if name}
+    assert extras and extras <= set(project["project"]["optional-dependencies"])
     users = [rest for name, rest in instructions(path) if name == "USER"]
     assert users == ["clearway"]
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -87,6 +88,43 @@ def probability_of_less(
     rows, columns = (_redrawn(len(runs), resamples, seed) for seed, runs in enumerate((first, second)))
     drawn = pairs[rows[:, :, None], columns[:, None, :]].mean((1, 2))
     return Estimate(float(pairs.mean()), _interval(drawn, min(len(first), len(second))))
+
+
+def permutation_p(first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, allowed: float = 0.0) -> float:
+    """How often chance alone tells two kinds of runs apart as much as they are, two-sided.
+
+    Over all ways to divide the runs anew, or 20,000 drawn ones where there are more, by Welch's statistic, which does
+    not ask for equal spread (Janssen, Statistics & Probability Letters 36(1), 1997). Of 5 and 5 runs it is 0.8 % at
+    least, of 4 and 4 2.9 %.
+
+    Args:
+        first: (R, M).
+        second: (R', M).
+        target_scene: (M,) int.
+        allowed: by which the first may exceed the second and still count as equal.
+    """
+    weights, count = _weights(target_scene), len(first)
+    runs = np.concatenate([first @ weights - allowed, second @ weights])
+    if math.comb(len(runs), count) <= RESAMPLES:
+        chosen = np.array(list(combinations(range(len(runs)), count)))
+    else:
+        rng = np.random.default_rng(0)
+        chosen = np.stack([np.arange(count), *(rng.permutation(len(runs))[:count] for _ in range(RESAMPLES))])
+    one = np.zeros((len(chosen), len(runs)), bool)
+    np.put_along_axis(one, chosen, True, axis=1)
+    statistic = _welch(runs, one)  # of the runs as they are, first
+    return float((np.abs(statistic) >= abs(statistic[0]) * (1 - 1e-9)).mean())
+
+
+def _welch(runs: np.ndarray, one: np.ndarray) -> np.ndarray:
+    """Welch's statistic of runs (R,) for each division (D, R) bool into one kind and the other."""
+    means, errors = [], np.zeros(len(one))
+    for kind in (one, ~one):
+        count = kind.sum(axis=1)
+        means.append((kind @ runs) / count)
+        spread = (kind * (runs - means[-1][:, None]) ** 2).sum(axis=1)
+        errors += spread / (count * np.maximum(count - 1, 1))
+    return (means[0] - means[1]) / np.sqrt(np.maximum(errors, np.finfo(float).tiny))
 
 
 def failed_targets(success: np.ndarray) -> str:

@@ -61,7 +61,7 @@ def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = 
         where: behind each claim, for example " on hard targets".
     """
     mark = mark_steps(setting, groups[0].trial.targets)
-    found = {(group.learner, group.agent): _frames(setting.out, group, mark) for group in groups}
+    found = {(group.learner, group.agent): frames_until_settled(setting.out, group, mark) for group in groups}
     rows: list[tuple[Value, ...]] = []
     for (learner, agent), (frames, settled) in found.items():
         estimate = mean_estimate(frames, ONE_TARGET) if len(frames) else None
@@ -81,7 +81,7 @@ def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = 
     return ReportTable(f"{name}_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
 
 
-def _frames(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
+def frames_until_settled(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
     """Frames until each complete run of a group whose metrics are there had settled (R, 1), and how many have."""
     frames, settled = [], 0
     for run in group.runs:

@@ -13,6 +13,7 @@ from clearway.errors import RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.correction import corrected
 from clearway.experiments.job import is_done
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
@@ -173,7 +174,7 @@ def _question(request: ReproduceRequest) -> str:
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
-        sections = [EXPERIMENTS[name].section(setting) for name in request.names]
+        sections = [corrected(EXPERIMENTS[name].section(setting)) for name in request.names]
     return Reproduction(tuple(request.commands), setting, planned(setting, request.names), sections)
 
 

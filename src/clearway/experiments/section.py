@@ -108,6 +108,7 @@ class Claim:
         verdict, evidence: for people.
         numbers: the evidence by name, for programs.
         further: the paper does not ask this.
+        p: that chance alone tells the two kinds apart as much; None where too few runs decide nothing.
     """
 
     text: str
@@ -115,6 +116,7 @@ class Claim:
     evidence: str
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     further: bool = False
+    p: float | None = None
 
 
 @dataclass(frozen=True)

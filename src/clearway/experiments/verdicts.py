@@ -6,7 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.evaluation.across_seeds import Estimate, difference, failed_targets, mean_estimate, probability_of_less
+from clearway.evaluation.across_seeds import (
+    Estimate,
+    difference,
+    failed_targets,
+    mean_estimate,
+    permutation_p,
+    probability_of_less,
+)
 from clearway.experiments.section import Claim, Verdict
 
 SAME = 0.02  # means within this share of each other count as equal
@@ -90,7 +97,8 @@ def _judged(
     )
     if min(len(first), len(second)) < LEAST_RUNS:
         return Claim(text, "undecided", f"{evidence} Fewer than {LEAST_RUNS} seeds decide nothing.", numbers)
-    return Claim(text, _side(-found if more else found, allowed), evidence, numbers)
+    p = permutation_p(first, second, target_scene, allowed)
+    return Claim(text, _side(-found if more else found, allowed), evidence, numbers, p=p)
 
 
 def _side(found: Estimate, allowed: float) -> Verdict:

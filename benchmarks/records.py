@@ -1,0 +1,79 @@
+"""Keep what a reproduction was made of in one small file, and make its folder of it again.
+
+    python benchmarks/records.py pack reproduction docs/records/memory.tar.xz
+    python benchmarks/records.py unpack docs/records/memory.tar.xz again && clearway report again
+
+Kept are settings, metrics and every episode of every run, and the scenes but for their pictures; not the weights.
+Of unpacked records a report is made as of the folder itself; nothing is trained.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import sys
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from clearway.experiments.job import RUNS, TRIALS
+from clearway.experiments.setting import SCENES
+from clearway.scenes.thor_v1 import read_scene, write_scene
+
+OF_A_RUN = ("run.json", "metrics.jsonl", f"{TRIALS}/*.json")
+
+
+def pack(folder: Path, record: Path) -> None:
+    """Write the record of a reproduction's folder, the same bytes whenever it is the same."""
+    record.parent.mkdir(parents=True, exist_ok=True)
+    part = record.with_name(f"{record.name}.part")
+    with tarfile.open(part, "w:xz", preset=9) as archive:
+        for path in sorted(_kept(folder)):
+            name = path.relative_to(folder).as_posix()
+            _add(archive, name, _without_pictures(path) if path.suffix == ".h5" else path.read_bytes())
+    part.rename(record)
+
+
+def unpack(record: Path, folder: Path) -> None:
+    """Make the folder of a record, which must not be there yet."""
+    folder.mkdir(parents=True)
+    with tarfile.open(record, "r:xz") as archive:
+        archive.extractall(folder, filter="data")
+
+
+def _kept(folder: Path) -> Iterator[Path]:
+    yield from folder.glob("*.json")
+    yield from (folder / SCENES).rglob("*.h5")
+    for pattern in OF_A_RUN:
+        yield from (folder / RUNS).glob(f"*/{pattern}")
+
+
+def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
+    entry = tarfile.TarInfo(name)
+    entry.size = len(content)
+    archive.addfile(entry, io.BytesIO(content))
+
+
+def _without_pictures(path: Path) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        bare = Path(folder) / path.name
+        write_scene(replace(read_scene(path), observations=None, further=(), top_view=None), bare)
+        return bare.read_bytes()
+
+
+def main() -> None:
+    """Pack or unpack."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("pack", "unpack"))
+    parser.add_argument("source", type=Path)
+    parser.add_argument("made", type=Path)
+    args = parser.parse_args()
+    if args.what == "unpack" and args.made.exists():
+        sys.exit(f"error: {args.made}: is there already. Name a new folder")
+    (pack if args.what == "pack" else unpack)(args.source, args.made)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+"""Verdicts corrected for the number of claims that a learner's table makes (Holm, Scand. J. Statistics 6(2), 1979).
+
+Of twenty claims that say nothing one is told by chance at 5 %. Holm's rule holds that chance at 5 % for all claims of
+a section about one learner together: of m claims the i-th smallest p, times m + 1 - i, is to be 5 % at most, and so
+are all before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from clearway.experiments.section import Claim, Section
+
+LEVEL = 0.05
+
+
+def corrected(section: Section) -> Section:
+    """The section; what was decided by a claim's own interval alone is undecided, and its evidence says so."""
+    claims = list(section.claims)
+    families: dict[str, list[int]] = {}
+    for number, claim in enumerate(claims):
+        if claim.p is not None:
+            families.setdefault(claim.text.partition(":")[0], []).append(number)
+    for numbers in families.values():
+        for number, p in zip(numbers, holm([claims[number].p or 0.0 for number in numbers]), strict=True):
+            claims[number] = _judged_again(claims[number], p, len(numbers))
+    return replace(section, claims=tuple(claims))
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Corrected p of each claim, 1 at most."""
+    found, largest = [0.0] * len(p), 0.0
+    for rank, number in enumerate(sorted(range(len(p)), key=p.__getitem__)):
+        largest = max(largest, min(1.0, (len(p) - rank) * p[number]))
+        found[number] = largest
+    return found
+
+
+def _judged_again(claim: Claim, p: float, claims: int) -> Claim:
+    told = f"{claim.evidence} Permutation test: p = {claim.p:.2g}, for {claims} claims {p:.2g} (Holm)."
+    if claim.verdict == "undecided" or p <= LEVEL:
+        return replace(claim, evidence=told)
+    return replace(claim, verdict="undecided", evidence=f"{told} By itself: {claim.verdict}.")
