@@ -16,6 +16,12 @@ def reason_of(fault: BaseException) -> str:
     return " ".join(str(told).split())[:200] or type(fault).__name__
 
 
+def is_out_of_memory(fault: BaseException) -> bool:
+    """Whether an allocation failed: PyTorch, and what is written in C++, say so by their words alone."""
+    told = str(fault).lower()
+    return isinstance(fault, MemoryError) or any(words in told for words in ("allocate memory", "out of memory"))
+
+
 class ClearwayError(Exception):
     """Bad input or a missing requirement. The message says what, where and the remedy, in one line.
 
