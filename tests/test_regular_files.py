@@ -139,8 +139,8 @@ BESIDE = {
     ("hdf5.py", "h5py.is_hdf5(path)"): "after `check_regular`: the library wants names",
     ("hdf5.py", "h5py.File(path, 'r')"): "after `check_regular`: the library wants names",
     ("pretrained.py", "AutoModel.from_pretrained"): "after all of its files were read through the door, for their hash",
-    ("app.py", "service.open(opening.selection, opening.seed)"): "a session",
-    ("service.py", "self.sessions.open(selection, seed)"): "a session",
+    ("app.py", "service.open"): "a session",
+    ("service.py", "self.sessions.open"): "a session",
 }
 """Calls that may open a file beside the door, and why they may."""
 
