@@ -63,7 +63,7 @@ def _named_in(path: Path) -> tuple[set[str], set[str]]:
         if file.peek(4)[:4].removeprefix(BOM).lstrip()[:1] not in (b"<", b""):  # a mesh or a picture
             return set(), set()
         content = read_at_most(file, MAX_TEXT_BYTES, path)
-    folders, files = set[str](), set[str]()
+    folders, files = set(), set()
     for name, quoted in _ATTRIBUTE.findall(content.decode("utf-8", "surrogateescape")):
         (folders if name.endswith("dir") else files).add(unescape(quoted[1:-1]))
     return folders, files
