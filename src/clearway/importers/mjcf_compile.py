@@ -18,9 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clearway.children import limit
-from clearway.errors import SceneError, reason_of
-from clearway.importers.mjcf_files import REMEDY as OUTSIDE_REMEDY
-from clearway.importers.mjcf_files import UnsafeModelError, check_files
+from clearway.errors import SceneError
 
 if TYPE_CHECKING:
     import mujoco
@@ -34,30 +32,24 @@ COMMAND = (
     "import sys; sys.path[:] = {path!r}; from clearway.children import end_with_parent; end_with_parent({parent}); "
     "from clearway.importers.mjcf_compile import main; main()"
 )
-REFUSED, UNSAFE = 3, 4
+REFUSED = 3
 MESSAGE_LENGTH = 300
 REMEDY = "Correct the model; the files that it names must lie where it says"
 
 
-def compiled(path: Path, agent: AgentShape, *, trust: bool = False) -> mujoco.MjModel:
+def compiled(path: Path, agent: AgentShape) -> mujoco.MjModel:
     """The model in an MJCF file, with the agent's body in it (see `obstacles.add_body`).
 
-    Args:
-        path: the file.
-        agent: the body.
-        trust: the model may name files outside its folder.
-
     Raises:
-        SceneError: there is no such file, it or a file that it names is none to be read, MuJoCo refuses it, or it takes
-            more than the limits of memory and time.
+        SceneError: there is no such file, MuJoCo refuses it, or it takes more than the limits of memory and time.
     """
     from clearway.rooms.render_worker import model_of_binary
 
-    if not path.exists():
+    if not path.is_file():
         raise SceneError(path, "there is no such file", "Check the path")
     search = [folder or os.getcwd() for folder in sys.path]
     limits = {"memory_bytes": MEMORY_LIMIT_BYTES, "seconds": TIME_LIMIT_S}
-    job = json.dumps({"path": str(path.resolve()), "agent": asdict(agent), "trust": trust, "limits": limits})
+    job = json.dumps({"path": str(path.resolve()), "agent": asdict(agent), "limits": limits})
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo leaves a log of warnings where it runs
         try:
             done = subprocess.run(
@@ -70,8 +62,6 @@ def compiled(path: Path, agent: AgentShape, *, trust: bool = False) -> mujoco.Mj
             )
         except subprocess.TimeoutExpired as fault:
             raise SceneError(path, f"MuJoCo took more than {TIME_LIMIT_S} s to compile it", "Simplify it") from fault
-    if done.returncode == UNSAFE:
-        raise SceneError(path, " ".join(done.stderr.decode(errors="replace").split())[:MESSAGE_LENGTH], OUTSIDE_REMEDY)
     if done.returncode != 0:
         raise SceneError(path, _failure(done.returncode, done.stderr), REMEDY)
     return model_of_binary(done.stdout)
@@ -93,7 +83,6 @@ def main() -> None:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what MuJoCo prints must not mix with the model
         job = json.loads(sys.argv[1])
         limit(**job["limits"])
-        _check_files(Path(job["path"]), job["trust"])
         import mujoco
 
         from clearway.rooms.obstacles import AgentShape, add_body
@@ -112,18 +101,6 @@ def main() -> None:
             print(f"{error}" or type(error).__name__, file=sys.stderr, flush=True)
             sys.exit(REFUSED)
         output.write(binary_model(model))
-
-
-def _check_files(path: Path, trust: bool) -> None:
-    """End the process where the model names what it may not."""
-    try:
-        check_files(path, trust=trust)
-    except UnsafeModelError as fault:
-        print(fault, file=sys.stderr, flush=True)
-        sys.exit(UNSAFE)
-    except OSError as fault:
-        print(f"{fault.filename}: {reason_of(fault)}", file=sys.stderr, flush=True)
-        sys.exit(REFUSED)
 
 
 if __name__ == "__main__":

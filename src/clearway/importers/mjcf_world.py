@@ -45,7 +45,6 @@ class ModelWorld:
         grid: where it fits there.
         top_m: height of the highest finite thing, or of the floor where that is higher.
         digest: hash of the compiled model, the same with the same version of MuJoCo.
-        trust: it may name files outside its folder.
     """
 
     path: Path
@@ -57,7 +56,6 @@ class ModelWorld:
     grid: NavigationGrid
     top_m: float
     digest: str
-    trust: bool = False
 
     def carries(self, points_m: np.ndarray) -> np.ndarray:
         """Whether there is a floor at each of (N, 2) points, (N,) bool."""
@@ -74,21 +72,17 @@ class ModelWorld:
                 "digest": self.digest,
                 "world": asdict(self.choice),
                 "agent": asdict(self.agent),
-                **({"trust": True} if self.trust else {}),
             },
         )
 
 
-def open_world(
-    path: Path, choice: FloorChoice | None = None, agent: AgentShape | None = None, *, trust: bool = False
-) -> ModelWorld:
+def open_world(path: Path, choice: FloorChoice | None = None, agent: AgentShape | None = None) -> ModelWorld:
     """The world of an MJCF or URDF file.
 
     Args:
         path: the file; meshes, textures and included files lie where it says.
         choice: what the file does not say.
         agent: the agent's body and step.
-        trust: the model may name files outside its folder.
 
     Raises:
         SceneError: MuJoCo refuses the model, the world is too large, or the agent fits nowhere.
@@ -97,14 +91,14 @@ def open_world(
     if agent.height_m <= 2 * agent.radius_m:
         problem = f"an agent {agent.height_m:g} m high and {2 * agent.radius_m:g} m wide is no standing capsule"
         raise SceneError(path, problem, "Make it higher or thinner")
-    model = compiled(path, agent, trust=trust)
+    model = compiled(path, agent)
     digest = _digest(model)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     floor = floor_of(path, model, data, choice, agent.step_m)
     grid = find_cells(path, model, data, floor, choice, agent)
     top_m = _set_lens(model, data, floor, choice.floor_m)
-    return ModelWorld(path, model, data, choice, agent, floor, grid, top_m, digest, trust)
+    return ModelWorld(path, model, data, choice, agent, floor, grid, top_m, digest)
 
 
 def world_of(scene: Scene) -> ModelWorld:
@@ -120,7 +114,7 @@ def world_of(scene: Scene) -> ModelWorld:
     choice, agent = _recorded(scene, FloorChoice, "world"), _recorded(scene, AgentShape, "agent")
     if not Path(path).is_file():
         raise SceneError(scene.name, f"its MuJoCo model {path} is missing", f"Put it back there, or {_lower(REIMPORT)}")
-    world = open_world(Path(path), choice, agent, trust=notes.get("trust") is True)
+    world = open_world(Path(path), choice, agent)
     same = scene.made_by.versions.get("mujoco") != mujoco.__version__ or world.digest == digest
     if not same or not _same_grid(world.grid, scene):
         raise SceneError(scene.name, f"its MuJoCo model {path} has changed since it was imported", REIMPORT)

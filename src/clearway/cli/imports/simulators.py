@@ -84,8 +84,6 @@ class ImportMjcf:
     """Of the pictures, pixels."""
     sensors: tuple[SensorName, ...] = ("rgb",)
     """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
-    trust: bool = False
-    """Let the model name files outside its folder; without it, such a model is refused."""
     encoding: Encoding = field(default_factory=Encoding)
 
     def run(self) -> None:
@@ -115,7 +113,6 @@ class ImportMjcf:
                 workers=workers,
                 ray=ray,
                 progress=True,
-                trust=self.trust,
             )
             encode_and_write([scene], self.out, self.encoding)
 
