@@ -21,6 +21,7 @@ ORDER = (
         "regular_files",
         "children",
         "ray_cluster",
+        "remote",
         "settings_file",
         "spelling",
         "spread",
