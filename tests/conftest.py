@@ -4,6 +4,10 @@ from collections.abc import Iterator
 import pytest
 import torch
 
+from helpers.servers_of_files import object_store, s3  # fixtures of all tests
+
+__all__ = ["object_store", "s3"]
+
 
 @pytest.fixture(autouse=True, scope="session")
 def _one_thread() -> Iterator[None]:

@@ -20,6 +20,7 @@ ORDER = (
         "progress",
         "children",
         "ray_cluster",
+        "remote",
         "settings_file",
         "spelling",
         "spread",

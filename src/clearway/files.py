@@ -92,6 +92,18 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
+def part_folder(parent: Path) -> Iterator[Path]:
+    """A temporary folder in `parent`, gone afterwards; what processes that were killed left there is removed too."""
+    parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(parent)
+    part = Path(tempfile.mkdtemp(prefix=f".part.{_host()}-{os.getpid()}-", suffix=".part", dir=parent))
+    try:
+        yield part
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
 def _faults_named(part: Path, path: Path) -> Iterator[None]:
     """Let errors of writing `part`, which name it or nothing, name `path`."""
     try:

@@ -72,6 +72,7 @@ def test_what_does_not_fit_is_refused(trained, arguments, part) -> None:
 
 def test_load_agent_takes_text_and_refuses_the_rest(trained) -> None:
     assert clearway.load_agent(str(trained.folder)).frames == 800
+    assert repr(trained.agent) == f"<TrainedNetwork: ppo, 800 frames in {trained.scenes[0].name}>"
     with pytest.raises(clearway.ClearwayError, match="no run here"):
         clearway.load_agent("nowhere")
     with pytest.raises(ArgumentError, match="run=None: expected a path"):

@@ -64,19 +64,19 @@ def test_build_room_renders_encodes_and_writes(tmp_path, monkeypatch) -> None:
 
     def stand_in(name, seed, *, sensors, workers, progress):
         calls.append((name, seed, sensors, workers, progress))
-        return with_depth(grid_scene(seed, name=name, picture_size=(32, 32)))
+        return with_depth(grid_scene(seed, name=name, picture_size=(30, 40)))
 
     monkeypatch.setattr(library, "cached_room_scene", stand_in)
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     out = tmp_path / "rooms/bathroom.h5"
-    scene = clearway.build_room("bathroom", np.int64(2), encoder="random-resnet50", out=str(out))
+    scene = clearway.build_room("bathroom", np.int64(2), out=str(out))
     assert calls == [("bathroom", 2, ("rgb",), None, False)]
-    assert scene.encoder_name == "random-resnet50"
+    assert scene.encoder_name == "clearway"
     assert np.array_equal(clearway.load_scene(out).features, scene.features)
     seen = clearway.build_room("bathroom", sensors=["rgb", "depth"], encoder="depth-grid")
     assert calls[1:] == [("bathroom", 0, ("rgb", "depth"), None, False)]
     assert seen.features.shape == (seen.state_count, 108)
-    assert seen.seen_by("depth")[:].shape == (seen.state_count, 32, 32)
+    assert seen.seen_by("depth")[:].shape == (seen.state_count, 30, 40)
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,12 @@ def plans(tmp_path: Path) -> Path:
 def test_a_plan_becomes_a_furnished_room(clearway, tmp_path, monkeypatch):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     (tmp_path / "nook.txt").write_text(".#\n..\n")
-    words = ("--cell-size", 0.5, "--encoder", "random-resnet50", "--sensors", "rgb", "depth")
+    words = ("--cell-size", 0.5, "--sensors", "rgb", "depth")
     answer = clearway("scenes", "import", "floor-plan", tmp_path / "nook.txt", *words, "--out", tmp_path / "scenes")
     assert answer.code == 0, answer
     assert "nook.h5: 12 states, 3 cells" in answer.err
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "nook.h5", "--json").json
-    assert (found["states"], found["encoder"], found["source"]) == (12, "random-resnet50", "floor_plan")
+    assert (found["states"], found["encoder"], found["source"]) == (12, "clearway", "floor_plan")
     assert found["picture_size"] == [300, 400]
     assert found["sensors"][1] == "depth (300 x 400 float32, 0 to 20 m)"
     assert found["closest_cosine_distance"] > 0.001

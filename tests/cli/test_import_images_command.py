@@ -18,17 +18,16 @@ def photographed(folder: Path) -> Path:
 
 def test_photographs_become_a_scene_that_can_be_inspected(clearway, tmp_path: Path, monkeypatch) -> None:
     table = photographed(tmp_path)
-    words = ("scenes", "import", "images", table, "--out", tmp_path / "scenes", "--height", 30)
-    answer = clearway(*words, "--encoder", "random-resnet50")
+    answer = clearway("scenes", "import", "images", table, "--out", tmp_path / "scenes", "--height", 30)
     assert answer.code == 0, answer
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "office.h5", "--json").json
     assert (found["states"], found["cells"], found["headings"]) == (8, 2, 4)
-    assert found["encoder"] == "random-resnet50"
+    assert found["encoder"] == "clearway"
     assert found["source"] == "images"
 
 
 def test_tables_of_one_name_become_scenes_of_their_folders(clearway, tmp_path: Path) -> None:
-    words = ("--out", tmp_path / "scenes", "--height", 30, "--encoder", "random-resnet50")
+    words = ("--out", tmp_path / "scenes", "--height", 30)
     answers = []
     for place in ("office", "lab", "lab"):
         (tmp_path / place).mkdir(exist_ok=True)

@@ -127,6 +127,7 @@ def test_every_command_has_help_with_an_example_that_can_be_read(clearway, monke
     for words, text in found.items():
         (example,) = re.findall(r"^Example: clearway (.+)$", text.split("╭")[0], re.MULTILINE)
         assert example.startswith(words)
+        assert not re.search(r"(?<![=\d])\d{1,3},\d{3}\b", text), "a narrow terminal breaks the line after a comma"
         assert clearway(*shlex.split(example)).code == 0, example
     assert {type(command) for command in run} == set(KINDS)
     assert len(KINDS) == len(COMMANDS)

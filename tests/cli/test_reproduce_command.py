@@ -1,7 +1,10 @@
 import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -19,24 +22,53 @@ from helpers.small_runs import small_learner
 from helpers.small_setting import BUDGET, small_rooms
 
 
+@contextmanager
+def small_experiments() -> Iterator[None]:
+    """Budget and learners are small."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(BUDGETS, "smoke", BUDGET)
+        patch.setattr(setting, "_budgeted", lambda name, budget: small_learner(setting.LEARNERS[name]))
+        yield
+
+
 @pytest.fixture
-def dumps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of two small scenes; budget and learners are small too."""
-    monkeypatch.setitem(BUDGETS, "smoke", BUDGET)
-    monkeypatch.setattr(setting, "_budgeted", lambda name, budget: small_learner(setting.LEARNERS[name]))
-    folder = tmp_path / "dumps"
+def small() -> Iterator[None]:
+    with small_experiments():
+        yield
+
+
+def write_rooms(folder: Path) -> Path:
     folder.mkdir()
     for scene in small_rooms():
         write_scene(scene, folder / f"{scene.name}.h5")
     return folder
 
 
-def test_an_experiment_from_dumps_to_report(clearway, dumps: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    words = ("reproduce", "fig5", "--scenes", dumps, "--out", out, "--seeds", 1, "--learners", "default", "--json")
-    answer = clearway(*words)
-    assert answer.code == 0, answer
-    content = answer.json
+@pytest.fixture
+def dumps(small, tmp_path: Path) -> Path:
+    """A folder of two small scenes."""
+    return write_rooms(tmp_path / "dumps")
+
+
+@pytest.fixture(scope="module")
+def first(clearway, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
+    """fig5, reproduced once: its words, its answer and the folder that it left."""
+    folder = tmp_path_factory.mktemp("reproduced")
+    words = ("--scenes", write_rooms(folder / "dumps"), "--seeds", 1, "--json")
+    with small_experiments():
+        answer = clearway("reproduce", "fig5", *words, "--learners", "default", "--out", folder / "out")
+    return SimpleNamespace(words=words, answer=answer, out=folder / "out")
+
+
+@pytest.fixture
+def out(small, first, tmp_path: Path) -> Path:
+    """A copy of what fig5 left."""
+    return shutil.copytree(first.out, tmp_path / "out")
+
+
+def test_an_experiment_from_dumps_to_report(clearway, first, out: Path) -> None:
+    assert first.answer.code == 0, first.answer
+    content = first.answer.json
     assert content == json.loads((out / "report.json").read_text())
     (section,) = content["sections"]
     assert section["name"] == "fig5" and not section["missing"]
@@ -44,51 +76,41 @@ def test_an_experiment_from_dumps_to_report(clearway, dumps: Path, tmp_path: Pat
     assert content["facts"]["scenes"].startswith("bathroom (")
     assert "kitchen" not in content["facts"]["scenes"]  # smoke takes one scene
     assert (out / "report.html").exists()
-    runs = sorted(path.name for path in (out / "runs").iterdir())
-    assert len(runs) == 2  # two rewards, one seed
-    assert clearway(*words).json["sections"] == content["sections"]
-    assert sorted(path.name for path in (out / "runs").iterdir()) == runs
+    runs = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.safetensors")}
+    assert len(list((out / "runs").iterdir())) == 2  # two rewards, one seed
+    again = clearway("reproduce", "fig5", *first.words, "--learners", "default", "--out", out)
+    assert again.json["sections"] == content["sections"]
+    assert {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.safetensors")} == runs
 
 
-def test_a_report_from_what_is_complete(clearway, dumps: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert clearway("reproduce", "fig5", "--scenes", dumps, "--out", out, "--learners", "default").code == 0
-    whole = json.loads((out / "report.json").read_text())["sections"]
-    first, *_ = sorted((out / "runs").iterdir())
-    shutil.rmtree(first)
+def test_a_report_from_what_is_complete(clearway, first, out: Path) -> None:
+    gone, _ = sorted((out / "runs").iterdir())
+    shutil.rmtree(gone)
     (section,) = clearway("report", out, "--json").json["sections"]
-    assert section["missing"] == [first.name]
-    assert (
-        "reproduce fig5" in json.loads((out / "report.json").read_text())["facts"]["commands"]
-    )  # not the report's own
-    assert not first.exists()  # nothing was trained
-    assert clearway("reproduce", "fig5", "--scenes", dumps, "--out", out, "--learners", "default").code == 0
-    assert json.loads((out / "report.json").read_text())["sections"] == whole
+    assert section["missing"] == [gone.name]
+    commands = json.loads((out / "report.json").read_text())["facts"]["commands"]
+    assert "reproduce fig5" in commands  # not the report's own
+    assert not gone.exists()  # nothing was trained
+    whole = clearway("reproduce", "fig5", *first.words, "--learners", "default", "--out", out)
+    assert whole.json["sections"] == first.answer.json["sections"]
 
 
-def test_a_second_experiment_joins_the_report(clearway, dumps: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    words = ("--scenes", dumps, "--out", out, "--learners", "default", "--json")
-
+def test_a_second_experiment_joins_the_report(clearway, first, out: Path) -> None:
     def names(answer) -> list[str]:
         return [section["name"] for section in answer.json["sections"]]
 
-    assert names(clearway("reproduce", "fig5", *words)) == ["fig5"]
-    both = clearway("reproduce", "fig3", *words)
+    both = clearway("reproduce", "fig3", *first.words, "--learners", "default", "--out", out)
     assert names(both) == ["fig3", "fig5"]
     assert "reproduce fig5" in both.json["facts"]["commands"] and "reproduce fig3" in both.json["facts"]["commands"]
     assert names(clearway("report", out, "--json")) == ["fig3", "fig5"]
-    alone = clearway("reproduce", "fig4", *words, "--seeds", 1)  # another question: a report of its own
-    assert names(alone) == ["fig4"]
+    alone = clearway("reproduce", "fig4", *first.words, "--learners", "paper", "--out", out)
+    assert names(alone) == ["fig4"]  # another question: a report of its own
     assert not (out / "tables" / "fig5.csv").exists()
 
 
-def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, dumps: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    words = ("reproduce", "fig3", "--scenes", dumps, "--out", out, "--learners", "default", "--seeds", 1, "--json")
-    assert "(2 runs)" in clearway(*words).json["facts"]["hardware"]
-    first, second = sorted((out / "runs").iterdir())
-    for folder, threads in ((first, 7), (second, 8)):
+def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, first, out: Path) -> None:
+    assert "(2 runs)" in first.answer.json["facts"]["hardware"]
+    for folder, threads in zip(sorted((out / "runs").iterdir()), (7, 8), strict=True):
         record = json.loads((folder / "run.json").read_text())
         record["hardware"]["threads"] = threads
         (folder / "run.json").write_text(json.dumps(record))

@@ -11,6 +11,7 @@ from dataclasses import replace
 import pytest
 
 from clearway.serve.client import Client
+from clearway.serve.tokens import Tokens
 from helpers.sums import Sums, plain
 
 
@@ -52,11 +53,11 @@ def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
 
 
 @pytest.fixture
-def served(monkeypatch) -> list[str]:
+def served(monkeypatch) -> list[Tokens]:
     """Tokens of the services that would have run."""
-    tokens: list[str] = []
+    tokens: list[Tokens] = []
     monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Sums())
-    monkeypatch.setattr("clearway.serve.run.run_service", lambda agent, listener, token, limits: tokens.append(token))
+    monkeypatch.setattr("clearway.serve.run.run_service", lambda agent, listener, given, limits: tokens.append(given))
     return tokens
 
 
@@ -65,8 +66,29 @@ def test_a_random_token_is_said_also_where_the_variable_is_empty(clearway, monke
         monkeypatch.setenv("CLEARWAY_TOKEN", own)
         answer = clearway("serve", "x.onnx")
         assert answer.code == 0
-        assert (f"token: {served[-1]}" in answer.err) == (own == "")
-    assert served[1] == "a-token-of-one-s-own"
+        said = re.search(r"token: (\S+)", answer.err)
+        assert (said is not None) == (own == "")
+        assert served[-1].owner_of(said[1] if said else own) == "default"
+
+
+def test_tokens_of_a_file_are_not_said(clearway, served, tmp_path):
+    (tmp_path / "tokens").write_text("robot " + "r" * 20)
+    (tmp_path / "tokens").chmod(0o600)
+    answer = clearway("serve", "x.onnx", "--tokens", tmp_path / "tokens")
+    assert answer.code == 0 and "token" not in answer.err
+    assert served[-1].owner_of("r" * 20) == "robot"
+    assert clearway("serve", "x.onnx", "--tokens", tmp_path).refusal("cannot be read")
+
+
+def test_before_others_it_needs_a_token_of_one_s_own_and_warns_without_tls(clearway, monkeypatch, served):
+    monkeypatch.delenv("CLEARWAY_TOKEN", raising=False)
+    assert clearway("serve", "x.onnx", "--host", "0.0.0.0").refusal("--host 0.0.0.0", "Set CLEARWAY_TOKEN")
+    assert not served
+    monkeypatch.setenv("CLEARWAY_TOKEN", "a-token-of-one-s-own")
+    assert "WARNING: NOT ENCRYPTED" in clearway("serve", "x.onnx", "--host", "0.0.0.0").err
+    assert "WARNING" not in clearway("serve", "x.onnx").err
+    assert clearway("serve", "x.onnx", "--tls-cert", "x.pem").refusal("go together")
+    assert "without a token: port" in clearway("serve", "x.onnx", "--health-port", "0").err
 
 
 def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, served):

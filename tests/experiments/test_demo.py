@@ -17,6 +17,7 @@ from PIL import Image
 from clearway.cli.main import main
 from clearway.errors import ClearwayError
 from clearway.experiments.demo import DemoRequest, run_demo
+from clearway.learn.checkpoint import checkpoints
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import read_scene
 from helpers.small_demo import shrink_demo
@@ -79,8 +80,10 @@ def check_demo(out: Path) -> None:
     assert len(ideal["targets"]) == 5
     scene = read_scene(out / "bathroom.h5")
     for reward in ("collision-aware", "shortest"):
-        record = RunFolder(out / "runs" / reward).read_record()
+        run = RunFolder(out / "runs" / reward)
+        record = run.read_record()
         assert record.reward.name == reward
+        assert len(checkpoints(run.checkpoints)) == 1
         assert Path(record.scenes[0].path) == (out / "bathroom.h5").resolve()
         assert all(0 <= target < scene.state_count for target in record.targets["bathroom"])
 

@@ -9,9 +9,11 @@ import sys
 import numpy as np
 from PIL import Image
 
+from clearway.serve.tokens import Tokens
 from helpers.sums import plain
 
-TOKEN = "a-token-for-the-tests"
+OWNER, TOKEN = "robot", "a-token-for-the-tests"
+TOKENS = Tokens([(OWNER, TOKEN)])
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
 
 
@@ -25,3 +27,10 @@ def picture_bytes(picture: np.ndarray, kind: str = "PNG", **settings: object) ->
 def grey(level: int) -> bytes:
     """A PNG file of one grey level."""
     return picture_bytes(plain(level))
+
+
+def many_scans(picture: np.ndarray, more: int) -> bytes:
+    """A progressive JPEG whose last scan comes `more` times again; each goes over the whole picture."""
+    content = picture_bytes(picture, "JPEG", quality=75, progressive=True)
+    last = content[content.rindex(b"\xff\xda") : content.rindex(b"\xff\xd9")]
+    return content.removesuffix(b"\xff\xd9") + last * more + b"\xff\xd9"

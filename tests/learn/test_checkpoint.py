@@ -12,6 +12,7 @@ from clearway.learn import checkpoint
 from clearway.learn.checkpoint import (
     KEPT,
     Progress,
+    keep_newest_checkpoint,
     newest_checkpoint,
     read_network,
     read_progress,
@@ -58,6 +59,18 @@ def test_only_the_newest_few_stay(tmp_path: Path) -> None:
         written(tmp_path, frames)
     assert KEPT == 2
     assert names(tmp_path) == ["frames-000000001000", "frames-000000090000"]
+
+
+def test_of_several_the_newest_whole_one_can_be_kept_alone(tmp_path: Path) -> None:
+    older, damaged = written(tmp_path, 100), written(tmp_path, 200)
+    flip_a_byte(damaged / FILES[0])
+    with pytest.warns(UserWarning, match="SHA-256"):
+        keep_newest_checkpoint(tmp_path)
+    assert names(tmp_path) == [older.name]
+    flip_a_byte(older / FILES[0])
+    with pytest.warns(UserWarning), pytest.raises(RunError, match="every checkpoint is damaged"):
+        keep_newest_checkpoint(tmp_path)
+    assert names(tmp_path) == [older.name]
 
 
 def test_writing_again_at_the_same_frame_replaces(tmp_path: Path) -> None:

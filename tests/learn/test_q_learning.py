@@ -107,6 +107,7 @@ def test_a_table_knows_its_own_targets_and_scenes_alone(tmp_path: Path) -> None:
     agent = load_agent(tmp_path)
     scenes = small_scenes()
     some = make_world(scenes, {"corridor": (8,), "grid": (22, 5)})  # in another order
+    assert repr(agent) == "<TrainedTable: q-learning, 80 frames in corridor, grid>"
     whole = run_world(agent.record, scenes)
     state, ours = torch.tensor([[3], [1], [25]]), torch.tensor([0, 0, 1])
     theirs = torch.tensor([1, 1, 4])

@@ -11,13 +11,13 @@ from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.protection import protected
 from clearway.serve.service import Service
-from helpers.serving import TOKEN
+from helpers.serving import TOKEN, TOKENS
 from helpers.sums import Sums
 
 
 @pytest.fixture
 def service() -> Service:
-    return Service(Sums(), Limits(picture_pixels=10_000, body_bytes=100_000, sessions=20, deadline_s=5))
+    return Service(Sums(), Limits(picture_pixels=10_000, body_bytes=100_000, sessions=20, deadline_s=5), TOKENS)
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def called() -> Iterator[Callable[..., TestClient]]:
 
     def client(service: Service, token: str | None = TOKEN) -> TestClient:
         headers = {"authorization": f"Bearer {token}"} if token else {}
-        made = TestClient(protected(make_app(service), service, TOKEN), headers=headers)
+        made = TestClient(protected(make_app(service), service), headers=headers)
         made.__enter__()
         opened.append(made)
         return made

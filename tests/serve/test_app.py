@@ -13,7 +13,8 @@ from clearway.errors import DeployError
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
-from helpers.serving import TOKEN, grey, picture_bytes
+from clearway.serve.tokens import OWNER as OWNER_KEY
+from helpers.serving import OWNER, TOKEN, TOKENS, grey, picture_bytes
 from helpers.sums import CARD, Sums, plain
 
 PNG = {"content-type": "image/png"}
@@ -207,7 +208,7 @@ def test_a_session_without_a_target_and_methods_that_are_not_there(client) -> No
 
 def test_what_takes_too_long_is_given_up_and_leaves_the_session_as_it_was(called) -> None:
     model = Sums()
-    client = called(Service(model, Limits(deadline_s=0.5)))
+    client = called(Service(model, Limits(deadline_s=0.5), TOKENS))
     session = opened(client)
     client.put(f"{session}/target", content=grey(0), headers=PNG)
     assert stepped(client, session, 1).json()["value"] == 4
@@ -227,7 +228,7 @@ def test_a_failing_agent_says_nothing_of_itself(called, caplog) -> None:
         def reset(self, target, seed):
             raise RuntimeError("secret")
 
-    client = called(Service(Broken(), Limits()))
+    client = called(Service(Broken(), Limits(), TOKENS))
     answer = client.put(f"{opened(client)}/target", content=grey(0), headers=PNG)
     assert fault(answer) == "500 internal"
     assert "secret" not in answer.text
@@ -273,20 +274,27 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
 
     path = f"/sessions/{session_id}/stream"
     extensions = {"websocket.http.response": {}}
-    scope = {"type": "websocket", "path": path, "headers": [], "query_string": b"", "extensions": extensions}
+    scope = {
+        "type": "websocket",
+        "path": path,
+        "headers": [],
+        OWNER_KEY: OWNER,
+        "query_string": b"",
+        "extensions": extensions,
+    }
     await asyncio.wait_for(make_app(service)(scope, receive, send), PATIENT_S)
 
 
 def test_a_stream_that_nobody_uses_is_closed() -> None:
-    service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1)), []
-    asyncio.run(listening(service, service.sessions.open("sampled", None).id, sent))
+    service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1), TOKENS), []
+    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None, 1).id, sent))
     assert [message["type"] for message in sent] == ["websocket.accept", "websocket.close"]
     assert (sent[1]["code"], sent[1]["reason"]) == (1008, "unused for too long")
 
 
 def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
-    service = Service(Sums(), Limits(sessions=1))
-    session = service.sessions.open("sampled", None)
+    service = Service(Sums(), Limits(sessions=1), TOKENS)
+    session = service.sessions.open(OWNER, "sampled", None, 1)
 
     async def two() -> tuple[list[dict], list[dict]]:
         first, second = [], []
@@ -331,4 +339,4 @@ def test_an_agent_that_takes_features_is_not_served() -> None:
         card = clearway.deploy.card.Card(**{**vars(CARD), "takes_pictures": False})
 
     with pytest.raises(DeployError, match="without its encoder"):
-        Service(Features(), Limits())
+        Service(Features(), Limits(), TOKENS)

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.service import Answer, Service
+from clearway.serve.tokens import Tokens
 from helpers.agents import equal
-from helpers.serving import grey
+from helpers.serving import OWNER, TOKENS, grey
 from helpers.sums import Sums, plain
 
 BEGUN = Sums().reset({RGB: plain(1)[None]}, np.zeros(1, np.int64))
@@ -35,8 +37,8 @@ def test_everyone_gets_the_own_row_and_waits_for_no_fuller_batch() -> None:
 
     async def ask() -> list[float]:
         batcher = Batcher(agent, Limits(batch=8), lambda *told: watched.append(told))
-        steps = await asyncio.gather(*(batcher.act(plain(level), walking) for level in range(20)))
-        again = await asyncio.gather(*(batcher.act(plain(0), after) for _, after in steps))
+        steps = await asyncio.gather(*(batcher.act(OWNER, plain(level), walking) for level in range(20)))
+        again = await asyncio.gather(*(batcher.act(OWNER, plain(0), after) for _, after in steps))
         assert [value(step) for step in again] == [1000.0 + level for level in range(20)]  # each by its own memory
         return [value(step) for step in steps]
 
@@ -52,7 +54,7 @@ def test_pictures_of_different_sizes_share_no_batch_and_none_is_passed_over() ->
     async def ask() -> list[float]:
         batcher = Batcher(agent, Limits(), ignore)
         sizes = [(3, 4), (5, 6), (3, 4), (5, 6), (7, 7)]
-        steps = [batcher.act(plain(level, size), BEGUN) for level, size in enumerate(sizes)]
+        steps = [batcher.act(OWNER, plain(level, size), BEGUN) for level, size in enumerate(sizes)]
         return [value(step) for step in await asyncio.gather(*steps)]
 
     assert asyncio.run(ask()) == [1000.0 + 4 * level for level in range(5)]
@@ -64,8 +66,8 @@ def test_begins_and_steps_share_no_batch_and_each_begin_has_its_own_seed_and_tar
 
     async def ask() -> tuple[list[State], float]:
         batcher = Batcher(agent, Limits(), ignore)
-        begins = [batcher.reset(plain(level), np.array([seed])) for level, seed in ((1, 5), (2, 6), (2, 5))]
-        *states, step = await asyncio.gather(*begins, batcher.act(plain(3), BEGUN))
+        begins = [batcher.reset(OWNER, plain(level), np.array([seed])) for level, seed in ((1, 5), (2, 6), (2, 5))]
+        *states, step = await asyncio.gather(*begins, batcher.act(OWNER, plain(3), BEGUN))
         return states, value(step)
 
     states, stepped = asyncio.run(ask())
@@ -80,7 +82,7 @@ def test_an_answer_does_not_keep_its_batch() -> None:
 
     async def ask() -> list[tuple[Decisions, State]]:
         batcher = Batcher(Sums(), Limits(), ignore)
-        return await asyncio.gather(*(batcher.act(plain(level), BEGUN) for level in range(3)))
+        return await asyncio.gather(*(batcher.act(OWNER, plain(level), BEGUN) for level in range(3)))
 
     for decisions, state in asyncio.run(ask()):
         for array in (*state.values(), decisions.action, decisions.probabilities, decisions.value):
@@ -91,19 +93,21 @@ def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() ->
     """The second rests on the history that the first left."""
 
     async def run() -> list[Answer]:
-        service = Service(Sums(seconds=0.05), Limits())
-        session = service.sessions.open("argmax", None)
-        await service.set_target(session, grey(0))
-        return await asyncio.gather(*(service.step(session, grey(level)) for level in (1, 2)))
+        service = Service(Sums(seconds=0.05), Limits(), TOKENS)
+        session = service.sessions.open(OWNER, "argmax", None, 1000)
+        with closing(service.decoders):
+            await service.set_target(session, grey(0))
+            return await asyncio.gather(*(service.step(session, grey(level)) for level in (1, 2)))
 
     assert [(answer.step, answer.decision.value) for answer in asyncio.run(run())] == [(1, 4.0), (2, 5.0)]
 
 
 def test_a_step_sent_while_the_target_is_computed_waits_for_it() -> None:
     async def run() -> tuple[None, Answer]:
-        service = Service(Sums(seconds=0.05), Limits())
-        session = service.sessions.open("argmax", None)
-        return await asyncio.gather(service.set_target(session, grey(2)), service.step(session, grey(1)))
+        service = Service(Sums(seconds=0.05), Limits(), TOKENS)
+        session = service.sessions.open(OWNER, "argmax", None, 1000)
+        with closing(service.decoders):
+            return await asyncio.gather(service.set_target(session, grey(2)), service.step(session, grey(1)))
 
     _, answer = asyncio.run(run())
     assert (answer.step, answer.decision.value) == (1, 2004.0)
@@ -114,7 +118,7 @@ def test_a_picture_whose_asker_has_gone_is_not_computed() -> None:
 
     async def ask() -> None:
         batcher = Batcher(agent, Limits(batch=1), ignore)
-        first, *others = [asyncio.create_task(batcher.act(plain(1), BEGUN)) for _ in range(5)]
+        first, *others = [asyncio.create_task(batcher.act(OWNER, plain(1), BEGUN)) for _ in range(5)]
         await asyncio.sleep(0.01)
         for other in others[:3]:
             other.cancel()
@@ -141,7 +145,7 @@ def test_an_asker_who_goes_while_the_batch_is_computed_leaves_the_others_theirs(
 
     async def ask() -> list[object]:
         batcher = Batcher(agent, Limits(), ignore)
-        first, *others = [asyncio.create_task(batcher.act(plain(level), BEGUN)) for level in range(3)]
+        first, *others = [asyncio.create_task(batcher.act(OWNER, plain(level), BEGUN)) for level in range(3)]
         while not agent.batches:
             await asyncio.sleep(0.001)
         first.cancel()
@@ -160,7 +164,7 @@ def test_an_asker_who_goes_while_the_batch_is_computed_leaves_the_others_theirs(
 def test_too_many_that_wait_are_refused_at_once() -> None:
     async def ask() -> list[object]:
         batcher = Batcher(Sums(0.05), Limits(waiting=3, batch=2), ignore)
-        return await asyncio.gather(*(batcher.act(plain(1), BEGUN) for _ in range(5)), return_exceptions=True)
+        return await asyncio.gather(*(batcher.act(OWNER, plain(1), BEGUN) for _ in range(5)), return_exceptions=True)
 
     found = asyncio.run(ask())
     refused = [step for step in found if isinstance(step, Fault)]
@@ -178,15 +182,19 @@ def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
             return super().act(observation, state)
 
     async def begin(refused: bool) -> State | None:
-        service = Service(Waits(), Limits(waiting=1, batch=1))
-        session = service.sessions.open("sampled", 7)
+        service = Service(Waits(), Limits(waiting=1, batch=1), TOKENS)
+        with closing(service.decoders):
+            return await begun(service, refused)
+
+    async def begun(service: Service, refused: bool) -> State | None:
+        session = service.sessions.open(OWNER, "sampled", 7, 1000)
         if refused:
-            computed = asyncio.create_task(service.batcher.act(plain(1), BEGUN))
+            computed = asyncio.create_task(service.batcher.act(OWNER, plain(1), BEGUN))
             while not service.batcher.waiting:
                 await asyncio.sleep(0)
             while service.batcher.waiting:
                 await asyncio.sleep(0)
-            waits = asyncio.create_task(service.batcher.act(plain(1), BEGUN))
+            waits = asyncio.create_task(service.batcher.act(OWNER, plain(1), BEGUN))
             await asyncio.sleep(0)
             with pytest.raises(Fault, match="too many pictures"):
                 await service.set_target(session, grey(2))
@@ -209,7 +217,7 @@ def test_an_agent_that_fails_fails_its_batch_alone() -> None:
     async def ask() -> list[object]:
         batcher = Batcher(Moody(), Limits(batch=1), ignore)
         return await asyncio.gather(
-            *(batcher.act(plain(level), BEGUN) for level in (12, 13, 14)), return_exceptions=True
+            *(batcher.act(OWNER, plain(level), BEGUN) for level in (12, 13, 14)), return_exceptions=True
         )
 
     found = asyncio.run(ask())
@@ -217,3 +225,42 @@ def test_an_agent_that_fails_fails_its_batch_alone() -> None:
     assert [value(found[index]) for index in (0, 2)] == [1048.0, 1056.0]
     with pytest.raises(ZeroDivisionError):
         raise found[1]
+
+
+def test_the_pictures_of_one_owner_do_not_keep_another_s_waiting() -> None:
+    """A crowd of the first's is there before; the second's single picture goes with the next batch."""
+    agent, done = Sums(0.01), []
+
+    async def ask() -> None:
+        batcher = Batcher(agent, Limits(batch=2), ignore)
+
+        async def asked(owner: str) -> None:
+            await batcher.act(owner, plain(1), BEGUN)
+            done.append(owner)
+
+        crowd = [asyncio.create_task(asked("crowd")) for _ in range(12)]
+        await asyncio.sleep(0.015)
+        await asked("guest")
+        await asyncio.gather(*crowd)
+
+    asyncio.run(ask())
+    assert done.index("guest") <= 6 and len(done) == 13
+
+
+def test_an_owner_of_several_holds_a_part_of_the_places_and_of_the_sessions() -> None:
+    tokens = Tokens([("crowd", 20 * "c"), ("guest", 20 * "g")])
+    service = Service(Sums(0.05), Limits(waiting=4, sessions=4, batch=1), tokens)
+
+    async def ask() -> list[object]:
+        with closing(service.decoders):
+            sessions = [service.open(owner, "argmax", None) for owner in ("crowd", "crowd", "guest")]
+            with pytest.raises(Fault, match="2 sessions of this token"):
+                service.open("crowd", "argmax", None)
+            third = service.sessions.open("crowd", "argmax", None, 3)
+            begins = [service.set_target(session, grey(1)) for session in (*sessions[:2], third, sessions[2])]
+            return await asyncio.gather(*begins, return_exceptions=True)
+
+    first, second, refused, guest = asyncio.run(ask())
+    assert first is second is guest is None
+    assert isinstance(refused, Fault) and refused.code == "overloaded"
+    assert service.waiting == 0

@@ -11,16 +11,20 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from clearway.deploy.agent import MAX_PICTURE_SIDE
-from clearway.serve.decoding import decoded
-from clearway.serve.faults import Fault
-from helpers.serving import picture_bytes
+from clearway.serve import decoding
+from clearway.serve.decoding import Bounds, Refused, scans_of
+from helpers.serving import many_scans, picture_bytes
 
 NOISE = np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8)
-LIMIT = 10_000
+LIMIT, MOST_SCANS = 10_000, 100
+
+
+def decoded(content: bytes, most_pixels: int) -> np.ndarray:
+    return np.asarray(decoding.decoded(content, Bounds(most_pixels, MAX_PICTURE_SIDE, MOST_SCANS)))
 
 
 def code(content: bytes, most_pixels: int = LIMIT) -> str:
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(Refused) as caught:
         decoded(content, most_pixels)
     return caught.value.code
 
@@ -114,7 +118,24 @@ def test_damaged_files_are_decoded_or_refused(kind, changes) -> None:
         content[place % len(content)] = value
     try:
         found = decoded(bytes(content), LIMIT)
-    except Fault:
+    except Refused:
         return
     assert found.dtype == np.uint8 and found.ndim == 3 and found.shape[2] == 3
     assert found.shape[0] * found.shape[1] <= LIMIT
+
+
+def test_scans_of_a_jpeg_are_counted_before_it_is_decoded(monkeypatch) -> None:
+    plainly, progressive = picture_bytes(NOISE, "JPEG"), picture_bytes(NOISE, "JPEG", progressive=True)
+    assert (scans_of(plainly, MOST_SCANS), scans_of(progressive, MOST_SCANS)) == (1, 10)
+    assert scans_of(many_scans(NOISE, 90), MOST_SCANS) == 100
+    assert scans_of(many_scans(NOISE, 500), MOST_SCANS) == MOST_SCANS + 1  # counted no further
+    assert decoded(many_scans(NOISE, 90), LIMIT).shape == NOISE.shape
+    monkeypatch.setattr(Image.Image, "convert", lambda *_: pytest.fail("it was decoded"))
+    with pytest.raises(Refused, match="more than 100 scans"):
+        decoded(many_scans(NOISE, 91), LIMIT)
+
+
+def test_what_looks_like_a_scan_inside_a_comment_is_none() -> None:
+    file = io.BytesIO()
+    Image.fromarray(NOISE).save(file, "JPEG", comment=b"\xff\xda" * 300)
+    assert scans_of(file.getvalue(), MOST_SCANS) == 1

@@ -10,7 +10,7 @@ from clearway.serve.limits import Limits
 from clearway.serve.service import Service
 from clearway.serve.sessions import state_bytes
 from helpers.one_file import OneFile
-from helpers.serving import TOKEN, picture_bytes
+from helpers.serving import TOKEN, TOKENS, picture_bytes
 
 PNG = {"content-type": "image/png"}
 
@@ -20,7 +20,7 @@ def test_it_walks_as_a_navigator_does_and_says_whether_it_has_arrived(called, tm
     pictures = np.random.default_rng(0).integers(0, 256, (6, 12, 16, 3)).astype(np.uint8)
     client, navigator = Client("http://testserver", TOKEN), clearway.Navigator(agent)
     client._http.close()
-    client._http = called(Service(agent, Limits()))
+    client._http = called(Service(agent, Limits(), TOKENS))
     assert client.agent()["scene"] == "any room"
     with client.session() as session:
         for mover in (session, navigator):

@@ -1,21 +1,43 @@
 """The service keeps what its OpenAPI document says, whatever is sent to it."""
 
+import numpy as np
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, Phase, settings
 
+from clearway.deploy.agent import MAX_PICTURE_SIDE
 from clearway.serve.app import make_app
+from clearway.serve.decoders import Decoders
+from clearway.serve.decoding import Bounds, Refused, decoded
+from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.protection import protected
 from clearway.serve.service import Service
-from helpers.serving import TOKEN, grey
+from helpers.serving import OWNER, TOKEN, TOKENS, grey
 from helpers.sums import Sums
 
 HEADERS = {"Authorization": f"Bearer {TOKEN}"}
-SERVICE = Service(Sums(), Limits(sessions=5000, body_bytes=20_000, idle_s=86_400.0))  # longer than any run of the tests
-APP = protected(make_app(SERVICE), SERVICE, TOKEN)
+LIMITS = Limits(sessions=5000, body_bytes=20_000, idle_s=86_400.0, wrong_tokens=10**9)
+
+
+class Here(Decoders):
+    """Decodes in this process: schemathesis starts and ends the application for every request."""
+
+    def start(self) -> None:
+        pass
+
+    async def decode(self, content, owner, standing):
+        try:
+            return np.asarray(decoded(content, Bounds(LIMITS.picture_pixels, MAX_PICTURE_SIDE, LIMITS.picture_scans)))
+        except Refused as refusal:
+            raise Fault(refusal.code, refusal.message) from refusal
+
+
+SERVICE = Service(Sums(), LIMITS, TOKENS)
+SERVICE.decoders = Here(LIMITS)
+APP = protected(make_app(SERVICE), SERVICE)
 SCHEMA = schemathesis.openapi.from_asgi("/openapi.json", APP, headers=HEADERS)
-KNOWN = SERVICE.sessions.open("sampled", 0)
+KNOWN = SERVICE.sessions.open(OWNER, "sampled", 0, 5000)
 SUPPRESSED = list(HealthCheck)
 
 

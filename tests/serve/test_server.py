@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import signal
 import socket
 import struct
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import httpx
@@ -23,52 +20,13 @@ from websockets.sync.client import connect
 
 import clearway
 from clearway.serve.client import KEEP_ALIVE_S as CLIENT_KEEP_ALIVE_S
-from clearway.serve.client import Client, ServiceError
-from helpers.serving import ENVIRONMENT, TOKEN, grey, picture_bytes
+from clearway.serve.client import ServiceError
+from helpers.running import PATIENT_S, Running, running
+from helpers.serving import TOKEN, grey, picture_bytes
 from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
 HEAD = f"Host: x\r\nAuthorization: Bearer {TOKEN}\r\n".encode()
-PATIENT_S = 60  # for what must happen, on a busy machine
-PROGRAM = f"""
-import json, sys
-from clearway.serve.limits import Limits
-from clearway.serve.run import run_service
-from clearway.web.local import listening, port_of
-from helpers.sums import Sums
-
-asked = json.loads(sys.argv[1])
-listener = listening(0)
-print(port_of(listener), flush=True)
-run_service(Sums(asked.pop("seconds", 0)), listener, {TOKEN!r}, Limits(**asked))
-print("ended", flush=True)
-"""
-
-
-class Running:
-    """A service in a process."""
-
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        assert process.stdout is not None
-        self.process, self.port = process, int(process.stdout.readline())
-        self.url = f"http://127.0.0.1:{self.port}"
-
-    def connected(self) -> socket.socket:
-        return socket.create_connection(("127.0.0.1", self.port), timeout=PATIENT_S)
-
-    def client(self) -> Client:
-        return Client(self.url, TOKEN, timeout_s=PATIENT_S)
-
-
-@contextmanager
-def running(**settings: float) -> Iterator[Running]:
-    words = [sys.executable, "-c", PROGRAM, json.dumps(settings)]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(words, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True) as process:
-        try:
-            yield Running(process)
-        finally:
-            process.kill()
 
 
 @pytest.fixture(scope="module")
@@ -153,9 +111,9 @@ def test_a_connection_stays_open_for_longer_than_clients_keep_theirs(hasty) -> N
     """A robot that steps every few seconds would else send pictures while the service closes."""
     with hasty.connected() as connection:
         for pause_s in (CLIENT_KEEP_ALIVE_S + 3, 0):
-            connection.sendall(b"GET /health HTTP/1.1\r\n" + HEAD + b"\r\n")
+            connection.sendall(b"GET /agent HTTP/1.1\r\n" + HEAD + b"\r\n")
             answer = b""
-            while b'{"status":"ok"}' not in answer:
+            while b'"scene":"attic"' not in answer:
                 part = connection.recv(65536)
                 assert part, "the connection was closed"
                 answer += part

@@ -6,6 +6,7 @@ from clearway.errors import DeployError
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.sessions import Sessions
+from helpers.serving import OWNER
 
 
 class Clock:
@@ -18,16 +19,16 @@ class Clock:
 def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
     clock = Clock()
     sessions = Sessions(Limits(idle_s=60), clock)
-    first, second = sessions.open("argmax", None), sessions.open("sampled", 3)
+    first, second = sessions.open(OWNER, "argmax", None, 1000), sessions.open(OWNER, "sampled", 3, 1000)
     clock.now += 59
-    assert sessions.get(first.id) is first  # its time begins anew
+    assert sessions.get(first.id, OWNER) is first  # its time begins anew
     clock.now += 1
     assert len(sessions) == 1
     with pytest.raises(Fault, match="expired") as caught:
-        sessions.get(second.id)
+        sessions.get(second.id, OWNER)
     assert (caught.value.code, caught.value.status) == ("no_such_session", 404)
     clock.now += 58
-    assert sessions.get(first.id) is first
+    assert sessions.get(first.id, OWNER) is first
     clock.now += 60
     assert len(sessions) == 0
 
@@ -35,24 +36,29 @@ def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
 def test_no_more_sessions_than_allowed_and_room_again_when_one_goes() -> None:
     clock = Clock()
     sessions = Sessions(Limits(sessions=2, idle_s=60), clock)
-    first = sessions.open("sampled", None)
+    first = sessions.open(OWNER, "sampled", None, 1000)
     clock.now += 30
-    sessions.open("sampled", None)
+    sessions.open(OWNER, "sampled", None, 1000)
     with pytest.raises(Fault, match="2 sessions are open") as caught:
-        sessions.open("sampled", None)
+        sessions.open(OWNER, "sampled", None, 1000)
     assert (caught.value.code, caught.value.status) == ("too_many_sessions", 429)
-    sessions.close(first.id)
-    sessions.open("sampled", None)
+    sessions.close(first.id, OWNER)
+    sessions.open(OWNER, "sampled", None, 1000)
     assert sessions.full
     clock.now += 60
     assert not sessions.full
     with pytest.raises(Fault):
-        sessions.close(first.id)
+        sessions.close(first.id, OWNER)
 
 
 def test_names_of_sessions_cannot_be_guessed() -> None:
     sessions = Sessions(Limits())
-    names = {sessions.open("sampled", None).id for _ in range(200)}
+    own = sessions.open(OWNER, "sampled", None, 1000)
+    for ask in (sessions.get, sessions.close):
+        with pytest.raises(Fault, match="no such session"):
+            ask(own.id, "another")
+    assert sessions.get(own.id, OWNER) is own
+    names = {sessions.open(OWNER, "sampled", None, 1000).id for _ in range(200)}
     assert len(names) == 200
     assert {len(name) for name in names} == {22}  # 128 bits
 

@@ -38,7 +38,7 @@ class Evaluate:
     episodes: int | None = None
     """Episodes a target; by default 100, live 10."""
     step_limit: int | None = None
-    """Steps after which an episode has failed; by default 10,000, live 100."""
+    """Steps after which an episode has failed; by default 10000, live 100."""
     seed: int = 0
     """Of starts and sampled actions."""
     scenes: tuple[Path, ...] = ()

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
+import socket
+import sys
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +17,10 @@ from clearway.cli.console import stderr_console
 from clearway.errors import ClearwayError
 
 TOKEN_VARIABLE = "CLEARWAY_TOKEN"
-FEWEST_TOKEN_LETTERS = 16
+UNENCRYPTED = (
+    "WARNING: NOT ENCRYPTED. Tokens and pictures cross the network in the clear; whoever listens can use them. "
+    "Give --tls-cert and --tls-key, or put a proxy with TLS before the service"
+)
 NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 
 
@@ -21,7 +28,7 @@ NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 class Serve:
     """Serve a trained agent over HTTP and WebSocket: pictures in, actions out.
 
-    Every request needs the token that is printed; the variable CLEARWAY_TOKEN sets one of your own.
+    Every request needs the token that is printed; the variable CLEARWAY_TOKEN sets one of your own, --tokens several.
 
     Example: clearway serve runs/bathroom --port 8000
     """
@@ -31,9 +38,21 @@ class Serve:
     scene: str | None = None
     """Name of the scene that the agent is for; by default the run's first."""
     host: str = "127.0.0.1"
-    """Address to listen on. The default is reached from this machine alone; before others, put a proxy with TLS."""
+    """Address to listen on. The default is reached from this machine alone; others need a token of yours, and TLS."""
     port: int = 0
     """Port to listen on; 0 for any that is free."""
+    tokens: Path | None = None
+    """File of tokens, a name and a token a line, instead of the one that is printed; clients share by name."""
+    tls_cert: Path | None = None
+    """Certificate for TLS, in PEM, with those that it rests on."""
+    tls_key: Path | None = None
+    """Its key, in PEM, without a password."""
+    health_port: int | None = None
+    """Port for /health, /ready and /metrics alone, without a token; by default the service's own answers them."""
+    trusted_proxy: str | None = None
+    """Address of a proxy before the service, whose X-Forwarded-For says who asks; nobody else's is believed."""
+    log_requests: bool = False
+    """Write a line of JSON to standard error for every answer, twenty a second at most."""
     sessions: int = 1000
     """Sessions that may be open at a time."""
     idle_s: float = 600.0
@@ -44,26 +63,37 @@ class Serve:
     def run(self) -> None:
         """Load the agent, then answer until interrupted."""
         from clearway.serve.limits import Limits
-        from clearway.serve.run import run_service, servable_agent
+        from clearway.serve.run import Network, check_tls, rotating, run_service, servable_agent
         from clearway.serve.sessions import state_bytes
+        from clearway.serve.tokens import ALONE, Tokens, checked_token, read_tokens
         from clearway.web.guard import new_token
-        from clearway.web.local import address_of, listening
+        from clearway.web.local import address_of, is_loopback, listening, port_of
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
+        check_tls(self.tls_cert, self.tls_key)
         own = os.environ.get(TOKEN_VARIABLE)
-        token = own or new_token()
-        if len(token) < FEWEST_TOKEN_LETTERS or not (token.isascii() and token.isprintable()) or " " in token:
-            problem = f"the variable {TOKEN_VARIABLE} holds no token of at least {FEWEST_TOKEN_LETTERS} plain letters"
-            raise ClearwayError(f"{problem}. Choose another, or unset it for a random one")
+        if self.tokens is not None:
+            tokens = read_tokens(self.tokens)
+        else:
+            token = checked_token(own or new_token(), f"the variable {TOKEN_VARIABLE}")
+            tokens = Tokens([(ALONE, token)])
         console = stderr_console()
 
         def say(line: str) -> None:
             console.print(line, highlight=False, soft_wrap=True)
 
         agent = servable_agent(self.agent, self.scene, say)
-        with listening(self.port, self.host) as listener:
-            say(f"scene {agent.card.scene}: {address_of(listener, self.host)}")
-            if not own:
+        with listening(self.port, self.host) as listener, self._health() as health:
+            local, tls = is_loopback(listener), self.tls_cert is not None
+            if not local and self.tokens is None and not own:
+                problem = f"--host {self.host} is reached by others, and no token of yours is set"
+                raise ClearwayError(f"{problem}. Set {TOKEN_VARIABLE}, or name a file by --tokens")
+            say(f"scene {agent.card.scene}: {address_of(listener, self.host, 'https' if tls else 'http')}")
+            if not local and not tls:
+                say(UNENCRYPTED)
+            if health is not None:
+                say(f"health and metrics, without a token: port {port_of(health)}")
+            if self.tokens is None and not own:
                 say(f"token: {token}")
             if not agent.card.tells_arrival:
                 say("arrived is null in all answers: an earlier clearway exported this file. Export it again")
@@ -71,4 +101,12 @@ class Serve:
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6
                 say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
-            run_service(agent, listener, token, limits)
+            log = functools.partial(print, file=sys.stderr, flush=True) if self.log_requests else None
+            network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy, log)
+            with rotating(tokens, self.tokens):
+                run_service(agent, network, tokens, limits)
+
+    def _health(self) -> AbstractContextManager[socket.socket | None]:
+        from clearway.web.local import listening
+
+        return nullcontext() if self.health_port is None else listening(self.health_port, self.host)

@@ -33,7 +33,7 @@ class Train:
     """
 
     files: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """Scene files, or folders of them."""
+    """Scene files, or folders of them; here, or at s3://..., gs://... or https://..."""
     out: Path | None = None
     """The run folder; by default a new one, runs/ROOM-REWARD-ALGORITHM-sSEED."""
     targets: tuple[str, ...] = ()
@@ -56,8 +56,8 @@ class Train:
     set: tuple[str, ...] = ()
     """Single settings of the algorithm, for example --set envs=200 clip_rewards=true (all: docs/learning.md)."""
     frames: int | None = None
-    """Training frames, such as 600000 or 6e5; by default 3,000,000 (a3c and the paper's presets 10,000,000, recurrent
-    12,000,000, bc and q-learning 1,000,000, adapt 40,000). With --resume, more of them lengthen a finished run."""
+    """Training frames, such as 600000 or 6e5; by default 3 million (a3c and the paper's presets 10 million, recurrent
+    12 million, bc and q-learning 1 million, adapt 40000). With --resume, more of them lengthen a finished run."""
     until: Literal["solved"] | None = None
     """solved: stop earlier, once 20 training episodes in a row reached every target; by default all frames are used."""
     feature_basis: int | None = None

@@ -13,6 +13,7 @@ from clearway.evaluation.runs import evaluate_runs
 from clearway.evaluation.showcase import Showcase, showcases
 from clearway.evaluation.summary import Evaluation
 from clearway.experiments.demo_generalist import FirstWalk, first_walk
+from clearway.learn.checkpoint import keep_newest_checkpoint
 from clearway.learn.load import TrainedAgent, load_agent, run_world
 from clearway.learn.presets import DEFAULT
 from clearway.learn.run_folder import RunFolder
@@ -104,6 +105,8 @@ def run_demo(request: DemoRequest, show_progress: bool = False) -> DemoResult:
         )
         for reward in REWARDS
     }
+    for run in runs.values():
+        keep_newest_checkpoint(run.checkpoints)
     clock.lap("training, both agents")
     agents = {name: load_agent(run.path) for name, run in runs.items()}
     evaluations = evaluate_runs(agents, [scene], seed=request.seed)

@@ -80,6 +80,14 @@ def write_checkpoint(
     return final
 
 
+def keep_newest_checkpoint(folder: Path) -> None:
+    """Remove all checkpoints in `folder` but the newest. Raises RunError as `newest_checkpoint` does; then all stay."""
+    newest = newest_checkpoint(folder)
+    for path in checkpoints(folder):
+        if path != newest:
+            shutil.rmtree(path)
+
+
 def newest_checkpoint(folder: Path) -> Path:
     """The newest checkpoint in `folder` whose files are as they were written; damaged ones are passed over.
 

@@ -13,6 +13,7 @@ from clearway.agents.agent import Agent
 from clearway.agents.by_pose import PoseAgent, network_on_poses
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
+from clearway.learn.described import described
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord, scene_digest
@@ -20,7 +21,9 @@ from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import ScenePolicy
+from clearway.remote.address import address_of
 from clearway.scenes.scene import Scene
+from clearway.scenes.scene_files import SCENE_SUFFIXES
 from clearway.scenes.thor_v1 import read_scene
 from clearway.world.world import World, make_world, scene_tables
 
@@ -56,6 +59,9 @@ class TrainedNetwork:
     network: SiameseActorCritic
     feature_map: FeatureMap
     frames: int
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def on_poses(self, world: World) -> PoseAgent:
         """Its agent on the grid, in a world with the run's scenes. Raises RunError as `lookup` does."""
@@ -153,9 +159,10 @@ def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -
     """
     loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given or ()]
     by_name = {scene.name: scene for scene in loaded} if given else None
+    places = {} if given else _places(record)
     scenes = []
     for wanted in record.scenes:
-        scene = _found(wanted.name, wanted.path, by_name)
+        scene = _found(wanted.name, places.get(wanted.path or "", wanted.path), by_name)
         if scene_digest(scene) != wanted.digest:
             raise RunError(
                 f"{wanted.path or wanted.name}: not the scene that the run was trained on (graph or features differ). "
@@ -163,6 +170,16 @@ def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -
             )
         scenes.append(scene)
     return scenes
+
+
+def _places(record: RunRecord) -> dict[str, str]:
+    """Where the scenes of a run that lie elsewhere are on this machine, by address; they are fetched."""
+    addresses = [scene.path for scene in record.scenes if scene.path is not None and address_of(scene.path)]
+    if not addresses:
+        return {}
+    from clearway.remote.cache import fetched
+
+    return dict(zip(addresses, map(str, fetched(addresses, SCENE_SUFFIXES)), strict=True))
 
 
 def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Scene:

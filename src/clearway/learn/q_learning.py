@@ -22,6 +22,7 @@ from torch import Tensor
 
 from clearway.agents.by_pose import PoseAgent
 from clearway.errors import RunError
+from clearway.learn.described import described
 from clearway.learn.figures import Figures, check_finite
 from clearway.learn.learner import Learner, linear, next_steps
 from clearway.learn.named_tensors import joined, part_of
@@ -187,6 +188,9 @@ class TrainedTable:
     record: RunRecord
     values: Tensor
     frames: int
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def on_poses(self, world: World) -> PoseAgent:
         """Its agent on the grid, which takes the best known actions alike, to targets of the run in the run's scenes.

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from clearway.agents.recurrent import RecurrentAgent
 from clearway.errors import RunError
+from clearway.learn.described import described
 from clearway.learn.learner import Learner
 from clearway.learn.named_tensors import part_of
 from clearway.learn.recurrent_trainer import RecurrentTrainer
@@ -126,6 +127,9 @@ class TrainedRecurrent:
     network: RecurrentActorCritic
     pairs: SeenPairs
     frames: int
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def on_poses(self, world: World) -> RecurrentAgent:
         """Its agent on the grid: it goes by features, in any world of the same eyes."""

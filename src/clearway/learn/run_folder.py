@@ -32,6 +32,7 @@ from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
+from clearway.remote.address import origin
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
 from clearway.version import __version__
@@ -50,7 +51,7 @@ class SceneRecord:
 
     Attributes:
         name: of the scene.
-        path: of its file, or None for a scene made in memory.
+        path: of its file, or its address elsewhere; None for a scene made in memory.
         digest: of its graph, poses and features (`scene_digest`).
         encoder: name of what made the features.
         targets: state ids.
@@ -130,7 +131,7 @@ def record_of(request: RunRequest) -> RunRecord:
         scenes=tuple(
             SceneRecord(
                 name=scene.name,
-                path=str(paths[scene.name].resolve()) if scene.name in paths else None,
+                path=origin(paths[scene.name]) if scene.name in paths else None,
                 digest=scene_digest(scene),
                 encoder=scene.encoder_name,
                 targets=tuple(int(target) for target in request.targets[scene.name]),

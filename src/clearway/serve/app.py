@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
 from clearway.deploy.navigator import Selection
@@ -12,6 +13,7 @@ from clearway.errors import ClearwayError
 from clearway.serve.decoding import CONTENT_TYPES
 from clearway.serve.faults import STATUS, Code, Fault, FaultBody
 from clearway.serve.service import Answer, Service
+from clearway.serve.tokens import OWNER
 from clearway.version import __version__
 
 try:
@@ -21,6 +23,7 @@ try:
     from fastapi.security import HTTPBearer
     from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
     from starlette.exceptions import HTTPException
+    from starlette.requests import HTTPConnection
 except ImportError as error:
     raise ClearwayError("clearway serve needs FastAPI. Install it: pip install 'clearway[serve]'") from error
 
@@ -86,8 +89,15 @@ class State(BaseModel):
 
 
 def make_app(service: Service) -> FastAPI:
-    """The application, to be put behind `guard.protected`."""
-    app = FastAPI(title="clearway serve", version=__version__, description=DESCRIPTION, docs_url=None, redoc_url=None)
+    """The application, to be put behind `protection.protected`, which says whose a request is."""
+    app = FastAPI(
+        title="clearway serve",
+        version=__version__,
+        description=DESCRIPTION,
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lambda app: _decoding(service),
+    )
     token = [Security(HTTPBearer(auto_error=False))]
     _answer_faults(app, service)
 
@@ -98,7 +108,7 @@ def make_app(service: Service) -> FastAPI:
 
     @app.get("/ready", responses=_faults("overloaded"))
     async def ready() -> State:
-        """There is room for another session."""
+        """There is room for another session, and pictures are decoded."""
         if not service.ready:
             raise Fault("overloaded", "no room for another session or picture. Try again")
         return State(status="ready")
@@ -108,7 +118,7 @@ def make_app(service: Service) -> FastAPI:
         """Figures for Prometheus."""
         return Response(service.metrics.text(), media_type="text/plain; version=0.0.4")
 
-    @app.get("/agent", dependencies=token, responses=_faults("unauthorised"))
+    @app.get("/agent", dependencies=token, responses=_faults("unauthorised", "too_many_attempts"))
     async def agent() -> AgentDescription:
         """What the agent is."""
         card = service.card
@@ -124,15 +134,15 @@ def make_app(service: Service) -> FastAPI:
         )
 
     @app.post("/sessions", status_code=201, dependencies=token, responses=_faults(*OPENING))
-    async def open_session(opening: Opening) -> Opened:
+    async def open_session(opening: Opening, request: Request) -> Opened:
         """Open a session; it expires when it is not used."""
-        session = service.open(opening.selection, opening.seed)
+        session = service.open(_owner(request), opening.selection, opening.seed)
         return Opened(session_id=session.id, expires_after_s=service.limits.idle_s)
 
     @app.delete("/sessions/{session_id}", status_code=204, dependencies=token, responses=_faults(*CLOSING))
-    async def close_session(session_id: Annotated[str, Path(pattern=ID)]) -> None:
+    async def close_session(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> None:
         """End a session."""
-        service.sessions.close(session_id)
+        service.sessions.close(session_id, _owner(request))
 
     @app.put(
         "/sessions/{session_id}/target",
@@ -143,7 +153,8 @@ def make_app(service: Service) -> FastAPI:
     )
     async def set_target(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> None:
         """Begin an episode: the body is the picture of the place to walk to."""
-        await service.set_target(service.sessions.get(session_id), await _picture(request))
+        session = service.sessions.get(session_id, _owner(request))
+        await service.set_target(session, await _picture(request))
 
     @app.post(
         "/sessions/{session_id}/steps",
@@ -153,7 +164,8 @@ def make_app(service: Service) -> FastAPI:
     )
     async def step(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> StepAnswer:
         """Decide: the body is what the camera sees now."""
-        return _answer(service, await service.step(service.sessions.get(session_id), await _picture(request)))
+        session = service.sessions.get(session_id, _owner(request))
+        return _answer(service, await service.step(session, await _picture(request)))
 
     @app.websocket("/sessions/{session_id}/stream")
     async def stream(socket: WebSocket, session_id: str) -> None:
@@ -162,8 +174,15 @@ def make_app(service: Service) -> FastAPI:
     return app
 
 
-OPENING: tuple[Code, ...] = ("unauthorised", "invalid_request", "too_many_sessions", "body_too_large", "too_slow")
-CLOSING: tuple[Code, ...] = ("unauthorised", "no_such_session", "invalid_request")
+OPENING: tuple[Code, ...] = (
+    "unauthorised",
+    "too_many_attempts",
+    "invalid_request",
+    "too_many_sessions",
+    "body_too_large",
+    "too_slow",
+)
+CLOSING: tuple[Code, ...] = ("unauthorised", "too_many_attempts", "no_such_session", "invalid_request")
 PICTURE: tuple[Code, ...] = (
     *CLOSING,
     "unsupported_picture",
@@ -191,7 +210,24 @@ def _faults(*codes: Code) -> dict[int | str, dict[str, Any]]:
     return found
 
 
-_METRICS = _faults("unauthorised") | {200: {"description": "Figures", "content": {"text/plain": {}}}}
+_METRICS = _faults("unauthorised", "too_many_attempts") | {
+    200: {"description": "Figures", "content": {"text/plain": {}}}
+}
+
+
+@asynccontextmanager
+async def _decoding(service: Service) -> AsyncIterator[None]:
+    """Decoders run meanwhile."""
+    try:
+        service.decoders.start()
+        yield
+    finally:
+        service.decoders.close()
+
+
+def _owner(connection: HTTPConnection) -> str:
+    """The name of the token that was sent."""
+    return str(connection.scope[OWNER])
 
 
 def _answer(service: Service, answer: Answer) -> StepAnswer:
@@ -217,7 +253,7 @@ async def _picture(request: Request) -> bytes:
 async def _stream(service: Service, socket: WebSocket, session_id: str) -> None:
     """Answer the pictures of a session, one after the other, until either side ends it."""
     try:
-        service.sessions.get(session_id)
+        service.sessions.get(session_id, _owner(socket))
         if service.streams.locked():
             raise Fault("overloaded", f"{service.limits.sessions} streams are open. Try again later")
     except Fault as fault:
@@ -235,7 +271,7 @@ async def _answer_messages(service: Service, socket: WebSocket, session_id: str)
             if message["type"] == "websocket.disconnect":
                 return
             try:
-                session = service.sessions.get(session_id)
+                session = service.sessions.get(session_id, _owner(socket))
                 content = message.get("bytes")
                 if content is None:
                     raise Fault("invalid_request", "send pictures as binary messages")

@@ -1,4 +1,7 @@
-"""Connections that do not wait for ever: for a request's headers, or for a client to read what was sent to it."""
+"""Connections that do not wait for ever: for a request's headers, or for a client to read what was sent to it.
+
+Before a right token has come, they are few for each address and stay open for a short time.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,8 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from clearway.serve.tokens import KNOWN
+
 KEEP_ALIVE_S = 75  # of an idle connection; longer than clients and proxies commonly keep theirs
 
 
@@ -20,6 +25,37 @@ def reset(transport: asyncio.Transport) -> None:
     if plug is not None and not transport.is_closing():
         plug.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     transport.abort()
+
+
+class Strangers:
+    """Connections on which no right token has come yet, by address.
+
+    Args:
+        most: of an address.
+        trusted: the address of a proxy, behind which all clients are; None: no such.
+    """
+
+    def __init__(self, most: int, trusted: str | None) -> None:
+        self._most, self._trusted = most, trusted
+        self._open: dict[str, dict[ImpatientHttp, None]] = {}
+
+    def add(self, connection: ImpatientHttp) -> None:
+        """Count a new connection; the oldest of its address is cut off where there are too many."""
+        if connection.address == self._trusted:
+            return
+        found = self._open.setdefault(connection.address, {})
+        found[connection] = None
+        oldest = next((other for other in found if not other.is_known), None)
+        if len(found) > self._most and oldest is not None:
+            reset(oldest.transport)
+            self.remove(oldest)
+
+    def remove(self, connection: ImpatientHttp) -> None:
+        """Count it no more: it is closed, or a right token has come."""
+        found = self._open.get(connection.address, {})
+        found.pop(connection, None)
+        if not found:
+            self._open.pop(connection.address, None)
 
 
 class _Impatient(asyncio.Protocol):
@@ -51,11 +87,20 @@ class _Impatient(asyncio.Protocol):
 class ImpatientHttp(_Impatient, H11Protocol):
     """HTTP/1.1 whose clients send a request's headers, and read its answer, within `patience_s`."""
 
+    strangers: Strangers
+    health_port: int | None = None
+    address = ""
+    is_known = False  # a right token has come on it
     _headers: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
         """Begin to wait for headers."""
         super().connection_made(transport)
+        self.address = self.client[0] if self.client else ""
+        if self.health_port is not None and self.server is not None and self.server[1] == self.health_port:
+            self.limit_concurrency = None  # whoever watches the service is answered however busy it is
+        self.app_state = {**self.app_state, KNOWN: self._become_known}  # every request's scope has it, under "state"
+        self.strangers.add(self)
         self._await_headers()
 
     def data_received(self, data: bytes) -> None:
@@ -67,20 +112,28 @@ class ImpatientHttp(_Impatient, H11Protocol):
         elif self._headers is None and self.conn.trailing_data[0]:
             self._await_headers()
 
+    def _become_known(self) -> None:
+        self.is_known = True
+        self.strangers.remove(self)
+
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing any more."""
         self._have_headers()
+        self.strangers.remove(self)
         super().connection_lost(exc)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         """Leave the connection to the WebSocket's class."""
         self._have_headers()
+        self.strangers.remove(self)
         super().handle_websocket_upgrade(event)
 
     def timeout_keep_alive_handler(self) -> None:
-        """Uvicorn calls it `patience_s` after an answer: who has left it unread is cut off, others may stay idle."""
+        """Uvicorn calls it `patience_s` after an answer: who has left it unread is cut off, owners may stay idle."""
         if self.transport.get_write_buffer_size():
             reset(self.transport)
+        elif not self.is_known:
+            super().timeout_keep_alive_handler()
         else:
             end = super().timeout_keep_alive_handler
             self.timeout_keep_alive_task = self.loop.call_later(KEEP_ALIVE_S, end)
@@ -98,9 +151,12 @@ class ImpatientSocket(_Impatient, WebSocketsSansIOProtocol):
     """A WebSocket whose client reads its answers within `patience_s`."""
 
 
-def impatient(patience_s: float) -> tuple[type[asyncio.Protocol], type[asyncio.Protocol]]:
+def impatient(
+    patience_s: float, strangers: Strangers, health_port: int | None = None
+) -> tuple[type[asyncio.Protocol], type[asyncio.Protocol]]:
     """The classes for HTTP and for WebSockets with that patience."""
+    own = {"patience_s": patience_s, "strangers": strangers, "health_port": health_port}
     return (
-        type("ImpatientHttp", (ImpatientHttp,), {"patience_s": patience_s}),
+        type("ImpatientHttp", (ImpatientHttp,), own),
         type("ImpatientSocket", (ImpatientSocket,), {"patience_s": patience_s}),
     )

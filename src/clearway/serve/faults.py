@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 Code = Literal[
     "unauthorised",
+    "too_many_attempts",
     "not_found",
     "method_not_allowed",
     "invalid_request",
@@ -26,6 +27,7 @@ Code = Literal[
 ]
 STATUS: dict[Code, HTTPStatus] = {
     "unauthorised": HTTPStatus.UNAUTHORIZED,
+    "too_many_attempts": HTTPStatus.TOO_MANY_REQUESTS,
     "not_found": HTTPStatus.NOT_FOUND,
     "method_not_allowed": HTTPStatus.METHOD_NOT_ALLOWED,
     "invalid_request": HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -75,5 +77,6 @@ class Fault(Exception):
     def headers(self) -> dict[str, str]:
         """That go with it."""
         extra = {"unauthorised": {"www-authenticate": "Bearer"}, "too_many_sessions": {"retry-after": "60"}}
+        extra["too_many_attempts"] = {"retry-after": "60"}
         extra["overloaded"] = {"retry-after": "1"}
         return {"content-type": "application/json", **extra.get(self.code, {})}

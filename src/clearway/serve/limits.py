@@ -21,6 +21,16 @@ class Limits:
     """Of a request, and of a WebSocket message."""
     picture_pixels: int = 1920 * 1080
     """Height times width, read from the picture's header before it is decoded."""
+    picture_scans: int = 100
+    """Of a JPEG, counted before it is decoded; progressive ones have some ten."""
+    decode_s: float = 0.25
+    """Of processor time to decode a picture; what takes longer is tried once more, slowly."""
+    slow_decode_s: float = 2.0
+    """Of processor time to decode a picture slowly, by a process that yields to all others; then it is refused."""
+    stall_s: float = 5.0
+    """After which a decoder that says nothing is ended and replaced."""
+    decoder_bytes: int = 512 << 20
+    """Of address space for a decoder."""
     sessions: int = 1000
     """That are open at a time."""
     idle_s: float = 600.0
@@ -30,11 +40,17 @@ class Limits:
     patience_s: float = 5.0
     """For a client to send a request's headers, and to read what waits for it."""
     waiting: int = 256
-    """Pictures that wait for the model; more are refused at once."""
+    """Pictures that wait to be decoded or for the model; more are refused at once."""
     batch: int = 16
     """Pictures that go through the model together."""
     connections: int = 1500
     """That are open at a time."""
+    strangers: int = 100
+    """Connections of an address on which no right token has come yet; the oldest makes room for the next."""
+    wrong_tokens: int = 20
+    """Of an address in a minute; beyond, only tokens are looked at that have come from there before."""
+    bodies_bytes: int = 256 << 20
+    """Of all requests under way together; owners of tokens share it."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -15,10 +15,11 @@ class Metrics:
 
     Args:
         sessions: gives the number of open sessions.
-        waiting: gives the number of pictures that wait for the model.
+        waiting: gives the number of pictures that wait.
+        replaced: gives the number of decoders that had to be replaced.
     """
 
-    def __init__(self, sessions: Callable[[], int], waiting: Callable[[], int]) -> None:
+    def __init__(self, sessions: Callable[[], int], waiting: Callable[[], int], replaced: Callable[[], int]) -> None:
         self.registry = r = CollectorRegistry()
         self.requests = Counter("clearway_requests", "Answers by route and status", ("route", "status"), registry=r)
         self.seconds = Histogram(
@@ -28,7 +29,8 @@ class Metrics:
         self.model = Histogram("clearway_model_seconds", "Encoder and policy, a batch", buckets=SECONDS, registry=r)
         self.faults = Counter("clearway_faults", "Refusals by code", ("code",), registry=r)
         Gauge("clearway_sessions", "Open sessions", registry=r).set_function(sessions)
-        Gauge("clearway_waiting_pictures", "That wait for the model", registry=r).set_function(waiting)
+        Gauge("clearway_waiting_pictures", "That wait", registry=r).set_function(waiting)
+        Gauge("clearway_replaced_decoders", "Ended for their pictures", registry=r).set_function(replaced)
 
     def computed(self, pictures: int, seconds: float) -> None:
         """Count a batch."""

@@ -8,30 +8,43 @@ import time
 from collections.abc import MutableMapping
 from typing import Any
 
+from clearway.serve.access_log import AccessLog
 from clearway.serve.faults import Fault
 from clearway.serve.metrics import Metrics
 from clearway.serve.service import Service
-from clearway.web.guard import HEADERS, Application, Receive, Scope, Send, same_token
+from clearway.serve.tokens import KNOWN, OWNER
+from clearway.web.guard import HEADERS, Application, Receive, Scope, Send
 
 OPEN_PATHS = ("/health", "/ready")  # say nothing but whether the service is up
+WATCHED = (*OPEN_PATHS, "/metrics")
 UNKNOWN = "unknown"
 
 
-def protected(app: Application, service: Service, token: str) -> Application:
-    """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted."""
+def protected(
+    app: Application, service: Service, health_port: int | None = None, log: AccessLog | None = None
+) -> Application:
+    """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted.
+
+    It finds the name of the token in the scope, under `OWNER`. Where there is a `health_port`, what `WATCHED` names is
+    answered there, without a token, and nothing else; and nowhere else. `log` is told of every answer.
+    """
     limits, metrics = service.limits, service.metrics
 
     async def guard(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
-            if _authorised(scope, token):
-                return await app(scope, receive, send)
-            return await _refuse_socket(send)
+            try:
+                scope[OWNER] = _owner(scope, service)
+            except Fault as fault:
+                return await _refuse_socket(send, fault)
+            return await app(scope, receive, send)
         if scope["type"] != "http":
             return await app(scope, receive, send)
-        begun, exchange = time.perf_counter(), _Exchange(scope, receive, send, limits.body_bytes)
+        begun, exchange = time.perf_counter(), _Exchange(scope, receive, send, service)
         try:
-            if scope["path"] not in OPEN_PATHS and not _authorised(scope, token):
-                raise _unauthorised()
+            if health_port is not None and (scope["path"] in WATCHED) != (scope["server"][1] == health_port):
+                raise Fault("not_found", "there is nothing here on this port")
+            if scope["path"] not in (OPEN_PATHS if health_port is None else WATCHED):
+                scope[OWNER] = _owner(scope, service)
             exchange.check_length()
             async with asyncio.timeout(limits.deadline_s):
                 await app(scope, exchange.receive, exchange.send)
@@ -48,8 +61,13 @@ def protected(app: Application, service: Service, token: str) -> Application:
         except Exception:  # the application has answered; whoever runs the service must know
             logging.getLogger("clearway.serve").exception("a request failed")
         finally:
+            exchange.free()
             route = getattr(scope.get("route"), "path", UNKNOWN)
-            metrics.answered(route, exchange.status, time.perf_counter() - begun)
+            seconds = time.perf_counter() - begun
+            metrics.answered(route, exchange.status, seconds)
+            if log is not None:
+                session = scope.get("path_params", {}).get("session_id")
+                log.note(_address(scope), scope.get(OWNER), session, route, exchange.status, seconds)
 
     return guard
 
@@ -63,8 +81,9 @@ class _Exchange:
         too_large: set once the body was; the application's own answer is then kept back.
     """
 
-    def __init__(self, scope: Scope, receive: Receive, send: Send, most_bytes: int) -> None:
-        self._receive, self._send, self._most_bytes, self._read_bytes = receive, send, most_bytes, 0
+    def __init__(self, scope: Scope, receive: Receive, send: Send, service: Service) -> None:
+        self._scope, self._receive, self._send, self._service = scope, receive, send, service
+        self._most_bytes, self._read_bytes, self._held_bytes = service.limits.body_bytes, 0, 0
         self._length = int(_header(scope, b"content-length") or 0)  # the server has checked that it is a number
         self.body_complete = self._length == 0 and _header(scope, b"transfer-encoding") is None
         self.status = 0
@@ -79,12 +98,19 @@ class _Exchange:
         """The next part of the request. Raises Fault where there is too much of it."""
         message = await self._receive()
         if message["type"] == "http.request":
-            self._read_bytes += len(message.get("body", b""))
+            arrived = len(message.get("body", b""))
+            self._read_bytes += arrived
             self.body_complete = not message.get("more_body", False)
             if self._read_bytes > self._most_bytes:
                 self.too_large = self._fault()
                 raise self.too_large
+            self._service.hold_bytes(self._scope.get(OWNER, ""), arrived)
+            self._held_bytes += arrived
         return message
+
+    def free(self) -> None:
+        """Its body is held no more."""
+        self._service.free_bytes(self._scope.get(OWNER, ""), self._held_bytes)
 
     def _fault(self) -> Fault:
         return Fault("body_too_large", f"at most {self._most_bytes} bytes are taken")
@@ -121,13 +147,28 @@ def _header(scope: Scope, wanted: bytes) -> str | None:
     return next((value.decode("latin-1") for name, value in scope["headers"] if name.lower() == wanted), None)
 
 
-def _authorised(scope: Scope, token: str) -> bool:
+def _address(scope: Scope) -> str:
+    return str((scope.get("client") or ("",))[0])
+
+
+def _owner(scope: Scope, service: Service) -> str:
+    """The name of the request's token. Raises Fault where it has none that is right, or had too many wrong ones."""
     scheme, _, given = (_header(scope, b"authorization") or "").partition(" ")
-    return scheme.lower() == "bearer" and same_token(given.strip(), token)
+    address, token = _address(scope), given.strip()
+    if scheme.lower() != "bearer" or not token:
+        raise _unauthorised()
+    if not service.attempts.may_try(address, token):
+        raise Fault("too_many_attempts", "too many wrong tokens have come from this address. Try again in a minute")
+    owner = service.tokens.owner_of(token)
+    service.attempts.note(address, token, owner is not None)
+    if owner is None:
+        raise _unauthorised()
+    if known := scope.get("state", {}).get(KNOWN):
+        known()
+    return owner
 
 
-async def _refuse_socket(send: Send) -> None:
-    fault = _unauthorised()
+async def _refuse_socket(send: Send, fault: Fault) -> None:
     pairs = [(name.encode(), value.encode()) for name, value in fault.headers().items()]
     await send({"type": "websocket.http.response.start", "status": fault.status, "headers": pairs})
     await send({"type": "websocket.http.response.body", "body": fault.body()})

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import logging
+import signal
 import socket
-import warnings
-from collections.abc import Callable
+import ssl
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-
-from PIL import Image
+from types import FrameType
 
 from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import open_agent
+from clearway.errors import ClearwayError
+from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
-from clearway.serve.connections import impatient
+from clearway.serve.connections import Strangers, impatient
 from clearway.serve.limits import Limits
 from clearway.serve.protection import protected
 from clearway.serve.service import Service
-from clearway.web.local import serve
+from clearway.serve.tokens import Tokens, read_tokens
+from clearway.web.local import port_of, serve
 
 OTHER_FILES = 200  # beside connections that a service may open
 SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
@@ -64,25 +69,97 @@ def allowed_connections(wanted: int) -> int:
     return allowed
 
 
-def run_service(agent: DeployedAgent, listener: socket.socket, token: str, limits: Limits) -> None:
+@dataclass(frozen=True)
+class Network:
+    """How the service is reached.
+
+    Attributes:
+        listener: from `web.local.listening`; closed at the end.
+        health: another one, for health and metrics alone, without a token; None: the first answers them.
+        certificate, key: files in PEM for TLS; None: none.
+        proxy: address of a proxy whose X-Forwarded-For is believed.
+        log: takes a line for every answer; None: none is written.
+    """
+
+    listener: socket.socket
+    health: socket.socket | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    proxy: str | None = None
+    log: Callable[[str], object] | None = None
+
+    def listeners(self) -> list[socket.socket]:
+        """Both, or the one."""
+        return [self.listener, *([self.health] if self.health else [])]
+
+
+def check_tls(certificate: Path | None, key: Path | None) -> None:
+    """Raise ClearwayError where one of both is missing, cannot be read or does not belong to the other."""
+    if certificate is None and key is None:
+        return
+    if certificate is None or key is None:
+        raise ClearwayError("--tls-cert and --tls-key go together. Give both, in PEM")
+    try:
+        for path in (certificate, key):
+            if not path.is_file():
+                raise ClearwayError(f"{path}: is no regular file. Name a certificate and its key, in PEM")
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
+    except OSError as fault:  # ssl.SSLError is one
+        reason = fault.strerror or fault
+        raise ClearwayError(f"{certificate}, {key}: {reason}. Name a certificate and its key, in PEM") from fault
+
+
+@contextmanager
+def rotating(tokens: Tokens, path: Path | None) -> Iterator[None]:
+    """Let SIGHUP read the file of tokens again meanwhile, also where the process was started to ignore it (nohup)."""
+    if path is None or not hasattr(signal, "SIGHUP"):
+        yield
+        return
+
+    def read_again(number: int, frame: FrameType | None) -> None:
+        log = logging.getLogger("clearway.serve")
+        try:
+            tokens.replace(read_tokens(path))
+        except ClearwayError as fault:
+            log.error("the tokens stay as they were: %s", fault)
+        else:
+            log.warning("tokens were read again from %s", path)
+
+    before = signal.signal(signal.SIGHUP, read_again)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: Limits) -> None:
     """Answer until told to end (SIGINT, SIGTERM); requests under way are answered, streams are closed.
 
     Args:
         agent: is asked.
-        listener: from `web.local.listening`; closed at the end.
-        token: that every request must hold.
+        network: how it is reached.
+        tokens: one of which every request must hold.
         limits: what is allowed.
 
     Raises:
         DeployError: the agent takes no pictures.
     """
-    service = Service(agent, limits)
-    warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # `decoding` refuses by a limit of our own
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
-    http, sockets = impatient(limits.patience_s)
+    service = Service(agent, limits, tokens)
+    for listener in network.listeners():
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+    health_port = port_of(network.health) if network.health else None
+    http, sockets = impatient(limits.patience_s, Strangers(limits.strangers, network.proxy), health_port)
+    tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
+    logging.getLogger("uvicorn.error").addFilter(Sparing())
     serve(
-        protected(make_app(service), service, token),
-        listener,
+        protected(make_app(service), service, health_port, AccessLog(network.log) if network.log else None),
+        *network.listeners(),
+        **tls,
+        proxy_headers=network.proxy is not None,
+        forwarded_allow_ips=network.proxy,
+        lifespan="on",
+        log_config=None,
         http=http,
         ws=sockets,
         ws_max_size=limits.body_bytes,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -15,6 +15,7 @@ from clearway.agents.agent import State
 from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import Selection, episode_seeds
 from clearway.scenes.sensors import RGB
+from clearway.serve.decoders import Standing
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 
@@ -27,22 +28,26 @@ class Session:
 
     Attributes:
         id: what clients call it by; nobody can guess another's.
+        owner: name of the token that opened it; to others it is not there.
         selection: how its actions are chosen.
         seed: of its next episode, (1,) int64.
         seeds: of the episodes after that, one after the other.
         state: what the agent remembers, of one row; None until there is a target.
         steps: answered since the target was set.
         used_s: when it was last asked for, on the clock of its `Sessions`.
+        standing: how its pictures have been.
         turn: held while a request of the session is answered, so that they are answered one after the other.
     """
 
     id: str
+    owner: str
     selection: Selection
     seed: np.ndarray
     seeds: Iterator[np.ndarray]
     used_s: float
     state: State | None = None
     steps: int = 0
+    standing: Standing = field(default_factory=Standing)
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
@@ -63,6 +68,7 @@ class Sessions:
 
     def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
         self._limits, self._clock = limits, clock
+        self._owned = Counter[str]()  # open sessions of each owner
         self._open: OrderedDict[str, Session] = OrderedDict()  # the one unused for longest comes first
 
     def __len__(self) -> int:
@@ -74,32 +80,38 @@ class Sessions:
         """No more can be opened."""
         return len(self) >= self._limits.sessions
 
-    def open(self, selection: Selection, seed: int | None) -> Session:
-        """A new session. Raises Fault where there are too many."""
-        if self.full:
-            raise Fault(
-                "too_many_sessions", f"{self._limits.sessions} sessions are open. Close one, or try again later"
+    def open(self, owner: str, selection: Selection, seed: int | None, most: int) -> Session:
+        """A new session. Raises Fault where there are too many, or `most` of this owner's."""
+        if self.full or self._owned[owner] >= most:
+            held = (
+                f"{self._limits.sessions} sessions are open" if self.full else f"{most} sessions of this token are open"
             )
+            raise Fault("too_many_sessions", f"{held}. Close one, or try again later")
         seeds = episode_seeds(seed)
-        made = Session(secrets.token_urlsafe(ID_BYTES), selection, next(seeds), seeds, self._clock())
+        made = Session(secrets.token_urlsafe(ID_BYTES), owner, selection, next(seeds), seeds, self._clock())
         self._open[made.id] = made
+        self._owned[owner] += 1
         return made
 
-    def get(self, session_id: str) -> Session:
-        """An open session, whose time begins anew. Raises Fault where there is none of that name."""
+    def get(self, session_id: str, owner: str) -> Session:
+        """An open session of this owner's, whose time begins anew. Raises Fault where there is none of that name."""
         self._expire()
         found = self._open.get(session_id)
-        if found is None:
+        if found is None or found.owner != owner:
             raise Fault("no_such_session", "no such session, or it has expired. Open a new one")
         found.used_s = self._clock()
         self._open.move_to_end(session_id)
         return found
 
-    def close(self, session_id: str) -> None:
-        """End a session. Raises Fault where there is none of that name."""
-        del self._open[self.get(session_id).id]
+    def close(self, session_id: str, owner: str) -> None:
+        """End a session of this owner's. Raises Fault where there is none of that name."""
+        self._forget(self.get(session_id, owner))
+
+    def _forget(self, session: Session) -> None:
+        del self._open[session.id]
+        self._owned[session.owner] -= 1
 
     def _expire(self) -> None:
         oldest = self._clock() - self._limits.idle_s
         while self._open and next(iter(self._open.values())).used_s <= oldest:
-            self._open.popitem(last=False)
+            self._forget(next(iter(self._open.values())))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ipaddress
+import os
 import signal
 import socket
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import FrameType
 from typing import Any
 
@@ -22,6 +25,8 @@ LOOPBACK = "127.0.0.1"
 GRACE_S = 5  # for requests under way when the service is told to end
 LARGEST_MESSAGE_BYTES = 64 * 1024  # that a WebSocket takes
 MOST_PORT = 65_535
+ENDED_LATE = 70  # exit code where something under way did not end (EX_SOFTWARE of sysexits.h)
+LATE_S = 3  # after the grace
 
 
 def listening(port: int, host: str = LOOPBACK) -> socket.socket:
@@ -54,18 +59,34 @@ def port_of(listener: socket.socket) -> int:
     return int(listener.getsockname()[1])
 
 
-def address_of(listener: socket.socket, host: str = LOOPBACK) -> str:
+def address_of(listener: socket.socket, host: str = LOOPBACK, scheme: str = "http") -> str:
     """The address of a service by the host that it was asked to listen on, as a browser takes it, without a path."""
     name = f"[{host}]" if ":" in host else host
-    return f"http://{name}:{port_of(listener)}"
+    return f"{scheme}://{name}:{port_of(listener)}"
 
 
-def serve(app: Application, listener: socket.socket, **settings: Any) -> None:
+def is_loopback(listener: socket.socket) -> bool:
+    """Whether only this machine reaches a socket."""
+    return ipaddress.ip_address(listener.getsockname()[0]).is_loopback
+
+
+class _Server(uvicorn.Server):
+    """Ends for certain once it is told to: `LATE_S` after the grace the process ends, whatever is under way."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        super().handle_exit(sig, frame)
+        grace = self.config.timeout_graceful_shutdown or 0
+        late = threading.Timer(grace + LATE_S, os._exit, (ENDED_LATE,))
+        late.daemon = True
+        late.start()
+
+
+def serve(app: Application, *listeners: socket.socket, **settings: Any) -> None:
     """Answer until the process is interrupted or told to end (SIGINT, SIGTERM); what is under way gets a few seconds.
 
     Args:
         app: what answers.
-        listener: from `listening`; closed at the end.
+        listeners: from `listening`; closed at the end.
         settings: of `uvicorn.Config`, where a service needs others.
     """
     ours: dict[str, Any] = {
@@ -77,8 +98,10 @@ def serve(app: Application, listener: socket.socket, **settings: Any) -> None:
         "ws_max_size": LARGEST_MESSAGE_BYTES,
     }
     config = uvicorn.Config(app, **(ours | settings))
-    with listener, _ending_quietly():
-        uvicorn.Server(config).run(sockets=[listener])
+    with ExitStack() as open_ones, _ending_quietly():
+        for listener in listeners:
+            open_ones.enter_context(listener)
+        _Server(config).run(sockets=list(listeners))
 
 
 @contextmanager

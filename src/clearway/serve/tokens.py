@@ -1,0 +1,91 @@
+"""Who may ask: the tokens of a service, each with the name of its owner."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+
+from clearway.errors import ClearwayError
+from clearway.web.guard import same_token
+
+OWNER = "clearway.owner"  # in the scope of a request: the name of its token
+KNOWN = "clearway.known"  # in the state of a request: to be called once its token was right
+ALONE = "default"  # the owner where there is one token
+FEWEST_LETTERS = 16
+MOST_BYTES = 1 << 20  # of a file of tokens
+MOST_SHARES = 4  # an owner gets no less than this part of what all owners share
+
+
+class Tokens:
+    """Tokens by the names of their owners; an owner may have several.
+
+    Args:
+        named: names and tokens.
+    """
+
+    def __init__(self, named: Sequence[tuple[str, str]]) -> None:
+        self._named = tuple(named)
+
+    def replace(self, other: Tokens) -> None:
+        """Take another's instead of the own."""
+        self._named = other._named
+
+    def owner_of(self, given: str) -> str | None:
+        """The name of a token's owner, None where there is no such token; how long it takes tells nothing of them."""
+        found = None
+        for name, token in self._named:
+            if same_token(given, token):
+                found = name
+        return found
+
+    def share(self, whole: int) -> int:
+        """How much of a whole one owner may hold: all where there is one, an even part where there are a few."""
+        return max(whole // min(len({name for name, _ in self._named}), MOST_SHARES), 1)
+
+
+def checked_token(token: str, what: str) -> str:
+    """The token. Raises ClearwayError where it is too weak or cannot be sent; `what` it is stands in the message."""
+    if len(token) < FEWEST_LETTERS or not (token.isascii() and token.isprintable()) or " " in token:
+        problem = f"{what} holds no token of at least {FEWEST_LETTERS} plain letters"
+        raise ClearwayError(f"{problem}. Choose another, or leave it out for a random one")
+    return token
+
+
+def read_tokens(path: Path) -> Tokens:
+    """The tokens of a file: a name and a token a line; empty lines and those that begin with # say nothing.
+
+    Raises:
+        ClearwayError: it cannot be read, others may read it, or it says something else.
+    """
+    named = []
+    for number, line in enumerate(_text(path).splitlines(), 1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        if len(words) != 2:
+            raise ClearwayError(f"{path}, line {number}: expected a name and a token. Write them with a space between")
+        named.append((words[0], checked_token(words[1], f"{path}, line {number},")))
+    if not named:
+        raise ClearwayError(f"{path}: no tokens in it. Write a name and a token a line")
+    return Tokens(named)
+
+
+def _text(path: Path) -> str:
+    """What a regular file says, which only its owner may read."""
+    try:
+        with open(
+            path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
+        ) as file:  # waits for no pipe
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise ClearwayError(f"{path}: is no regular file. Name a file of tokens")
+            if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+                raise ClearwayError(f"{path}: others may read or change it. Forbid it them: chmod 600 {path}")
+            content = file.read(MOST_BYTES + 1)
+    except OSError as fault:
+        raise ClearwayError(f"{path}: cannot be read ({fault.strerror}). Name a file of tokens") from fault
+    if len(content) > MOST_BYTES:
+        raise ClearwayError(f"{path}: is larger than {MOST_BYTES >> 20} MiB. Name a file of tokens")
+    return content.decode("utf-8", "replace")

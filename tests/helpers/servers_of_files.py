@@ -1,0 +1,142 @@
+"""Servers of files on this machine: an object store, a web server, Google's interface, and some that fail."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from urllib.parse import unquote, urlsplit
+from urllib.request import Request, urlopen
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def object_store() -> Iterator[str]:
+    """A server with S3's interface; yields its address."""
+    import logging
+
+    from moto.server import ThreadedMotoServer
+
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    yield f"http://{host}:{port}"
+    server.stop()
+
+
+@pytest.fixture
+def s3(object_store: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[str, bytes], None]]:
+    """An object store with the empty bucket "rooms", and an empty cache; yields what puts a file there by its key."""
+    from s3fs import S3FileSystem
+
+    environment = {
+        "CLEARWAY_CACHE": str(tmp_path / "cache"),
+        "AWS_ENDPOINT_URL": object_store,
+        "AWS_ACCESS_KEY_ID": "any",
+        "AWS_SECRET_ACCESS_KEY": "any",
+        "AWS_DEFAULT_REGION": "us-east-1",
+        "AWS_EC2_METADATA_DISABLED": "true",
+    }
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    urlopen(Request(f"{object_store}/moto-api/reset", method="POST")).close()
+    S3FileSystem.clear_instance_cache()
+    system = S3FileSystem()
+    system.mkdir("rooms")
+
+    def put(key: str, content: bytes) -> None:
+        system.pipe_file(f"rooms/{key}", content)
+
+    yield put
+    S3FileSystem.clear_instance_cache()
+
+
+@contextmanager
+def web_server(handler: Callable[..., BaseHTTPRequestHandler]) -> Iterator[str]:
+    """A web server; yields its address."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+class _Files(SimpleHTTPRequestHandler):
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def files_of(folder: Path) -> Callable[..., BaseHTTPRequestHandler]:
+    """Python's own server of a folder's files."""
+    return partial(_Files, directory=str(folder))
+
+
+class CutShort(_Files):
+    """Says that a file has ten bytes, and sends four."""
+
+    def do_HEAD(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Length", "10")
+        self.end_headers()
+
+    def do_GET(self) -> None:
+        self.do_HEAD()
+        self.wfile.write(b"four")
+        self.close_connection = True
+
+
+class Shrunk(CutShort):
+    """Says that a file has ten bytes, and sends another one, of four."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Length", "4")
+        self.end_headers()
+        self.wfile.write(b"four")
+
+
+class GoogleStore(_Files):
+    """The part of Google's JSON interface that lists and reads the objects of one bucket."""
+
+    objects: dict[str, bytes]
+
+    def do_GET(self) -> None:
+        path = urlsplit(self.path).path
+        name = unquote(path.partition("/b/rooms/o")[2].lstrip("/"))
+        if path.startswith("/download"):
+            self._send(self.objects[name], "application/octet-stream")
+        elif name in self.objects:
+            self._send(json.dumps(self._described(name)).encode())
+        elif not name and "/b/rooms" in path:
+            self._send(json.dumps({"items": [self._described(one) for one in self.objects]}).encode())
+        else:
+            self.send_error(404)
+
+    def _described(self, name: str) -> dict[str, str]:
+        size = str(len(self.objects[name]))
+        return {"name": name, "bucket": "rooms", "size": size, "generation": "1", "etag": "a"}
+
+    def _send(self, content: bytes, kind: str = "application/json") -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
+
+
+@contextmanager
+def silent_server() -> Iterator[str]:
+    """A server that takes connections and says nothing; yields its address."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}"

@@ -1,0 +1,106 @@
+"""What is said of servers that fail, and how soon."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import ClearwayError
+from clearway.remote import store
+from clearway.remote.cache import fetched
+from helpers.servers_of_files import CutShort, GoogleStore, Shrunk, files_of, silent_server, web_server
+
+SUFFIXES = (".h5",)
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    yield
+    left = [path for path in (tmp_path / "cache/remote").glob("*") if not path.name.startswith(".")]
+    assert all((path / "address.txt").exists() for path in left)
+    assert not list((tmp_path / "cache/remote").glob("*.part"))
+
+
+def told(address: str) -> str:
+    """What is said of an address, without the address."""
+    with pytest.raises(ClearwayError) as caught:
+        fetched([address], SUFFIXES)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(f"{address}: ")
+    return str(caught.value).removeprefix(f"{address}: ")
+
+
+def test_what_is_not_there(s3: Callable[[str, bytes], None], tmp_path: Path) -> None:
+    s3("a/b.txt", b"no scene")
+    assert told("s3://no-such-bucket/a") == "there is nothing there. Check the address"
+    assert told("s3://no-such-bucket/a.h5") == "there is nothing there. Check the address"
+    assert told("s3://rooms/a/c.h5") == "there is nothing there. Check the address"
+    assert told("s3://rooms/a") == "no file ending in .h5 there. Check the address"
+    with web_server(files_of(tmp_path)) as address:
+        assert told(f"{address}/c.h5") == "there is nothing there. Check the address"
+        assert told(f"{address}/c") == "there is nothing there. Check the address"
+    assert told(f"{address}/c.h5").startswith("cannot be reached or read (Cannot connect to host 127.0.0.1")
+
+
+def test_without_credentials(s3: Callable[[str, bytes], None], monkeypatch: pytest.MonkeyPatch) -> None:
+    from s3fs import S3FileSystem
+
+    S3FileSystem.clear_instance_cache()
+    monkeypatch.delenv("AWS_ACCESS_KEY_ID")
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", "/nowhere")
+    assert told("s3://rooms/a.h5").startswith("may not be opened (Unable to locate credentials). Check the credentials")
+
+
+@pytest.mark.parametrize("scheme", ["http", "s3"])
+def test_a_server_that_says_nothing_is_given_up(
+    scheme: str, s3: Callable[[str, bytes], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from s3fs import S3FileSystem
+
+    S3FileSystem.clear_instance_cache()
+    monkeypatch.setattr(store, "SILENCE_S", 0.2)
+    with silent_server() as address:
+        monkeypatch.setenv("AWS_ENDPOINT_URL", address)
+        began = time.monotonic()
+        said = told("s3://rooms/a" if scheme == "s3" else f"{address}/a.h5")
+    assert time.monotonic() - began < 5
+    assert said.startswith("no answer in ")
+
+
+def test_a_question_is_given_up_after_a_time_whatever_the_library_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "ANSWER_S", 0.3)
+    with silent_server() as address:
+        assert told(f"{address}/a.h5") == "no answer in 0 s. Check the network and the server, then try again"
+
+
+@pytest.mark.parametrize("handler", [CutShort, Shrunk])
+def test_half_a_file_is_none(handler: type[CutShort], tmp_path: Path) -> None:
+    with web_server(handler) as address:
+        said = told(f"{address}/a.h5")
+    assert "payload is not completed" in said if handler is CutShort else said.startswith("4 of 10 bytes came")
+    assert not list((tmp_path / "cache/remote").rglob("a.h5"))
+
+
+def test_signatures_are_not_told(tmp_path: Path) -> None:
+    with web_server(files_of(tmp_path)) as address, pytest.raises(ClearwayError) as caught:
+        fetched([f"{address}/a.h5?signature=secret"], SUFFIXES)
+    assert "secret" not in str(caught.value)
+
+
+def test_google_s_store(monkeypatch: pytest.MonkeyPatch) -> None:
+    GoogleStore.objects = {"a/1.h5": b"one", "a/2.h5": b"two", "a/no.txt": b"no"}
+    with web_server(GoogleStore) as address:
+        monkeypatch.setenv("STORAGE_EMULATOR_HOST", address)
+        paths = fetched(["gs://rooms/a", "gs://rooms/a/2.h5"], SUFFIXES)
+    assert [path.read_bytes() for path in paths] == [b"one", b"two", b"two"]
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    assert told("https://127.0.0.1/a.h5") == (
+        "https:// needs another package. Install it: pip install 'clearway[https]'"
+    )

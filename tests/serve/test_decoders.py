@@ -1,0 +1,212 @@
+"""Decoder processes: bounded, killed, replaced, ended with their service."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import closing
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from clearway.serve.decoders import Decoders, Standing
+from clearway.serve.faults import Fault
+from clearway.serve.limits import Limits
+from clearway.serve.service import Service
+from helpers.serving import ENVIRONMENT, OWNER, TOKENS, grey, picture_bytes
+from helpers.sums import Sums, plain
+
+Result = TypeVar("Result")
+PATIENT_S = 20  # for what must happen, on a busy machine
+NOISE = np.random.default_rng(0).integers(0, 256, (900, 1200, 3), np.uint8)
+HEAVY = picture_bytes(NOISE, "WEBP", quality=90, method=0)  # some 60 ms of processor time
+HASTY = Limits(decode_s=0.01, slow_decode_s=5)
+
+
+def with_decoders(limits: Limits, task: Callable[[Decoders], Awaitable[Result]]) -> Result:
+    async def run() -> Result:
+        with closing(Decoders(limits)) as decoders:
+            return await task(decoders)
+
+    return asyncio.run(run())
+
+
+def processes(decoders: Decoders) -> list[int]:
+    lanes = decoders._quick.decoders + decoders._slow.decoders
+    return [decoder._process.pid for decoder in lanes if decoder._process is not None]
+
+
+def is_there(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_pictures_come_back_and_refusals_too() -> None:
+    async def task(decoders: Decoders) -> None:
+        found = await decoders.decode(picture_bytes(NOISE), OWNER, Standing())
+        assert np.array_equal(found, NOISE)
+        for content, code in ((b"nonsense", "unsupported_picture"), (grey(1)[:-28], "unreadable_picture")):
+            with pytest.raises(Fault) as caught:
+                await decoders.decode(content, OWNER, Standing())
+            assert caught.value.code == code
+        assert decoders.replaced == 0
+
+    with_decoders(Limits(), task)
+
+
+def test_a_picture_that_overruns_is_tried_slowly_and_the_next_ones_at_once() -> None:
+    async def task(decoders: Decoders) -> None:
+        standing = Standing()
+        for _ in range(2):
+            assert (await decoders.decode(HEAVY, OWNER, standing)).shape == NOISE.shape
+            assert decoders.replaced == 1  # by the first alone
+        assert not standing.proven
+        await decoders.decode(grey(1), "another", other := Standing())
+        assert other.proven and not decoders.stalled
+
+    with_decoders(HASTY, task)
+
+
+def test_a_picture_that_overruns_slowly_too_is_refused() -> None:
+    async def task(decoders: Decoders) -> None:
+        with pytest.raises(Fault, match="takes too long to decode"):
+            await decoders.decode(HEAVY, OWNER, Standing())
+        assert decoders.replaced == 2
+        assert (await decoders.decode(grey(7), OWNER, Standing())).max() == 7
+
+    with_decoders(Limits(decode_s=0.01, slow_decode_s=0.02), task)
+
+
+def test_who_lets_pictures_overrun_in_ever_new_sessions_is_slow_in_all_but_proven_ones() -> None:
+    async def task(decoders: Decoders) -> None:
+        proven = Standing(proven=True)
+        decoders._overruns.add(OWNER, 1.5)
+        await decoders.decode(grey(1), OWNER, new := Standing())
+        assert not new.proven and len(processes(decoders)) == 1  # the slow one
+        await decoders.decode(grey(1), OWNER, proven)
+        assert len(processes(decoders)) == 2
+
+    with_decoders(Limits(), task)
+
+
+def test_memory_is_bounded() -> None:
+    async def task(decoders: Decoders) -> None:
+        with pytest.raises(Fault) as caught:
+            await decoders.decode(picture_bytes(np.zeros((4000, 4000, 3), np.uint8)), OWNER, Standing())
+        assert caught.value.code == "unreadable_picture"
+
+    with_decoders(Limits(picture_pixels=4000 * 4000, decoder_bytes=90 << 20), task)
+
+
+def test_a_stalled_decoder_is_noticed_ended_and_replaced() -> None:
+    async def task(decoders: Decoders) -> None:
+        decoders._quick.decoders[1:] = []
+        decoders._quick._idle[:] = decoders._quick.decoders
+        await decoders.decode(grey(1), OWNER, Standing())
+        (process,) = processes(decoders)
+        os.kill(process, signal.SIGSTOP)
+        asked = asyncio.create_task(decoders.decode(grey(9), OWNER, Standing()))
+        until = time.monotonic() + PATIENT_S
+        while not decoders.stalled and time.monotonic() < until:
+            await asyncio.sleep(0.01)
+        assert decoders.stalled and not asked.done()
+        assert (await asked).max() == 9
+        assert not decoders.stalled and not is_there(process) and process not in processes(decoders)
+
+    with_decoders(Limits(decode_s=0.1, stall_s=1.0), task)
+
+
+def test_a_decoder_that_was_killed_meanwhile_costs_nobody_a_picture() -> None:
+    async def task(decoders: Decoders) -> None:
+        decoders.start()
+        for process in processes(decoders):
+            os.kill(process, signal.SIGKILL)
+            os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT)
+        assert (await decoders.decode(grey(3), OWNER, Standing())).max() == 3
+        assert decoders.replaced == 0
+
+    with_decoders(Limits(), task)
+
+
+def test_the_answer_to_a_picture_given_up_is_nobody_else_s() -> None:
+    async def task(decoders: Decoders) -> None:
+        for _ in range(5):
+            given_up = asyncio.create_task(decoders.decode(HEAVY, OWNER, Standing()))
+            await asyncio.sleep(0.02)
+            given_up.cancel()
+            assert (await decoders.decode(grey(5), OWNER, Standing())).shape == plain(5).shape
+
+    with_decoders(Limits(), task)
+
+
+def test_a_service_whose_decoders_cannot_start_is_not_ready(monkeypatch) -> None:
+    async def task() -> None:
+        service = Service(Sums(), Limits(), TOKENS)
+        session = service.open(OWNER, "argmax", None)
+        monkeypatch.setattr(sys, "executable", "/nowhere/python")
+        with closing(service.decoders):
+            with pytest.raises(Fault, match="no picture can be decoded"):
+                await service.set_target(session, grey(1))
+            assert not service.ready
+            monkeypatch.undo()
+            await service.set_target(session, grey(1))
+            assert service.ready
+
+    asyncio.run(task())
+
+
+def test_none_is_left_once_they_are_closed() -> None:
+    async def task(decoders: Decoders) -> list[int]:
+        asked = asyncio.create_task(decoders.decode(HEAVY, OWNER, Standing()))
+        await asyncio.sleep(0.02)
+        decoders.start()
+        found = processes(decoders)
+        decoders.close()
+        with pytest.raises(Fault):
+            await asked
+        return found
+
+    started = with_decoders(Limits(), task)
+    assert started and not any(map(is_there, started))
+
+
+PROGRAM = """
+import asyncio, signal, sys
+from clearway.serve.decoders import Decoders, Standing
+from clearway.serve.limits import Limits
+from helpers.serving import grey
+
+async def main():
+    decoders = Decoders(Limits())
+    decoders.start()
+    await decoders.decode(grey(1), "me", Standing())
+    print(*(decoder._process.pid for decoder in decoders._quick.decoders), flush=True)
+    await asyncio.sleep(60)
+
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup starts programs that ignore it
+asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+def test_decoders_end_with_their_parent(number) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM], env=ENVIRONMENT, stdout=subprocess.PIPE, text=True
+    ) as parent:
+        assert parent.stdout is not None
+        started = [int(word) for word in parent.stdout.readline().split()]
+        assert started and all(map(is_there, started))
+        parent.send_signal(number)
+    until = time.monotonic() + PATIENT_S
+    while any(map(is_there, started)) and time.monotonic() < until:
+        time.sleep(0.02)
+    assert not any(map(is_there, started))

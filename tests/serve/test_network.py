@@ -1,0 +1,215 @@
+"""The service on an open network: TLS, strangers, wrong tokens, a port for health, tokens that change, its end."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import socket
+import ssl
+import subprocess
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+
+from clearway.errors import ClearwayError
+from clearway.serve.attempts import Attempts
+from clearway.serve.limits import Limits
+from clearway.serve.run import check_tls
+from clearway.serve.service import Service
+from clearway.serve.tokens import Tokens
+from helpers.running import PATIENT_S, running
+from helpers.serving import OWNER, TOKEN, TOKENS, grey
+from helpers.sums import Sums, plain
+
+AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
+
+
+def until_closed(connection: socket.socket) -> bytes:
+    found = b""
+    try:
+        while part := connection.recv(65536):
+            found += part
+    except ConnectionResetError:
+        pass
+    return found
+
+
+def certified(folder: Path) -> tuple[Path, Path]:
+    """A certificate for 127.0.0.1 that is its own authority, and its key."""
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl, which makes the certificate, is not installed")
+    certificate, key = folder / "cert.pem", folder / "key.pem"
+    words = [
+        "openssl",
+        "req",
+        "-x509",
+        "-newkey",
+        "ec",
+        "-pkeyopt",
+        "ec_paramgen_curve:prime256v1",
+        "-nodes",
+        "-days",
+        "1",
+        "-subj",
+        "/CN=127.0.0.1",
+    ]
+    more = ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
+    subprocess.run([*words, *more], check=True, capture_output=True)
+    return certificate, key
+
+
+def test_over_tls_an_episode_is_walked_and_plain_http_is_not_answered(tmp_path) -> None:
+    certificate, key = certified(tmp_path)
+    check_tls(certificate, key)
+    with running(tls=(str(certificate), str(key))) as service:
+        trusting = ssl.create_default_context(cafile=str(certificate))
+        url = f"https://127.0.0.1:{service.port}"
+        with httpx.Client(base_url=url, headers=AUTHORISED, verify=trusting, timeout=PATIENT_S) as http:
+            session = http.post("/sessions", json={"selection": "argmax"}).json()["session_id"]
+            kind = {"content-type": "image/png"}
+            assert http.put(f"/sessions/{session}/target", content=grey(1), headers=kind).status_code == 204
+            assert http.post(f"/sessions/{session}/steps", content=grey(2), headers=kind).json()["value"] == 1008
+        with service.connected() as connection:
+            connection.sendall(b"GET /health HTTP/1.1\r\nHost: x\r\n\r\n")
+            assert b"200" not in until_closed(connection)
+        with pytest.raises(httpx.ConnectError):
+            httpx.get(f"{url}/health", timeout=PATIENT_S)  # an authority that nobody knows
+
+
+def test_certificates_that_are_none(tmp_path) -> None:
+    certificate, key = certified(tmp_path)
+    (tmp_path / "other").mkdir()
+    _, other = certified(tmp_path / "other")
+    for first, second, part in (
+        (certificate, None, "go together"),
+        (None, key, "go together"),
+        (certificate, tmp_path / "x", "no regular file"),
+        (Path("/dev/zero"), key, "no regular file"),
+        (key, key, "in PEM"),
+        (certificate, other, "in PEM"),
+    ):
+        with pytest.raises(ClearwayError, match=part):
+            check_tls(first, second)
+
+
+def test_strangers_keep_no_connection_and_not_many() -> None:
+    """Idle ones after `GET /health`, as many as the service has, once kept everybody else out."""
+    with running(patience_s=1.0, connections=40, strangers=10) as service:
+        held = [service.connected() for _ in range(60)]
+        try:
+            for connection in held[-10:]:
+                connection.sendall(b"GET /health HTTP/1.1\r\nHost: x\r\n\r\n")
+                assert connection.recv(65536).startswith(b"HTTP/1.1 200")
+            with service.client() as client:
+                assert client.agent()["scene"] == "attic"
+            for connection in held:
+                until_closed(connection)  # within the patience, not the 75 s of those who have shown a token
+        finally:
+            for connection in held:
+                connection.close()
+
+
+def test_health_and_metrics_on_a_port_of_their_own() -> None:
+    with running(health=True) as service:
+        own = f"http://127.0.0.1:{service.health_port}"
+        for path in ("/health", "/ready", "/metrics"):
+            assert httpx.get(own + path, timeout=PATIENT_S).status_code == 200
+            assert httpx.get(service.url + path, headers=AUTHORISED, timeout=PATIENT_S).status_code == 404
+        assert httpx.get(f"{own}/agent", headers=AUTHORISED, timeout=PATIENT_S).status_code == 404
+        assert httpx.get(f"{service.url}/agent", headers=AUTHORISED, timeout=PATIENT_S).status_code == 200
+
+
+@pytest.mark.parametrize("proxy", [None, "127.0.0.1"])
+def test_who_asks_is_told_by_a_trusted_proxy_alone(proxy) -> None:
+    """The fourth wrong token of an address is too many; a header makes it another address where it is believed."""
+    with running(proxy=proxy, wrong_tokens=3) as service:
+        codes = []
+        for number in range(4):
+            headers = {"authorization": "Bearer wrong", "x-forwarded-for": f"192.0.2.{number}"}
+            codes.append(httpx.get(f"{service.url}/agent", headers=headers, timeout=PATIENT_S).status_code)
+        assert codes == [401, 401, 401, 401 if proxy else 429]
+
+
+def test_wrong_tokens_keep_out_nobody_whose_token_was_right_there(called) -> None:
+    client = called(Service(Sums(), Limits(wrong_tokens=3), TOKENS), None)
+    assert client.get("/agent", headers=AUTHORISED).status_code == 200
+    wrong = {"authorization": "Bearer wrong"}
+    answers = [client.get("/agent", headers=wrong) for _ in range(5)]
+    assert [answer.status_code for answer in answers] == [401, 401, 401, 429, 429]
+    assert answers[-1].json()["error"]["code"] == "too_many_attempts" and answers[-1].headers["retry-after"] == "60"
+    assert client.get("/agent", headers=AUTHORISED).status_code == 200
+
+
+def test_a_minute_forgives_wrong_tokens() -> None:
+    now = [0.0]
+    attempts = Attempts(2, lambda: now[0])
+    for token in ("a", "b"):
+        assert attempts.may_try("here", token)
+        attempts.note("here", token, False)
+    assert not attempts.may_try("here", "right") and attempts.may_try("there", "right")
+    now[0] = 31.0
+    assert attempts.may_try("here", "right")
+
+
+def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_path) -> None:
+    """Also where nohup has told the process to ignore it."""
+    path, new = tmp_path / "tokens", 20 * "n"
+    path.write_text(f"{OWNER} {TOKEN}\n")
+    path.chmod(0o600)
+
+    def status(service, token: str) -> int:
+        headers = {"authorization": f"Bearer {token}"}
+        return httpx.get(f"{service.url}/agent", headers=headers, timeout=PATIENT_S).status_code
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with running(tokens=str(path), wrong_tokens=10_000) as service:
+            assert (status(service, TOKEN), status(service, new)) == (200, 401)
+            path.write_text(f"{OWNER} {new}\n")
+            service.process.send_signal(signal.SIGHUP)
+            until = time.monotonic() + PATIENT_S
+            while status(service, new) != 200 and time.monotonic() < until:
+                time.sleep(0.05)
+            assert (status(service, TOKEN), status(service, new)) == (401, 200)
+            path.write_text("nonsense\n")
+            service.process.send_signal(signal.SIGHUP)
+            assert status(service, new) == 200
+            service.process.send_signal(signal.SIGTERM)
+            _, err = service.process.communicate(timeout=PATIENT_S)
+            assert "tokens were read again" in err and "the tokens stay as they were" in err and new not in err
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_large_bodies_together_are_bounded() -> None:
+    service = Service(Sums(), Limits(bodies_bytes=100), Tokens([("crowd", 20 * "c"), ("guest", 20 * "g")]))
+    service.hold_bytes("crowd", 50)
+    with pytest.raises(Exception, match="too many large requests"):
+        service.hold_bytes("crowd", 1)
+    service.hold_bytes("guest", 50)
+    service.free_bytes("crowd", 50)
+    service.hold_bytes("crowd", 50)
+
+
+def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
+    service = Service(Sums(), Limits(bodies_bytes=1000), TOKENS)
+    client = called(service)
+    path = f"/sessions/{client.post('/sessions', json={}).json()['session_id']}/target"
+    kind = {"content-type": "image/png"}
+    for _ in range(3):
+        assert client.put(path, content=bytes(2000), headers=kind).json()["error"]["code"] == "overloaded"
+        assert client.put(path, content=grey(1), headers=kind).status_code == 204
+    assert service._bodies.total() == 0
+
+
+def test_it_ends_in_time_whatever_is_under_way_and_tells_who_waits() -> None:
+    with running(seconds=300, deadline_s=1.0, idle_s=60) as service, service.client() as client:
+        session = client.session()
+        with pytest.raises(Exception, match="deadline_passed"):
+            session.set_target(plain(1))
+        begun = time.monotonic()
+        service.process.send_signal(signal.SIGTERM)
+        service.process.wait(timeout=PATIENT_S)
+        assert time.monotonic() - begun < 15  # 1 s for a request, 1 s and 3 s more; the rest is for a busy machine
