@@ -85,7 +85,7 @@ class Reproduce:
             ray=self.ray,
             commands=(shlex.join(["clearway", *sys.argv[1:]]),),
         )
-        _write(reproduce(request, show_progress=True), self.out, self.json)
+        _write(reproduce(request, show_progress=True, tell=say), self.out, self.json)
 
 
 @dataclass(frozen=True)

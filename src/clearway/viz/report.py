@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from clearway.experiments.in_short import in_short, is_judged
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.files import json_text, read_json, written_whole
 from clearway.markdown import table_lines
@@ -102,8 +103,10 @@ def value_text(value: Value) -> str:
 
 
 def _summary(sections: Sequence[Section]) -> list[ReportTable]:
-    """All verdicts at a glance, the paper's claims apart; nothing where there are none."""
-    tables = []
+    """All verdicts at a glance, the paper's claims apart; nothing where none is judged."""
+    tables: list[ReportTable] = []
+    if not is_judged(sections):
+        return tables
     for title, further in (("The paper's claims at a glance", False), ("Further questions", True)):
         claims = [(claim, section.title) for section in sections for claim in section.claims]
         rows = tuple((claim.text, claim.verdict, where) for claim, where in claims if claim.further == further)
@@ -133,15 +136,16 @@ def _table_notes(table: ReportTable) -> tuple[str, ...]:
 
 
 def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
-    lines = [f"# {title}", ""]
+    lines, judged = [f"# {title}", ""], is_judged(sections)
     lines += [f"**{warning}**", ""] if warning else []
+    lines += [*(f"- {line}" for line in in_short(sections)), ""]
     for table in _summary(sections):
         lines += [f"## {table.title}", "", *_markdown_table(table)]
     for section in sections:
         lines += [f"## {section.title}", "", section.text, ""]
         missing = _missing_text(section)
         lines += [f"*{missing}*", ""] if missing else []
-        if section.claims:
+        if section.claims and judged:
             lines += _markdown_table(_verdict_rows(section.claims))
         for table in section.tables:
             lines += [f"### {table.title}", "", *_markdown_table(table)]
@@ -186,15 +190,16 @@ def _page(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[
         "report",
         title=title,
         warning=warning,
+        in_short=in_short(sections),
         summary=[_shown(table) for table in _summary(sections)],
-        sections=[_section(folder, section) for section in sections],
+        sections=[_section(folder, section, is_judged(sections)) for section in sections],
         facts=facts,
     )
 
 
-def _section(folder: Path, section: Section) -> dict[str, Any]:
-    """A section as the page's template names it."""
-    verdicts = [_verdict_rows(section.claims)] if section.claims else []
+def _section(folder: Path, section: Section, judged: bool) -> dict[str, Any]:
+    """A section as the page's template names it; without verdicts where the report judges nothing."""
+    verdicts = [_verdict_rows(section.claims)] if section.claims and judged else []
     return {
         "name": section.name,
         "title": section.title,
