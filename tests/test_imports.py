@@ -18,6 +18,7 @@ ORDER = (
         "markdown",
         "colours",
         "progress",
+        "regular_files",
         "children",
         "ray_cluster",
         "remote",

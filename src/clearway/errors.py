@@ -10,6 +10,18 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
+def reason_of(fault: BaseException) -> str:
+    """What was wrong, in one line, for an error of ours that names the file itself."""
+    told = getattr(fault, "strerror", None) or fault
+    return " ".join(str(told).split())[:200] or type(fault).__name__
+
+
+def is_out_of_memory(fault: BaseException) -> bool:
+    """Whether an allocation failed: PyTorch, and what is written in C++, say so by their words alone."""
+    told = str(fault).lower()
+    return isinstance(fault, MemoryError) or any(words in told for words in ("allocate memory", "out of memory"))
+
+
 class ClearwayError(Exception):
     """Bad input or a missing requirement. The message says what, where and the remedy, in one line.
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import ClearwayError
+from clearway.regular_files import read_text
 
 CACHE_VARIABLE = "CLEARWAY_CACHE"
 PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
@@ -151,12 +152,10 @@ def read_json(path: Path, most_bytes: int = MAX_JSON_BYTES) -> Any:
     """What a JSON file in UTF-8 holds.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: it is larger than `most_bytes`, or not JSON.
+        OSError: it cannot be read, is no regular file, or larger than `most_bytes`.
+        ValueError: it is not JSON.
     """
-    if path.stat().st_size > most_bytes:
-        raise ValueError(f"it is larger than {most_bytes >> 20} MiB")
-    return parse_json(path.read_text(encoding="utf-8"))
+    return parse_json(read_text(path, most_bytes))
 
 
 def parse_json(text: str) -> Any:
@@ -165,6 +164,18 @@ def parse_json(text: str) -> Any:
         return json.loads(text)
     except RecursionError as fault:
         raise ValueError("it is nested too deep") from fault
+
+
+def safetensors_metadata(content: bytes) -> dict[str, Any]:
+    """The texts by name that stand in the header of a safetensors file.
+
+    Raises:
+        ValueError, KeyError, TypeError: it has no such header.
+    """
+    length = int.from_bytes(content[:8], "little")
+    if len(content) < 8 or length > len(content) - 8:
+        raise ValueError("its header is cut off")
+    return dict(parse_json(content[8 : 8 + length].decode())["__metadata__"])
 
 
 def cache_dir() -> Path:

@@ -10,6 +10,7 @@ import yaml
 
 from clearway.errors import ClearwayError
 from clearway.files import written_whole
+from clearway.regular_files import read_bytes
 
 MAX_BYTES = 1024**2
 
@@ -43,12 +44,9 @@ def read_settings(path: Path) -> dict[str, Any]:
         ClearwayError: there is no such file, it is too large, no YAML, or no mapping with words as keys.
     """
     try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+        content = read_bytes(path, MAX_BYTES)
     except OSError as fault:
         raise ClearwayError(f"{path}: not readable ({fault.strerror}). Name a YAML file of settings") from fault
-    if len(content) > MAX_BYTES:
-        raise ClearwayError(f"{path}: larger than {MAX_BYTES // 1024**2} MiB, too large for settings. Name another")
     try:
         read = yaml.load(content.decode("utf-8"), _Loader)
     except yaml.MarkedYAMLError as fault:

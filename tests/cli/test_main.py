@@ -12,7 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args, get_type_hints
 
+import numpy as np
 import pytest
+import torch
 
 import clearway as package
 from clearway.cli.console import showing_warnings
@@ -164,10 +166,22 @@ def test_exit_codes(clearway, monkeypatch, error, code, said):
     assert (answer.code, answer.out, answer.err) == (code, "", said)
 
 
+@pytest.mark.parametrize(
+    "allocate",
+    [lambda: bytearray(1 << 60), lambda: np.zeros(1 << 58), lambda: torch.zeros(1 << 58)],
+    ids=["Python", "NumPy", "PyTorch"],
+)
+def test_memory_that_runs_out_is_one_line(clearway, monkeypatch, allocate):
+    monkeypatch.setattr(Inspect, "run", lambda self: allocate())
+    line = clearway("scenes", "inspect", "x.h5").refusal("not enough memory (", "--resume")
+    assert "Free some" in line
+
+
 def test_our_own_mistakes_are_not_hidden(clearway, monkeypatch):
-    monkeypatch.setattr(Inspect, "run", raising(ZeroDivisionError()))
-    with pytest.raises(ZeroDivisionError):
-        clearway("scenes", "inspect", "x.h5")
+    for mistake in (ZeroDivisionError, RuntimeError):
+        monkeypatch.setattr(Inspect, "run", raising(mistake()))
+        with pytest.raises(mistake):
+            clearway("scenes", "inspect", "x.h5")
 
 
 def test_warnings_are_a_line_on_standard_error(clearway, dump, tmp_path):

@@ -59,7 +59,7 @@ def test_a_file_larger_than_onnx_allows_is_not_read(tmp_path) -> None:
     path = tmp_path / "large.onnx"
     with path.open("wb") as file:
         file.truncate(MAX_BYTES + 1)  # a hole: takes no space
-    assert "larger than an ONNX file can be" in refusal(path)
+    assert "larger than 2048 MiB" in refusal(path)
 
 
 CARD = Card("attic", ("a", "b"), 4, 32, True, {"name": "x"}, {"pixels": None}, (3, 4), {"seed": 0})

@@ -54,6 +54,14 @@ def sections(setting: Setting) -> dict[str, Section]:
     return {name: experiment.section(setting) for name, experiment in EXPERIMENTS.items()}
 
 
+def judged(sections: dict[str, Section]) -> dict[str, Section]:
+    """The same as if of enough runs."""
+    return {
+        name: replace(section, claims=tuple(replace(claim, p=0.5) for claim in section.claims))
+        for name, section in sections.items()
+    }
+
+
 def column(table: ReportTable, heading: str) -> list:
     """The values under a heading."""
     return [row[table.headings.index(heading)] for row in table.rows]
@@ -294,6 +302,7 @@ def test_pareto_front_by_hand() -> None:
 def test_the_report_is_complete_and_stands_alone(
     tmp_path: Path, setting: Setting, sections: dict[str, Section]
 ) -> None:
+    sections = judged(sections)
     page = write_report(
         tmp_path, "Title", list(sections.values()), {"command": "clearway <reproduce>"}, "Only smoke.", setting.scenes
     )
@@ -396,7 +405,7 @@ def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[
     assert "default: fewer collisions than with a penalty for bumping" in further
     assert "paper, unclipped: fewer collisions than with the shortest-path reward" in further
     assert "paper: fewer collisions than with the shortest-path reward" not in further
-    summary = report._summary(list(sections.values()))
+    summary = report._summary(list(judged(sections).values()))
     assert [len(table.rows) for table in summary] == [30, 28]
 
 

@@ -28,6 +28,8 @@ from clearway.learn.checkpoint import FORMAT_VERSION, MANIFEST_FILE, NETWORK_FIL
 from clearway.learn.load import load_agent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import train
+from clearway.mapping.map_files import read_map, write_map
+from clearway.mapping.room_map import RoomMap
 from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
@@ -377,6 +379,46 @@ def run_cases() -> Iterator[Case]:
         yield run_case(files, f"tensors: {kind}", changes, checkpoint)
     for kind, text in {"100,000 deep": DEEP, "Inf": '{"format_version": Infinity}', "null": "null"}.items():
         yield Case("episodes", kind, _file("trial.json", text.encode), read_trial, "trial.json")
+
+    for kind, line in FIGURES.items():
+        content = b'{"frames": 80, "seconds": 1}\n' + line + b"\n"
+        made = _file("metrics.jsonl", lambda content=content: content)
+        yield Case("hostile figures", kind, made, read_figures, "metrics.jsonl, line 2")
+    for kind, content in tensor_files(room_map()).items():
+        yield Case("hostile maps", kind, _file("room.map", lambda content=content: content), read_room_map, "room.map")
+
+
+def read_figures(path: Path) -> str:
+    return str(RunFolder(path.parent).metrics())
+
+
+def room_map() -> bytes:
+    """A map of one picture."""
+    shapes = {"room": (5, 5), "shut": (4, 5, 5), "taken": (1, 3), "features": (1, 3)}
+    with tempfile.TemporaryDirectory() as folder:
+        write_map(
+            Path(folder) / "room.map", RoomMap(**{name: np.zeros(shape) for name, shape in shapes.items()}), "eyes"
+        )
+        return (Path(folder) / "room.map").read_bytes()
+
+
+def read_room_map(path: Path) -> str:
+    return str(read_map(path, "eyes", 3))
+
+
+FIGURES = {
+    "100,000 deep": DEEP.encode(),
+    "a list": b"[]",
+    "a number": b"1e400",
+    "no UTF-8": b"\xff",
+    "NaN": b'{"frames": 160, "seconds": NaN}',
+    "Inf": b'{"frames": 160, "seconds": 1e400}',
+    "a number of 5,000 digits": b'{"frames": %s, "seconds": 1}' % (b"9" * 5000),
+    "frames of a half": b'{"frames": 0.5, "seconds": 1}',
+    "a text": b'{"frames": 160, "seconds": "\\u001b[2J"}',
+    "an object": b'{"frames": 160, "seconds": 1, "loss": {}}',
+    "nothing": b"",
+}
 
 
 def read_trial(path: Path) -> str:

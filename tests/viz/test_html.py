@@ -30,5 +30,5 @@ def test_content_that_a_template_misses_is_an_error_and_no_gap(template: str) ->
 
 def test_the_style_goes_into_pages_as_it_is() -> None:
     style = (TEMPLATES / "style.css").read_text(encoding="utf-8")
-    page = rendered_html("report", title="", warning="", summary=[], sections=[], facts={})
+    page = rendered_html("report", title="", warning="", in_short=(), summary=[], sections=[], facts={})
     assert "> * {" in style and f"<style>\n{style}" in page

@@ -1,6 +1,7 @@
 """The report's page, from sections written by hand."""
 
 from base64 import b64decode
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ TABLE = ReportTable(
 )
 MANY = ReportTable("many", "Many", ("n",), tuple((n,) for n in range(SHOWN_ROWS + 7)), folded=True)
 FIGURE = ReportFigure("line", 'A "line"', "x", "y", (Series("a", [0, 1], [1, 2]),))
-CLAIM = Claim("It <works>", "holds", "9 < 10")
+CLAIM = Claim("paper: it <works>", "holds", "9 < 10", p=0.01)
 SECTION = Section(
     "first", "First <section>", "What was done.", (TABLE, MANY), (FIGURE,), claims=(CLAIM,), missing=("run",)
 )
@@ -30,13 +31,21 @@ def test_everything_is_shown_and_nothing_is_taken_for_markup(written, page_parts
     shown = page_parts(written)
     for text in (
         "A & B", "Only <smoke>.", "First <section>", "What was done.", "Kept & shown", "<i>ours</i>", "1,234", LONG,
-        "A note.", "It <works>", "holds", "9 < 10", 'A "line"', "clearway reproduce --out '<here>'",
+        "A note.", "paper: it <works>", "holds", "9 < 10", 'A "line"', "clearway reproduce --out '<here>'",
         "1 run is not complete yet; the tables hold what is.",
     ):  # fmt: skip
         assert text in shown.texts
     assert not {"i", "here", "works", "smoke"} & {tag for tag, _ in shown.seen}
-    assert shown.texts.count("It <works>") == 2  # among all verdicts and in its section
-    assert [each.get("id") for each in shown.all("section")] == [None, "first", None]
+    assert shown.texts.count("paper: it <works>") == 2  # among all verdicts and in its section
+    assert "paper, 1 of the paper's claims. 1 hold: it <works>." in shown.texts
+    assert [each.get("id") for each in shown.all("section")] == [None, None, "first", None]
+
+
+def test_where_nothing_is_judged_no_verdict_is_listed(tmp_path, page_parts):
+    undecided = replace(SECTION, claims=(replace(CLAIM, verdict="undecided", p=None),))
+    page = write_report(tmp_path, "T", [undecided], {}, "", []).read_text(encoding="utf-8")
+    assert CLAIM.text not in page_parts(page).texts and "No claim is judged (1 are asked)" in page
+    assert CLAIM.text not in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
 def test_columns_of_words_stand_on_the_left(written, page_parts):

@@ -37,7 +37,7 @@ from clearway.cli.train import Train
 from clearway.cli.video import Video
 from clearway.cli.view import ViewRuns, ViewScene
 from clearway.cli.views import TakeViews
-from clearway.errors import ArgumentError, ClearwayError
+from clearway.errors import ArgumentError, ClearwayError, is_out_of_memory, reason_of
 
 DESCRIPTION = (
     "Train, evaluate and look at agents that walk to the place where a picture was taken "
@@ -116,6 +116,11 @@ def _exit_code(words: Sequence[str]) -> int:
             return 0
         where = f"{error.filename}: " if error.filename else ""
         return _refused(f"{where}{error.strerror or error}. Check the path, its permissions and the space left")
+    except (MemoryError, RuntimeError) as error:
+        if not is_out_of_memory(error):
+            raise
+        told = f"not enough memory ({reason_of(error)})"
+        return _refused(f"{told}. Free some, or ask for less at once; a training goes on with --resume")
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130

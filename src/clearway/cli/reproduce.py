@@ -85,7 +85,7 @@ class Reproduce:
             ray=self.ray,
             commands=(shlex.join(["clearway", *sys.argv[1:]]),),
         )
-        _write(reproduce(request, show_progress=True), self.out, self.json)
+        _write(reproduce(request, show_progress=True, tell=say), self.out, self.json)
 
 
 @dataclass(frozen=True)
@@ -109,10 +109,9 @@ class Report:
 
 def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     """Write the report into a folder and say where it is, or print it."""
-    import json
-
     from clearway.experiments.provenance import made_by
     from clearway.experiments.setting import ABOUT_LEARNERS
+    from clearway.files import read_json
     from clearway.viz.report import JSON, MARKDOWN, write_report
 
     setting = found.setting
@@ -131,5 +130,5 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     }
     page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning, setting.scenes)
     if as_json:
-        print_json(json.loads((out / JSON).read_text(encoding="utf-8")))
+        print_json(read_json(out / JSON))
     say(f"report: {page} and {out / MARKDOWN}")

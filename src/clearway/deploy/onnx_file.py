@@ -19,7 +19,9 @@ from clearway.agents.arrival import Arrival, arrival_of_json
 from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.deploy.agent import sight_of
 from clearway.deploy.card import ARRIVAL, EXPORT_AGAIN, SIAMESE, Card, card_from_json
+from clearway.deploy.onnx_graph_check import problem_of
 from clearway.errors import DeployError
+from clearway.regular_files import read_bytes
 
 CARD_KEY, CHECKSUM_KEY = "clearway", "clearway.sha256"
 MAX_BYTES = 1 << 31  # of one ONNX file, by its format
@@ -70,10 +72,12 @@ def read_onnx(path: Path, threads: int | None = None) -> OnnxFile:
         threads: processor threads; None: one a core.
 
     Raises:
-        DeployError: there is no such file, it is no exported agent or was changed, or onnxruntime is not installed.
+        DeployError: there is no such file, it is no exported agent, was changed, or asks for what none does, or
+            onnxruntime is not installed.
     """
     content = _content(path)
     check_seal(content, str(path))
+    _check_graph(content, str(path))
     session = _session(content, path, threads)
     metadata = session.get_modelmeta().custom_metadata_map
     return OnnxFile(session, card_from_json(metadata.get(CARD_KEY, ""), str(path)), str(path))
@@ -151,11 +155,19 @@ def _arrival_of(file: OnnxFile) -> Arrival | None:
 
 def _content(path: Path) -> bytes:
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise DeployError(f"{path}: larger than an ONNX file can be. {EXPORT_AGAIN}")
-        return path.read_bytes()
+        return read_bytes(path, MAX_BYTES)
     except OSError as fault:
         raise DeployError(f"{path}: cannot be read ({fault.strerror}). Check the path") from fault
+
+
+def _check_graph(content: bytes, source: str) -> None:
+    """Raise DeployError where a file asks for what no exported agent does."""
+    try:
+        problem = problem_of(content)
+    except ValueError as fault:
+        raise DeployError(f"{source}: not an agent's ONNX file ({fault}). {EXPORT_AGAIN}") from fault
+    if problem is not None:
+        raise DeployError(f"{source}: asks for {problem}, which no exported agent does. {EXPORT_AGAIN}")
 
 
 def _session(content: bytes, path: Path, threads: int | None) -> Any:

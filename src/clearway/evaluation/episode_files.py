@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from clearway.errors import RunError
+from clearway.errors import RunError, reason_of
 from clearway.evaluation.episodes import EpisodeTable
 from clearway.files import read_json, written_whole
 
@@ -40,7 +40,7 @@ def read_episodes(path: Path) -> tuple[EpisodeTable, dict[str, Any]]:
         columns = {name: np.array(content["episodes"][name], np.int64) for name in _COLUMNS}
         about = dict(content["about"])
     except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
-        raise RunError(f"{path}: not readable ({error}). Remove it, and it is made again") from error
+        raise RunError(f"{path}: not readable ({reason_of(error)}). Remove it, and it is made again") from error
     for name in _FLAGS:
         columns[name] = columns[name].astype(bool)
     if len({len(column) for column in columns.values()}) != 1:

@@ -8,19 +8,18 @@ runs/NAME/            run folders (`learn.run_folder`), each with one checkpoint
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from PIL import Image
 
 from clearway.errors import RunError
 from clearway.files import read_json
+from clearway.regular_files import sha256_of
 from clearway.scenes import hdf5
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
@@ -86,9 +85,8 @@ def load_example(folder: Path = SHIPPED) -> Example:
 
 
 def file_sum(path: Path) -> str:
-    """SHA-256 of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    """SHA-256 of a file. Raises OSError."""
+    return sha256_of(path)
 
 
 def write_pictures(path: Path, jpegs: list[bytes]) -> None:
@@ -105,7 +103,7 @@ def decoded(jpeg: bytes) -> np.ndarray:
 
 def _pictures(path: Path, count: int) -> np.ndarray:
     """The pictures (S, h, w, 3) uint8 that `write_pictures` kept."""
-    with h5py.File(path) as file:
+    with hdf5.opened(path) as file:
         content, ends = file["jpeg"][:].tobytes(), file["ends"][:].tolist()
     assert len(ends) == count, "the sums agree, and the pictures are of another scene"
     return np.stack([decoded(content[start:end]) for start, end in zip([0, *ends], ends, strict=False)])

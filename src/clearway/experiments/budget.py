@@ -73,7 +73,10 @@ SMOKE = Budget(
     5,
     most_scenes=1,
     whole_grid=False,
-    mark="Smoke budget: shows that everything runs. Its figures say nothing about the paper.",
+    mark=(
+        "Smoke budget: shows that everything runs here, and what a report looks like. It cannot show which agent is "
+        "better: its trainings end before anything is learnt, and two seeds decide nothing."
+    ),
 )
 """Shows within minutes that everything runs; its figures say nothing about the paper."""
 

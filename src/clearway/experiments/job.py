@@ -47,15 +47,7 @@ def do(out: Path, job: Job, threads: int) -> None:
     """
     set_threads(threads)
     run = job.run
-    scenes = _scenes(run)
-    request = RunRequest(
-        scenes=scenes,
-        targets={scene.name: targets for scene, targets in zip(run.scenes, run.targets, strict=True)},
-        learner=run.learner,
-        reward=run.reward,
-        seed=run.seed,
-        paths={scene.name: scene.path for scene in run.scenes},
-    )
+    request = request_of(run)
     folder = train(request, run_folder(out, run).path, resume=True, milestones=(run.halfway,))
     for trial in job.trials:
         path = trial_path(out, run, trial)
@@ -68,7 +60,23 @@ def do(out: Path, job: Job, threads: int) -> None:
                 "seed": trial.seed,
                 "step_limit": trial.step_limit,
             }
-            write_episodes(path, _walk(folder, scenes, run, trial), about)
+            write_episodes(path, _walk(folder, request.scenes, run, trial), about)
+
+
+def request_of(run: PlannedRun) -> RunRequest:
+    """What to train, with the scenes as they lie in their files.
+
+    Raises:
+        ClearwayError: a scene is missing or has changed.
+    """
+    return RunRequest(
+        scenes=_scenes(run),
+        targets={scene.name: targets for scene, targets in zip(run.scenes, run.targets, strict=True)},
+        learner=run.learner,
+        reward=run.reward,
+        seed=run.seed,
+        paths={scene.name: scene.path for scene in run.scenes},
+    )
 
 
 def episodes_of(out: Path, run: PlannedRun, trial: Trial) -> EpisodeTable | None:

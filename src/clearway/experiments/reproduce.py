@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -14,6 +14,7 @@ from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.correction import corrected
+from clearway.experiments.expected_time import told_time
 from clearway.experiments.job import is_done
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
@@ -80,10 +81,17 @@ HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a
 WHO_ASKED = ("names", "commands")  # parts that may differ between requests of one report
 
 
-def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reproduction:
+def reproduce(
+    request: ReproduceRequest, show_progress: bool = False, tell: Callable[[str], None] | None = None
+) -> Reproduction:
     """Do what is missing of the experiments and gather their sections.
 
     Experiments that earlier commands asked for with all else alike keep their place in the report.
+
+    Args:
+        request: see there.
+        show_progress: draw progress bars.
+        tell: told in a line, before the first run, how long all will take on this machine; None: nobody asks.
 
     Raises:
         ClearwayError: a scene cannot be had, or a run failed; what is complete stays.
@@ -94,8 +102,10 @@ def reproduce(request: ReproduceRequest, show_progress: bool = False) -> Reprodu
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
     jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
+    workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
+    if tell is not None and workers:
+        tell(told_time(jobs, left, workers, request.threads))
     with board(request.out, jobs, show_progress) as show:
-        workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
         run_jobs(request.out, left, workers=workers, threads=request.threads, show=show, ray=request.ray)
     return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
 

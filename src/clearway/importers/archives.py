@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 import struct
 import tempfile
@@ -11,7 +12,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
+from clearway.regular_files import opened
 
 ZIP_SUFFIX = ".zip"
 MAX_MEMBERS = 10_000
@@ -63,14 +65,14 @@ def unpacked(paths: Sequence[Path], suffixes: Sequence[str]) -> Iterator[list[Pa
 def _unpack(path: Path, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     folder.mkdir()
     try:
-        with zipfile.ZipFile(path) as archive:
+        with opened(path) as file, zipfile.ZipFile(file) as archive:
             members = _wanted(path, archive, suffixes)
-            left = min(MAX_BYTES, BLOCK_BYTES + MAX_RATIO * path.stat().st_size)  # members may share their bytes
+            size = os.fstat(file.fileno()).st_size
+            left = min(MAX_BYTES, BLOCK_BYTES + MAX_RATIO * size)  # members may share their bytes
             for member in members:
                 left -= _copy(path, archive, member, folder / PurePosixPath(member.filename).name, left)
     except _FAULTS as fault:
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
-        raise SceneError(path, f"cannot be unpacked ({reason})", GET_ANOTHER) from fault
+        raise SceneError(path, f"cannot be unpacked ({reason_of(fault)})", GET_ANOTHER) from fault
     return sorted(folder.iterdir())
 
 

@@ -8,6 +8,7 @@ columns `x1`, `z1`, `x2`, `z2` may name edges that are blocked, for example by a
 from __future__ import annotations
 
 import csv
+import io
 import math
 import warnings
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 from clearway.errors import SceneError
 from clearway.importers.photographs import HEIGHT_PX, photographs, picture_within
 from clearway.importers.pose_graph import recorded_pose_graph
+from clearway.regular_files import read_text
 from clearway.scenes.graph import components
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import MAX_COORDINATE_M, MAX_STATES, SceneWarning, check_scene
@@ -85,14 +87,13 @@ def read_images(
 
 def _rows(path: Path, columns: tuple[str, ...]) -> list[tuple[int, list[str]]]:
     """The columns of a CSV file, in this order, without its first line; with the number of each line."""
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
-    if path.stat().st_size > MAX_TABLE_BYTES:
-        raise SceneError(path, f"is larger than {MAX_TABLE_BYTES >> 20} MiB", "Give a table of poses")
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            lines = [(reader.line_num, line) for line in reader if line]
+        reader = csv.reader(io.StringIO(read_text(path, MAX_TABLE_BYTES, "utf-8-sig"), newline=""))
+        lines = [(reader.line_num, line) for line in reader if line]
+    except OSError as fault:
+        raise SceneError(path, f"cannot be read ({fault.strerror})", "Give a table of poses") from fault
     except (UnicodeDecodeError, csv.Error) as fault:
         raise SceneError(path, f"is no CSV file ({fault})", "Save it as comma-separated text in UTF-8") from fault
     head = [word.strip().lower() for word in lines[0][1]] if lines else []

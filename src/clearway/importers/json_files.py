@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from clearway import files
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 
 
 def read_json(path: Path) -> Any:
@@ -15,10 +15,9 @@ def read_json(path: Path) -> Any:
     Raises:
         SceneError: there is no such file, it is too large, or not JSON.
     """
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Give the whole folder of the data set")
     try:
         return files.read_json(path)
     except (OSError, ValueError) as fault:
-        reason = " ".join(str(fault).split())[:200]
-        raise SceneError(path, f"cannot be read as JSON ({reason})", "Get another copy") from fault
+        raise SceneError(path, f"cannot be read as JSON ({reason_of(fault)})", "Get another copy") from fault

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageOps
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 from clearway.importers.picture_limits import check_picture_size
+from clearway.regular_files import opened
 from clearway.scenes.file_pictures import file_stamp
 from clearway.scenes.memory_limits import array_limit
 
@@ -99,7 +100,7 @@ def photographs(paths: Sequence[Path], height_px: int = HEIGHT_PX, width_px: int
 def _opened(path: Path) -> Image.Image:
     """The picture as it is meant to be seen, not unpacked where it would be too large."""
     try:
-        with Image.open(path, formats=FORMATS) as picture:
+        with opened(path) as file, Image.open(file, formats=FORMATS) as picture:
             most = min(MAX_PICTURE_PIXELS, array_limit(path) // PIXEL_BYTES)
             if math.prod(picture.size) > most:
                 problem = f"has {picture.size[0]} x {picture.size[1]} pixels, more than {most:,} for a file of its size"
@@ -113,8 +114,7 @@ def _opened(path: Path) -> Image.Image:
         raise
     except (*_FAULTS, Image.DecompressionBombError) as fault:
         kinds = ", ".join(FORMATS)
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
-        raise SceneError(path, f"cannot be read as a picture ({reason})", f"Give one of {kinds}") from fault
+        raise SceneError(path, f"cannot be read as a picture ({reason_of(fault)})", f"Give one of {kinds}") from fault
 
 
 def _photograph(path: Path, height_px: int, width_px: int) -> np.ndarray:

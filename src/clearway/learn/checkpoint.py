@@ -22,14 +22,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load, save_file
 from torch import Tensor
 
-from clearway.errors import RunError
+from clearway.errors import RunError, reason_of
 from clearway.files import read_json
+from clearway.regular_files import read_bytes, sha256_of
 
 FORMAT_VERSION = 1
 NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE = "network.safetensors", "training.safetensors", "checkpoint.json"
+MAX_BYTES = 8 * 1024**3  # of a file
 KEPT = 2  # newest checkpoints that stay
 _NAME = re.compile(r"frames-(\d{12})")
 
@@ -64,7 +66,7 @@ def write_checkpoint(
         sums = {}
         for name, tensors in ((NETWORK_FILE, network), (TRAINING_FILE, training)):
             save_file({key: tensor.detach().cpu().contiguous() for key, tensor in tensors.items()}, part / name)
-            sums[name] = _sha256(part / name)
+            sums[name] = sha256_of(part / name)
         manifest = {"format_version": FORMAT_VERSION, **vars(progress), "sha256": sums}
         (part / MANIFEST_FILE).write_text(json.dumps(manifest, indent=2) + "\n")
         _to_disk(part)
@@ -128,11 +130,14 @@ def read_training(path: Path) -> dict[str, Tensor]:
 
 
 def _read_tensors(path: Path, name: str) -> dict[str, Tensor]:
-    _checked_manifest(path)
+    manifest = _checked_manifest(path)
     try:
-        return load_file(path / name)
+        content = read_bytes(path / name, MAX_BYTES)
+        if hashlib.sha256(content).hexdigest() != manifest["sha256"][name]:
+            raise _Damaged(f"{path / name}: has changed while it was read. Use another checkpoint")
+        return load(content)
     except (OSError, SafetensorError) as error:
-        raise _Damaged(f"{path / name}: cannot be read ({error}). Use another checkpoint") from error
+        raise _Damaged(f"{path / name}: cannot be read ({reason_of(error)}). Use another checkpoint") from error
 
 
 def checkpoints(folder: Path) -> list[Path]:
@@ -147,18 +152,13 @@ def _checked_manifest(path: Path) -> dict:
         if version > FORMAT_VERSION:  # it may hold other files, so this comes before looking for ours
             raise RunError(f"{path}: written by a newer clearway (format {version}). Upgrade clearway")
         sums = dict(manifest["sha256"])
-        actual = {name: _sha256(path / name) for name in (NETWORK_FILE, TRAINING_FILE)}
+        actual = {name: sha256_of(path / name) for name in (NETWORK_FILE, TRAINING_FILE)}
     except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise _Damaged(f"{path}: the checkpoint is incomplete ({error}). Use another one") from error
     for name, digest in actual.items():
         if sums.get(name) != digest:
             raise _Damaged(f"{path / name}: its SHA-256 differs from the manifest's. Use another checkpoint")
     return manifest
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _to_disk(folder: Path) -> None:

@@ -25,13 +25,14 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 import numpy as np
 
 from clearway.choices import ZoneLevel
-from clearway.errors import ClearwayError, RunError
+from clearway.errors import ClearwayError, RunError, reason_of
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
+from clearway.regular_files import read_bytes, read_text
 from clearway.remote.address import origin
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.scene import Scene
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
 FORMAT_VERSION = 2
 SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
+MAX_METRICS_BYTES = 1024**3
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
 
 
@@ -268,7 +270,7 @@ class RunFolder:
                 f"{self.path}: no run here ({RUN_FILE} is missing). Name a folder that clearway train made"
             ) from error
         except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
-            raise RunError(f"{path}: not readable ({error}). Restore it or train again") from error
+            raise RunError(f"{path}: not readable ({reason_of(error)}). Restore it or train again") from error
         if found > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
@@ -288,7 +290,12 @@ class RunFolder:
         """
         if not self.metrics_path.exists():
             return []
-        lines = self.metrics_path.read_bytes().splitlines(keepends=True)
+        try:
+            lines = read_bytes(self.metrics_path, MAX_METRICS_BYTES).splitlines(keepends=True)
+        except OSError as error:
+            raise RunError(
+                f"{self.metrics_path}: not readable ({reason_of(error)}). Restore it or train again"
+            ) from error
         return [self._row(number, line) for number, line in enumerate(lines, 1) if line.endswith(b"\n")]
 
     def _row(self, number: int, line: bytes) -> dict[str, float]:
@@ -308,7 +315,7 @@ class RunFolder:
         """Drop rows that training will write again when it resumes from a checkpoint at `frames`."""
         rows = [row for row in self.metrics() if row["frames"] <= frames]
         text = "".join(json.dumps(row) + "\n" for row in rows)
-        if not self.metrics_path.exists() or self.metrics_path.read_text() != text:
+        if not self.metrics_path.exists() or read_text(self.metrics_path, MAX_METRICS_BYTES) != text:
             with written_whole(self.metrics_path) as part:
                 part.write_text(text)
 

@@ -17,9 +17,11 @@ from typing import Any, Protocol, get_args
 
 from clearway.choices import TrackerName
 from clearway.errors import RunError
+from clearway.regular_files import read_text
 
 BOARD, WANDB = "tensorboard", "wandb"  # folders of their files, beside the JSON lines
 ID_FILE = "clearway-run-id"
+MAX_ID_BYTES = 100
 
 
 class Tracker(Protocol):
@@ -112,7 +114,7 @@ class _Wandb:
             self.run: Any = wandb.init(
                 project=os.environ.get("WANDB_PROJECT", "clearway"),
                 name=folder.resolve().name,
-                id=known.read_text().strip(),
+                id=read_text(known, MAX_ID_BYTES).strip(),
                 dir=str(folder),
                 mode=mode,
                 resume="allow" if mode == "online" else None,

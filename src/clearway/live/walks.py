@@ -19,6 +19,7 @@ from clearway.live.result_tables import markdown_tables
 from clearway.live.results import Figures, LiveReport, LiveResult, grid_figures, summarise
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder, sensor_of
+from clearway.regular_files import read_bytes
 from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from clearway.rooms.detail import taken_fast
 from clearway.rooms.render import Camera, studio
@@ -28,6 +29,7 @@ from clearway.torch_threads import torch_threads
 from clearway.world.world import World, make_world
 
 LIVE = "live"
+MAX_PART_BYTES = 1024**3
 """Name of the files in the run folder."""
 
 
@@ -183,5 +185,5 @@ def finish_live(folder: Path, name: str = LIVE) -> None:
     for ending in ("json", "md"):
         part = folder / f"{name}.part.{ending}"
         with written_whole(folder / f"{name}.{ending}") as whole:
-            whole.write_bytes(part.read_bytes())
+            whole.write_bytes(read_bytes(part, MAX_PART_BYTES))
         part.unlink()

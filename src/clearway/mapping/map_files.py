@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import DeployError
-from clearway.files import parse_json, written_whole
+from clearway.files import parse_json, safetensors_metadata, written_whole
 from clearway.mapping.lattice import HEADINGS
 from clearway.mapping.room_map import RoomMap
+from clearway.regular_files import read_bytes
 
 FORMAT_VERSION = 1
 HEADER = "clearway.map"
@@ -56,13 +57,11 @@ def read_map(path: Path, eyes: str, feature_count: int) -> RoomMap:
     from safetensors.numpy import load
 
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise DeployError(f"{path}: larger than {MAX_BYTES >> 20} MiB, which no map is. Check the path")
-        content = path.read_bytes()
+        content = read_bytes(path, MAX_BYTES)
     except OSError as fault:
         raise DeployError(f"{path}: cannot be read ({fault.strerror}). Check the path") from fault
     try:
-        header = _header(content)
+        header = parse_json(safetensors_metadata(content)[HEADER])
         version, made_by, sha256 = (header[name] for name in ("format_version", "eyes", "sha256"))
         arrays = load(content)
     except (SafetensorError, ValueError, KeyError, TypeError) as fault:
@@ -79,14 +78,6 @@ def read_map(path: Path, eyes: str, feature_count: int) -> RoomMap:
     if _sha256(arrays) != sha256:
         raise DeployError(f"{path}: altered, its SHA-256 is not what its header says. {AGAIN}")
     return RoomMap(**arrays)
-
-
-def _header(content: bytes) -> Mapping[str, object]:
-    """Our own part of a safetensors file's header. Raises ValueError, KeyError or TypeError where there is none."""
-    length = int.from_bytes(content[:8], "little")
-    if len(content) < 8 or length > len(content) - 8:
-        raise ValueError("its header is cut off")
-    return parse_json(parse_json(content[8 : 8 + length].decode())["__metadata__"][HEADER])
 
 
 def _problem(arrays: Mapping[str, np.ndarray], feature_count: int) -> str | None:

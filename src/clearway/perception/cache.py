@@ -15,9 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import EncoderError
-from clearway.files import cache_dir, locked, written_whole
+from clearway.files import cache_dir, locked, parse_json, safetensors_metadata, written_whole
+from clearway.regular_files import read_bytes
 from clearway.scenes.file_pictures import BLOCK_PICTURES
 from clearway.scenes.scene import Observations
+
+MAX_BYTES = 8 * 1024**3  # of an entry
 
 
 @dataclass(frozen=True)
@@ -78,13 +81,13 @@ def _write_faults_named(folder: Path) -> Iterator[None]:
 
 def _load(path: Path) -> Entry | None:
     """The entry in a file; None where it is missing, damaged or not one of ours."""
-    from safetensors import SafetensorError, safe_open
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
 
     try:
-        with safe_open(path, framework="numpy") as file:
-            kept = file.metadata() or {}
-            arrays = {name: file.get_tensor(name) for name in list(file.keys())}
-        note = json.loads(kept["note"])
+        content = read_bytes(path, MAX_BYTES)
+        kept, arrays = safetensors_metadata(content), load(content)
+        note = parse_json(kept["note"])
     except (OSError, SafetensorError, KeyError, ValueError, TypeError):
         return None
     return Entry(arrays, note) if kept.get("sha256") == _checksum(arrays, kept["note"]) else None

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clearway.errors import EncoderError
+from clearway.errors import EncoderError, reason_of
 from clearway.files import json_text, read_json, written_whole
 from clearway.perception.encoder import IDENTITY_LETTERS, NetworkEncoder
 from clearway.perception.preprocess import Preprocessing
+from clearway.regular_files import read_bytes, sha256_of
 from clearway.scenes.scene import EncoderRecord
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ def write_eyes(folder: Path, eyes: Eyes, trained: Mapping[str, Any]) -> None:
     card = {
         "format_version": FORMAT_VERSION,
         "shape": eyes.shape.to_json(),
-        "sha256": _sha256(folder / WEIGHTS_FILE),
+        "sha256": sha256_of(folder / WEIGHTS_FILE),
         "trained": dict(trained),
     }
     with written_whole(folder / CARD_FILE) as part:
@@ -161,7 +162,7 @@ def read_card(folder: Path) -> EyesCard:
             f"{folder}: no eyes here ({CARD_FILE} is missing). Give what clearway pretrain made"
         ) from fault
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise EncoderError(f"{path}: damaged ({' '.join(str(fault).split())[:200]}). Get the eyes again") from fault
+        raise EncoderError(f"{path}: damaged ({reason_of(fault)}). Get the eyes again") from fault
 
 
 def read_eyes(folder: Path) -> Eyes:
@@ -173,9 +174,7 @@ def read_eyes(folder: Path) -> Eyes:
 
     card, path = read_card(folder), folder / WEIGHTS_FILE
     try:
-        if path.stat().st_size > MAX_WEIGHTS_BYTES:
-            raise EncoderError(f"{path}: larger than {MAX_WEIGHTS_BYTES >> 20} MiB. Get the eyes again")
-        content = path.read_bytes()
+        content = read_bytes(path, MAX_WEIGHTS_BYTES)
         if hashlib.sha256(content).hexdigest() != card.sha256:
             raise EncoderError(f"{path}: altered, its SHA-256 is not what {CARD_FILE} says. Get the eyes again")
         eyes = Eyes(card.shape)
@@ -183,8 +182,7 @@ def read_eyes(folder: Path) -> Eyes:
         counts = {name: tensor for name, tensor in eyes.state_dict().items() if name.endswith("num_batches_tracked")}
         eyes.load_state_dict({**counts, **state})
     except (OSError, SafetensorError, RuntimeError) as fault:
-        reason = " ".join(str(fault).split())[:200]
-        raise EncoderError(f"{path}: cannot be read ({reason}). Get the eyes again") from fault
+        raise EncoderError(f"{path}: cannot be read ({reason_of(fault)}). Get the eyes again") from fault
     return eyes.eval().requires_grad_(False)
 
 
@@ -204,8 +202,3 @@ def _shape_of(content: Mapping[str, Any]) -> EyesShape:
         if not isinstance(side, int) or side % 16 or not 16 <= side <= MAX_SIDE_PX:
             raise ValueError(f"pictures of {shape.height_px} x {shape.width_px}")
     return shape
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -17,6 +17,7 @@ from clearway.errors import EncoderError
 from clearway.perception.encoder import NetworkEncoder, identity_of
 from clearway.perception.model_files import CONFIG, PREPROCESSOR, WEIGHTS, find_model, read_preprocessing
 from clearway.perception.preprocess import preprocessing_from_json, to_pixels
+from clearway.regular_files import blocks_of
 from clearway.scenes.scene import EncoderRecord
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 KIND = "pretrained"
 RESNET50_MODEL = "microsoft/resnet-50"
-READ_BYTES = 1 << 24
 
 
 def find_record(model: str, name: str | None = None) -> EncoderRecord:
@@ -69,15 +69,9 @@ def _folder_identity(folder: Path, settings: dict[str, object]) -> str:
     names += [PREPROCESSOR] if (folder / PREPROCESSOR).is_file() else []
     fixed = {"preprocessing": settings["preprocessing"], "files": names}
     try:
-        return identity_of(fixed, (part for name in names for part in _parts(folder / name)))
+        return identity_of(fixed, (part for name in names for part in blocks_of(folder / name)))
     except OSError as fault:
         raise EncoderError(f"encoder '{settings['model']}': cannot be read ({fault}). Check the folder") from fault
-
-
-def _parts(path: Path) -> Iterator[bytes]:
-    with path.open("rb") as file:
-        while part := file.read(READ_BYTES):
-            yield part
 
 
 def _load(folder: Path, model: str) -> tuple[torch.nn.Module, Callable[[torch.Tensor], torch.Tensor]]:

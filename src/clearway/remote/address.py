@@ -8,7 +8,9 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
 from clearway.files import cache_dir
+from clearway.regular_files import read_text
 
+MAX_ADDRESS_BYTES = 64 * 1024
 EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to install, by scheme
 ADDRESS_FILE = "address.txt"  # beside a file that was fetched
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
@@ -41,5 +43,5 @@ def origin(path: Path) -> str:
     """Where a file can be had again: the address of one that was fetched, the whole path of any other."""
     path = path.resolve()
     if path.parent.parent == fetched_folder().resolve():
-        return (path.parent / ADDRESS_FILE).read_text(encoding="utf-8")
+        return read_text(path.parent / ADDRESS_FILE, MAX_ADDRESS_BYTES)
     return str(path)

@@ -22,9 +22,11 @@ from filelock import FileLock, Timeout
 from clearway.errors import ClearwayError
 from clearway.files import CACHE_VARIABLE, locked, part_folder
 from clearway.progress import picture_progress
+from clearway.regular_files import read_text
 from clearway.remote.address import ADDRESS_FILE, fetched_folder, without_query
 from clearway.remote.store import RemoteFile, Store
 
+MAX_LIST_BYTES = 64 * 1024**2  # of the entries that a process uses
 LIMIT_VARIABLE = "CLEARWAY_CACHE_GB"
 LIMIT_GB = 50.0
 AT_ONCE = 16  # files that are fetched at a time
@@ -192,7 +194,7 @@ def _leased(folder: Path) -> set[str]:
         if path != own.path and _is_free(Path(f"{path}.lock")):
             path.unlink(missing_ok=True)
             continue
-        entries.update(path.read_text(encoding="utf-8").split())
+        entries.update(read_text(path, MAX_LIST_BYTES).split())
     return entries
 
 

@@ -22,7 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
+from clearway.regular_files import opened, read_text
 from clearway.scenes.floor_plans import CELL_SIZE_M, FloorPlan, grid_from_above
 
 SUFFIXES = (".npz", ".csv", ".txt")
@@ -43,7 +44,7 @@ def floor_plan_names(path: Path) -> tuple[str, ...]:
     _check_file(path)
     if path.suffix != ".npz":
         return (path.stem,)
-    with _faults_named(path), zipfile.ZipFile(path) as archive:
+    with _faults_named(path), opened(path) as file, zipfile.ZipFile(file) as archive:
         names = tuple(name.removesuffix(NPY) for name in archive.namelist() if name.endswith(NPY))
     if not names:
         raise SceneError(path, "holds no array", "Store one array a plan with numpy.savez")
@@ -79,7 +80,8 @@ def read_floor_plans(path: Path, names: Sequence[str] = (), *, cell_size_m: floa
         archive = None
         if path.suffix == ".npz":
             with _faults_named(path):
-                archive = stack.enter_context(zipfile.ZipFile(path))
+                file = stack.enter_context(opened(path))
+                archive = stack.enter_context(zipfile.ZipFile(file))
         return [_read_plan(path, archive, name, held, cell_size_m) for name in names or held]
 
 
@@ -104,7 +106,7 @@ def _read_plan(
 
 
 def _check_file(path: Path) -> None:
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
     if path.suffix not in SUFFIXES:
         problem = f"its name ends in '{path.suffix}', expected {' or '.join(SUFFIXES)}"
@@ -123,9 +125,8 @@ def _faults_named(path: Path, dataset: str = "") -> Iterator[None]:
     try:
         yield
     except (*_FAULTS, SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error) as fault:
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         remedy = "Make the file again or get another copy"
-        raise SceneError(path, f"cannot be read ({reason})", remedy, dataset) from fault
+        raise SceneError(path, f"cannot be read ({reason_of(fault)})", remedy, dataset) from fault
 
 
 def _read_array(path: Path, archive: zipfile.ZipFile, name: str) -> np.ndarray:
@@ -156,9 +157,7 @@ def _check_length(content: io.BytesIO) -> None:
 def _read_text(path: Path) -> list[str]:
     """The lines of a text file, without empty ones before and after."""
     with _faults_named(path):
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
-        lines = [line.strip() for line in path.read_text("utf-8-sig").strip().splitlines()]
+        lines = [line.strip() for line in read_text(path, MAX_BYTES, "utf-8-sig").strip().splitlines()]
     if not lines:
         raise SceneError(path, "is empty", "Give a map or a list of cells")
     return lines

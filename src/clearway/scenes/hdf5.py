@@ -16,8 +16,9 @@ from types import EllipsisType
 import h5py
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, reason_of
 from clearway.files import parse_json, written_whole
+from clearway.regular_files import check_regular
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
@@ -49,8 +50,7 @@ def faults_named(source: Path, dataset: str = "", problem: str = "cannot be read
     try:
         yield
     except _FAULTS as fault:
-        reason = " ".join(str(fault).split())[:200] or type(fault).__name__
-        raise SceneError(source, f"{problem} ({reason})", MAKE_AGAIN, dataset) from fault
+        raise SceneError(source, f"{problem} ({reason_of(fault)})", MAKE_AGAIN, dataset) from fault
 
 
 @contextmanager
@@ -58,9 +58,10 @@ def opened(path: Path) -> Iterator[h5py.File]:
     """The HDF5 file at `path`, open for reading. Raises SceneError where it is missing or not HDF5."""
     if path.is_dir():
         raise SceneError(path, "is a folder", "Name a scene file in it")
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
     with faults_named(path, problem="cannot be opened as HDF5"):
+        check_regular(path)
         if not h5py.is_hdf5(path):
             raise SceneError(path, "is not an HDF5 file", "Give a scene file in the thor_v1 format")
         file = h5py.File(path, "r")
@@ -78,8 +79,7 @@ def written(path: Path) -> Iterator[h5py.File]:
         with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
             yield file
     except (OSError, RuntimeError) as fault:  # HDF5 raises the second where the disk fills up as a file is closed
-        reason = getattr(fault, "strerror", None) or " ".join(str(fault).split())
-        problem = f"cannot be written ({reason})"
+        problem = f"cannot be written ({reason_of(fault)})"
         raise SceneError(path, problem, "Check that the folder may be written to and has room") from fault
 
 

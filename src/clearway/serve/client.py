@@ -14,9 +14,11 @@ import numpy as np
 from clearway.deploy.agent import checked_picture
 from clearway.deploy.navigator import Decision, Selection, checked_seed
 from clearway.errors import ClearwayError, DeployError
+from clearway.regular_files import read_bytes
 from clearway.scenes.actions import Action
 
 TIMEOUT_S = 30.0
+MAX_PICTURE_BYTES = 64 * 1024**2  # of a file; the service takes less
 KEEP_ALIVE_S = 3.0  # of an idle connection; the service's is longer, so that it never closes one that is used
 ANSWER = ("action_index", "probabilities", "value", "arrived")  # of a step
 KINDS = {b"\xff\xd8\xff": "image/jpeg", b"\x89PNG": "image/png", b"RIFF": "image/webp"}
@@ -191,7 +193,6 @@ def _body(picture: object) -> dict[str, Any]:
 def _content(path: Path) -> bytes:
     """What a file holds. Raises DeployError where it cannot be read."""
     try:
-        return path.read_bytes()
-    except (OSError, ValueError) as fault:  # the latter: no system takes such a name
-        reason = fault.strerror if isinstance(fault, OSError) else fault
-        raise DeployError(f"{path}: cannot be read ({reason}). Name a JPEG, PNG or WebP file") from fault
+        return read_bytes(path, MAX_PICTURE_BYTES)
+    except OSError as fault:
+        raise DeployError(f"{path}: cannot be read ({fault.strerror}). Name a JPEG, PNG or WebP file") from fault

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from clearway.errors import ClearwayError
+from clearway.regular_files import opened, read_at_most
 from clearway.web.guard import same_token
 
 OWNER = "clearway.owner"  # in the scope of a request: the name of its token
@@ -75,17 +76,9 @@ def read_tokens(path: Path) -> Tokens:
 def _text(path: Path) -> str:
     """What a regular file says, which only its owner may read."""
     try:
-        with open(
-            path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
-        ) as file:  # waits for no pipe
-            about = os.fstat(file.fileno())
-            if not stat.S_ISREG(about.st_mode):
-                raise ClearwayError(f"{path}: is no regular file. Name a file of tokens")
-            if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        with opened(path) as file:
+            if os.fstat(file.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
                 raise ClearwayError(f"{path}: others may read or change it. Forbid it them: chmod 600 {path}")
-            content = file.read(MOST_BYTES + 1)
+            return read_at_most(file, MOST_BYTES, path).decode("utf-8", "replace")
     except OSError as fault:
         raise ClearwayError(f"{path}: cannot be read ({fault.strerror}). Name a file of tokens") from fault
-    if len(content) > MOST_BYTES:
-        raise ClearwayError(f"{path}: is larger than {MOST_BYTES >> 20} MiB. Name a file of tokens")
-    return content.decode("utf-8", "replace")

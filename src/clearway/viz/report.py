@@ -16,15 +16,18 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from clearway.experiments.in_short import in_short, is_judged
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.files import json_text, read_json, written_whole
 from clearway.markdown import table_lines
+from clearway.regular_files import read_bytes
 from clearway.scenes.scene import Scene
 from clearway.viz.html import rendered_html
 from clearway.viz.report_figures import draw_report_figure, draw_report_map
 
 HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json", "tables", "figures"
 LONG_TEXT = 60  # letters; a column with more is broken into lines
+MAX_PICTURE_BYTES = 64 * 1024**2  # of a figure
 SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
 
 
@@ -100,8 +103,10 @@ def value_text(value: Value) -> str:
 
 
 def _summary(sections: Sequence[Section]) -> list[ReportTable]:
-    """All verdicts at a glance, the paper's claims apart; nothing where there are none."""
-    tables = []
+    """All verdicts at a glance, the paper's claims apart; nothing where none is judged."""
+    tables: list[ReportTable] = []
+    if not is_judged(sections):
+        return tables
     for title, further in (("The paper's claims at a glance", False), ("Further questions", True)):
         claims = [(claim, section.title) for section in sections for claim in section.claims]
         rows = tuple((claim.text, claim.verdict, where) for claim, where in claims if claim.further == further)
@@ -131,15 +136,16 @@ def _table_notes(table: ReportTable) -> tuple[str, ...]:
 
 
 def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str], warning: str) -> str:
-    lines = [f"# {title}", ""]
+    lines, judged = [f"# {title}", ""], is_judged(sections)
     lines += [f"**{warning}**", ""] if warning else []
+    lines += [*(f"- {line}" for line in in_short(sections)), ""]
     for table in _summary(sections):
         lines += [f"## {table.title}", "", *_markdown_table(table)]
     for section in sections:
         lines += [f"## {section.title}", "", section.text, ""]
         missing = _missing_text(section)
         lines += [f"*{missing}*", ""] if missing else []
-        if section.claims:
+        if section.claims and judged:
             lines += _markdown_table(_verdict_rows(section.claims))
         for table in section.tables:
             lines += [f"### {table.title}", "", *_markdown_table(table)]
@@ -184,15 +190,16 @@ def _page(folder: Path, title: str, sections: Sequence[Section], facts: Mapping[
         "report",
         title=title,
         warning=warning,
+        in_short=in_short(sections),
         summary=[_shown(table) for table in _summary(sections)],
-        sections=[_section(folder, section) for section in sections],
+        sections=[_section(folder, section, is_judged(sections)) for section in sections],
         facts=facts,
     )
 
 
-def _section(folder: Path, section: Section) -> dict[str, Any]:
-    """A section as the page's template names it."""
-    verdicts = [_verdict_rows(section.claims)] if section.claims else []
+def _section(folder: Path, section: Section, judged: bool) -> dict[str, Any]:
+    """A section as the page's template names it; without verdicts where the report judges nothing."""
+    verdicts = [_verdict_rows(section.claims)] if section.claims and judged else []
     return {
         "name": section.name,
         "title": section.title,
@@ -204,7 +211,7 @@ def _section(folder: Path, section: Section) -> dict[str, Any]:
 
 
 def _encoded(folder: Path, name: str) -> str:
-    return base64.b64encode((folder / FIGURES / f"{name}.png").read_bytes()).decode()
+    return base64.b64encode(read_bytes(folder / FIGURES / f"{name}.png", MAX_PICTURE_BYTES)).decode()
 
 
 def _shown(table: ReportTable) -> ShownTable:

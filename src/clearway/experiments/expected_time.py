@@ -1,0 +1,61 @@
+"""How long the trainings of a plan will take on this machine: each kind of learner is tried for some seconds."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict, replace
+
+from clearway.experiments.job import request_of
+from clearway.experiments.plan import Job, PlannedRun
+from clearway.learn.a3c.config import A3C
+from clearway.torch_threads import torch_threads
+
+TRIED_S = 2.0
+"""A kind of learner is tried for so long, after its first update."""
+
+
+def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int, threads: int) -> str:
+    """How many runs are to be trained, and for how long, in a line."""
+    counted = f"{len(jobs)} runs, {len(left)} to be trained"
+    if not left:
+        return f"{counted}: all is there"
+    known = [job.run for job in left if not isinstance(job.run.learner, A3C)]
+    speeds: dict[str, float] = {}
+    seconds = 0.0
+    for run in known:
+        kind = _kind(run)
+        if kind not in speeds:
+            speeds[kind] = frames_per_second(run, threads)
+        seconds += run.learner.frames / speeds[kind]
+    beside = min(workers, len(left))
+    unknown = len(left) - len(known)
+    more = f", and {unknown} of A3C, whose time is not known" if unknown else ""
+    return f"{counted}, {beside} at a time: about {_duration(seconds / beside)} of training here{more}"
+
+
+def frames_per_second(run: PlannedRun, threads: int) -> float:
+    """Of a run's training, tried for `TRIED_S` seconds; nothing is kept of it."""
+    with torch_threads(threads), closing(request_of(run).trainer()) as trainer:
+        trainer.update()
+        frames, began = trainer.frames, time.perf_counter()
+        while time.perf_counter() - began < TRIED_S and not trainer.finished:
+            trainer.update()
+        taken = time.perf_counter() - began
+    return max(trainer.frames - frames, 1) / taken
+
+
+def _kind(run: PlannedRun) -> str:
+    """What speed depends on."""
+    settings = asdict(replace(run.learner, frames=1))
+    return json.dumps([run.learner.algorithm, settings, run.targets], sort_keys=True)
+
+
+def _duration(seconds: float) -> str:
+    """To the minute, or to the second below two minutes."""
+    if seconds < 120:
+        return f"{max(1, round(seconds))} s"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min"

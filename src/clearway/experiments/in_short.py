@@ -1,0 +1,47 @@
+"""What a report answers, in ten lines at most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from clearway.experiments.section import Claim, Section, Verdict
+from clearway.experiments.verdicts import LEAST_RUNS
+
+MOST_LINES = 10
+NAMED = 3  # claims of one verdict that a line names
+VERDICTS: dict[Verdict, str] = {"holds": "hold", "does not hold": "do not", "undecided": "undecided"}
+
+
+def is_judged(sections: Sequence[Section]) -> bool:
+    """Whether any claim rests on enough runs to be judged at all."""
+    return any(claim.p is not None for section in sections for claim in section.claims)
+
+
+def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
+    """A line for each learner on the paper's claims, then one for each on further questions."""
+    claims = [claim for section in sections for claim in section.claims]
+    if not claims:
+        return ()
+    if not is_judged(sections):
+        return (
+            f"No claim is judged ({len(claims)} are asked): fewer than {LEAST_RUNS} complete runs of a kind decide "
+            "nothing. The tables hold what was measured.",
+        )
+    lines = []
+    for further, of_whom in ((False, "of the paper's claims"), (True, "of further claims")):
+        learners = dict.fromkeys(claim.text.partition(":")[0] for claim in claims if claim.further == further)
+        for learner in learners:
+            own = [c for c in claims if c.further == further and c.text.startswith(f"{learner}:")]
+            lines.append(f"{learner}, {len(own)} {of_whom}. {_told(own)}")
+    more = len(lines) - MOST_LINES
+    return tuple(lines) if more <= 0 else (*lines[: MOST_LINES - 1], f"And {more + 1} more learners, below.")
+
+
+def _told(claims: Sequence[Claim]) -> str:
+    parts = []
+    for verdict, called in VERDICTS.items():
+        texts = [claim.text.partition(": ")[2] for claim in claims if claim.verdict == verdict]
+        if texts:
+            more = f"; and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
+            parts.append(f"{len(texts)} {called}: {'; '.join(texts[:NAMED])}{more}.")
+    return " ".join(parts)

@@ -1,0 +1,45 @@
+"""What a report answers first."""
+
+from clearway.experiments.in_short import MOST_LINES, in_short, is_judged
+from clearway.experiments.section import Claim, Section, Verdict
+
+
+def section(*claims: Claim) -> list[Section]:
+    return [Section("s", "", "", claims=claims)]
+
+
+def claim(text: str, verdict: Verdict, further: bool = False, p: float | None = 0.01) -> Claim:
+    return Claim(text, verdict, "", further=further, p=p)
+
+
+def test_a_line_for_each_learner_says_what_holds_and_what_does_not() -> None:
+    found = in_short(
+        section(
+            claim("paper: fewer collisions", "holds"),
+            claim("paper: no more steps", "undecided"),
+            claim("default: fewer collisions", "does not hold"),
+            claim("paper: fewer than with bump", "does not hold", further=True),
+        )
+    )
+    assert found == (
+        "paper, 2 of the paper's claims. 1 hold: fewer collisions. 1 undecided: no more steps.",
+        "default, 1 of the paper's claims. 1 do not: fewer collisions.",
+        "paper, 1 of further claims. 1 do not: fewer than with bump.",
+    )
+
+
+def test_where_runs_are_too_few_one_line_says_so() -> None:
+    few = section(*(claim(f"paper: {number}", "undecided", p=None) for number in range(30)))
+    (line,) = in_short(few)
+    assert line.startswith("No claim is judged (30 are asked): fewer than 4 complete runs")
+    assert not is_judged(few) and in_short(section()) == ()
+
+
+def test_it_is_never_longer_than_ten_lines() -> None:
+    found = in_short(section(*(claim(f"learner {number}: better", "holds") for number in range(30))))
+    assert len(found) == MOST_LINES and found[-1] == "And 21 more learners, below."
+
+
+def test_many_claims_of_a_kind_are_counted() -> None:
+    (line,) = in_short(section(*(claim(f"paper: {name}", "holds") for name in "abcde")))
+    assert line == "paper, 5 of the paper's claims. 5 hold: a; b; c; and 2 more."
