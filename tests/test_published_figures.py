@@ -2,12 +2,14 @@
 
 import json
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
+from clearway.experiments.reproduce import gather
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "seeing.md").read_text(encoding="utf-8")
@@ -74,3 +76,23 @@ def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
     expect("93.3", 93.34, "near")
     with pytest.raises(AssertionError, match=r"written 93\.3, recorded 93\.36"):
         expect("93.3", 93.36, "far")
+
+
+def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
+    records["unpack"](DOCS / "records" / "memory-bathroom.tar.xz", tmp_path / "memory")
+    ((section,), page) = gather(tmp_path / "memory").sections, (DOCS / "results.md").read_text(encoding="utf-8")
+    assert not section.missing
+    (table,) = section.tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    told = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("| planner on a learnt map")]
+    assert len(told) == 4
+    for _, frames, steps, collisions, _ in told:
+        count = int(frames.replace(",", ""))
+        (row,) = [row for row in rows if row["agent"] == "planner on a learnt map" and row["frames"] == count]
+        for cell, name in ((steps, "steps"), (collisions, "collisions")):
+            mean, *interval = numbers(cell)
+            expect(mean, row[name], f"{name} after {count} frames")
+            assert not interval or interval == numbers(str(row[f"95 % of {name}"]))
+    verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
+    assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
