@@ -180,15 +180,17 @@ def test_none_is_left_once_they_are_closed() -> None:
 
 
 PROGRAM = """
-import asyncio, signal, sys
-from clearway.serve.decoders import Decoders, Standing
+import asyncio, os, signal
+from clearway.serve.decoders import Decoders
 from clearway.serve.limits import Limits
 from helpers.serving import grey
 
 async def main():
     decoders = Decoders(Limits())
     decoders.start()
-    await decoders.decode(grey(1), "me", Standing())
+    for decoder in decoders._quick.decoders:
+        await decoder.decode(grey(1), 5.0, 60.0)
+        os.kill(decoder._process.pid, signal.SIGSTOP)  # as if it were busy: it hears of no closed connection
     print(*(decoder._process.pid for decoder in decoders._quick.decoders), flush=True)
     await asyncio.sleep(60)
 
