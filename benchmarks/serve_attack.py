@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     hostile = hostile_pictures()
     found: dict[bool, list[float]] = {False: [], True: []}
-    with served(options.agent) as url:
+    with served(options.agent) as (url, _):
         for _ in range(options.rounds):
             for attacked in (False, True):
                 with attacking(url, hostile, options.attack_per_s if attacked else 0):
@@ -84,8 +84,8 @@ def rescanned(content: bytes, more: int, most_bytes: int = (4 << 20) - 1024) -> 
 
 
 @contextmanager
-def served(agent: str) -> Iterator[str]:
-    """A service in a process; gives its address."""
+def served(agent: str) -> Iterator[tuple[str, int]]:
+    """A service in a process; gives its address, and the process's id."""
     with tempfile.TemporaryDirectory() as folder:
         tokens = Path(folder) / "tokens"
         tokens.write_text("".join(f"{name} {token}\n" for name, token in TOKENS.items()), encoding="utf-8")
@@ -100,7 +100,7 @@ def served(agent: str) -> Iterator[str]:
                 found = re.search(r"http://\S+", line)
                 if found is None:
                     sys.exit(f"the service did not start: {line}{process.stderr.read()}")
-                yield found[0]
+                yield found[0], process.pid
             finally:
                 process.terminate()
 
