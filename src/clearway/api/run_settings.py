@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import ClearwayError
-from clearway.learn.run_folder import RunFolder, RunRecord
+from clearway.learn.run_folder import SETTINGS_FILE, RunFolder, RunRecord
 from clearway.reward import REWARDS, Reward
 from clearway.settings_file import write_settings
 
-SETTINGS_FILE = "run.yaml"
 OPTIONS = ("frames", "feature_basis", "goals")  # settings of algorithms that have options of their own
 HEAD = "The settings of this run. To repeat it: clearway train --config run.yaml --out ANOTHER_FOLDER"
 

@@ -101,6 +101,7 @@ def train(
     seed: int = 0,
     out: str | os.PathLike[str] | None = None,
     resume: bool = False,
+    copy_to: str | None = None,
     zone_level: ZoneLevel = "pose",
     perturb: Perturbed = (),
     takes: int | None = None,
@@ -131,6 +132,8 @@ def train(
             run lies in a temporary one until `train` returns, and what there is of it is what `train` returns. Give
             scene files, not scenes in memory, where the folder is to be opened without naming them again.
         resume: go on with the run in `out` from its newest checkpoint; with more `frames`, with a finished one too.
+        copy_to: address in an object store, such as s3://bucket/run, to which the run is copied after each checkpoint.
+            With `resume`, where `out` holds no run, it is fetched from there first.
         zone_level: whether zones are those of poses ("pose") or of whole cells ("cell").
         perturb: what is perturbed in pictures of every pose that are seen beside the scene's own, one a step, as of
             `evaluate_goals`; nothing by default. The scenes are rooms that can be built again; by
@@ -155,8 +158,9 @@ def train(
         KeyboardInterrupt: the user interrupted; a run with a folder can be resumed.
     """
     store = as_choice("feature_store", feature_store, get_args(FeatureStore))
-    if resume and out is None:
-        raise ArgumentError("resume=True: expected the run folder to go on with. Give it as out")
+    if (resume or copy_to is not None) and out is None:
+        asked = "resume=True" if resume else f"copy_to={copy_to!r:.80}"
+        raise ArgumentError(f"{asked}: expected the run folder to go on with, or to copy. Give it as out")
     number = as_seed("seed", seed)
     learner, processes = chosen_learner(algorithm, frames, settings), as_whole("workers", workers, 1)
     pairs = scenes_and_files(scenes, features_in_file=store != "memory" or processes > 1)
@@ -206,6 +210,7 @@ def train(
             until_solved=as_truth("until_solved", until_solved),
             track=track,
             on_begin=begun,
+            copy_to=None if copy_to is None else as_word("copy_to", copy_to),
         )
         return TrainResult(
             agent=load_agent(path),

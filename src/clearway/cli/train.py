@@ -89,6 +89,9 @@ class Train:
     Needs the extra of that name; by default metrics.jsonl in the run folder alone."""
     resume: bool = False
     """Go on with the run in --out from its newest checkpoint; with more --frames, with a finished one too."""
+    copy_to: str | None = None
+    """Copy the run to an object store after each checkpoint, for example s3://bucket/run. With --resume, where --out
+    holds no run, it is fetched from there first."""
 
     def run(self) -> None:
         """Train."""
@@ -106,6 +109,7 @@ class Train:
             seed=self.seed,
             out=out,
             resume=self.resume,
+            copy_to=self.copy_to,
             zone_level=self.zones,
             perturb=self.perturb,
             takes=self.takes,

@@ -45,6 +45,7 @@ FORMAT_VERSION = 2
 SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 MAX_METRICS_BYTES = 1024**3
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
+SETTINGS_FILE = "run.yaml"  # what repeats the run
 
 
 @dataclass(frozen=True)

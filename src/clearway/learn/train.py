@@ -33,6 +33,7 @@ from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.learn.pace import Pace
 from clearway.learn.peers import ALONE, Peers
 from clearway.learn.progress import ProgressView, progress_view
+from clearway.learn.run_copy import RunCopy
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.seeds import check_seed
 from clearway.learn.share import Share, check_scenes
@@ -163,6 +164,7 @@ def train(
     until_solved: bool = False,
     track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
+    copy_to: str | None = None,
 ) -> RunFolder:
     """Train until all frames are used and leave a run folder behind.
 
@@ -176,6 +178,8 @@ def train(
         until_solved: stop before that, once every target is solved, see `EpisodeStatistics.solved`.
         track: where figures are shown as they come, see `tracking`.
         on_begin: called with the run folder as soon as it holds the run, before the first frame.
+        copy_to: address in an object store to which the run is copied after each checkpoint; with `resume`, and where
+            `out` holds no run, it is fetched from there first.
 
     Raises:
         RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
@@ -183,6 +187,7 @@ def train(
     """
     check_tracker(track)
     trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
+    copy = opened_copy(copy_to, folder, resume)
     with folder.held():
         other_bits = folder.begin(record_of(request), resume)
         if on_begin is not None:
@@ -195,7 +200,7 @@ def train(
             interruption() as interrupted,
         ):
             every_s = SECONDS_BETWEEN_CHECKPOINTS
-            run = Running(trainer, folder, view, interrupted, milestones, until_solved, track, ALONE, every_s)
+            run = Running(trainer, folder, view, interrupted, milestones, until_solved, track, ALONE, every_s, copy)
             run.go_on(seconds)
     return folder
 
@@ -209,6 +214,7 @@ def train_part(
     until_solved: bool,
     track: TrackerName | None,
     checkpoint_s: float,
+    copy_to: str | None = None,
 ) -> None:
     """Train as one of several workers, from the newest checkpoint of a run that has been begun, if it has one.
 
@@ -217,6 +223,7 @@ def train_part(
         peers: the workers.
         show_progress, until_solved, track: as of `train`.
         checkpoint_s: seconds between checkpoints.
+        copy_to: as of `train`; what lies there has been fetched.
 
     Raises:
         RunError, KeyboardInterrupt: as of `train`.
@@ -237,8 +244,27 @@ def train_part(
             progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
             interruption() as interrupted,
         ):
-            run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s)
+            copy = RunCopy(copy_to) if copy_to and peers.leads else None
+            run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s, copy)
             run.go_on(seconds)
+
+
+def opened_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy | None:
+    """A run's copy, with what it holds in the run folder where that holds no run; None: there is to be none.
+
+    Raises:
+        ClearwayError: the store cannot be reached, or holds a run already that is not to be gone on with.
+    """
+    if address is None:
+        return None
+    copy = RunCopy(address)
+    if folder.exists:
+        return copy
+    if resume:
+        copy.restore(folder.path)
+    elif copy.holds_a_run:
+        raise RunError(f"{address}: holds a run already. Give --resume to go on with it, or another --copy-to")
+    return copy
 
 
 def told_of_other_bits(folder: RunFolder, request: RunRequest, other_bits: Sequence[str] | None) -> None:
@@ -275,6 +301,7 @@ class Running:
         trainer, folder, view, interrupted, milestones, until_solved, track: as of `train`.
         peers: the workers.
         checkpoint_s: seconds between checkpoints.
+        copy: where checkpoints are copied to; None: nowhere.
     """
 
     trainer: Learning
@@ -286,6 +313,7 @@ class Running:
     track: TrackerName | None
     peers: Peers
     checkpoint_s: float
+    copy: RunCopy | None = None
 
     def go_on(self, seconds: float) -> None:
         """Update until the frames are used or the user interrupts; ends with a checkpoint either way.
@@ -300,6 +328,8 @@ class Running:
         finally:
             if log:
                 log.close()
+        if self.copy is not None:
+            self.copy.update(self.folder.path)
         if not self._done():
             raise KeyboardInterrupt
 
@@ -356,6 +386,8 @@ class Running:
             self.view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
             if saves:
                 self._save(seconds)
+                if self.copy is not None:
+                    self.copy.tried_update(self.folder.path)
                 saved_at, saved_frames = time.monotonic(), trainer.frames
         trainer.tensors()
         tell()

@@ -28,7 +28,14 @@ from clearway.errors import ClearwayError, RunError
 from clearway.learn.peers import LostPeer, Peers
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.tracking import check_tracker
-from clearway.learn.train import SECONDS_BETWEEN_CHECKPOINTS, RunRequest, set_threads, told_of_other_bits, train_part
+from clearway.learn.train import (
+    SECONDS_BETWEEN_CHECKPOINTS,
+    RunRequest,
+    opened_copy,
+    set_threads,
+    told_of_other_bits,
+    train_part,
+)
 
 if TYPE_CHECKING:
     import torch.distributed as dist
@@ -52,6 +59,7 @@ class Task:
     track: TrackerName | None
     threads: int
     checkpoint_s: float
+    copy_to: str | None
 
 
 @dataclass(frozen=True)
@@ -82,6 +90,7 @@ def train_by_workers(
     on_begin: Callable[[Path], None] | None = None,
     threads: int | None = None,
     checkpoint_s: float = SECONDS_BETWEEN_CHECKPOINTS,
+    copy_to: str | None = None,
 ) -> RunFolder:
     """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
 
@@ -92,6 +101,7 @@ def train_by_workers(
         resume, show_progress, until_solved, track, on_begin: as of `train.train`.
         threads: of torch in each worker; None: the machine's, divided among them.
         checkpoint_s: seconds between checkpoints.
+        copy_to: as of `train.train`.
 
     Raises:
         RunError, KeyboardInterrupt: as of `train.train`; or workers were lost again and again.
@@ -99,6 +109,7 @@ def train_by_workers(
     check_tracker(track)
     request.check_workers(workers)
     folder = RunFolder(out)
+    opened_copy(copy_to, folder, resume)
     with folder.held():
         record = record_of(request)
         record = replace(record, hardware={**record.hardware, "workers": workers})
@@ -114,6 +125,7 @@ def train_by_workers(
         track,
         threads or max(1, torch.get_num_threads() // workers),
         checkpoint_s,
+        copy_to,
     )
     outcomes = _launched(task, workers)
     failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
@@ -231,6 +243,7 @@ def trained(task: Task, place: Place, server: dist.Store) -> str | None:
             until_solved=task.until_solved,
             track=task.track,
             checkpoint_s=task.checkpoint_s,
+            copy_to=task.copy_to,
         )
     except KeyboardInterrupt:
         return INTERRUPTED

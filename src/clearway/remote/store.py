@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ CONNECT_S = 10  # for a connection
 SILENCE_S = 20  # for the next bytes
 ANSWER_S = 60  # for a question about one file or folder, tries together
 TRIES = 2
+WRITABLE = ("s3", "gs")
 _VERSIONS = ("ETag", "etag", "generation", "Content-MD5", "LastModified", "Last-Modified", "mtime", "updated")
 _CREDENTIALS = ("Credential", "Permission", "Refresh", "Profile", "Token", "Forbidden")  # in names of errors
 
@@ -107,6 +108,34 @@ class Store:
         if (size := path.stat().st_size) != file.size:
             problem = f"{size:,} of {file.size:,} bytes came"
             raise ClearwayError(f"{without_query(file.address)}: {problem}. Try again; the file there may be damaged")
+
+    def names(self, address: str) -> list[str]:
+        """Names of what lies in a folder, ascending; none where there is no such folder.
+
+        Raises:
+            ClearwayError: the server cannot be asked.
+        """
+        with _faults_named(address):
+            path = self.system._strip_protocol(address)
+            try:
+                listed = self._ask(self.system._ls, path, detail=True)
+            except FileNotFoundError:
+                return []
+        return sorted(file_name(entry["name"].rstrip("/")) for entry in listed)
+
+    def upload(self, path: Path, address: str) -> None:
+        """Put a file of this machine there, in place of what may be there.
+
+        Raises:
+            ClearwayError: the server cannot be written to.
+        """
+        with _faults_named(address):
+            self.system.put_file(str(path), self.system._strip_protocol(address))
+
+    def remove(self, address: str) -> None:
+        """Remove a file, if it is there. Raises ClearwayError as `upload` does."""
+        with _faults_named(address), suppress(FileNotFoundError):
+            self.system.rm_file(self.system._strip_protocol(address))
 
     def _described(self, entry: dict[str, Any]) -> RemoteFile:
         """A file of a listing; web servers list names alone."""

@@ -1,0 +1,108 @@
+"""The copy of a run in an object store: brought up to date after each checkpoint, and gone on with from there.
+
+A checkpoint's manifest is put last and removed first, and one without a manifest is none: a checkpoint there is whole
+or not at all, whatever is killed when. Metrics are put before it, since rows beyond a checkpoint are dropped, and
+`run.json` after it, without which there is no run.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+from clearway.errors import ClearwayError, RunError
+from clearway.files import folder_written_whole
+from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints
+from clearway.learn.run_folder import CHECKPOINTS, METRICS_FILE, RUN_FILE, SETTINGS_FILE
+from clearway.remote.address import address_of
+from clearway.remote.store import WRITABLE, Store
+
+PARTS = (NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE)
+
+
+class RunCopy:
+    """A run's copy.
+
+    Args:
+        address: of its folder, such as s3://bucket/run.
+
+    Raises:
+        ClearwayError: it is no address that can be written to, or the package for it is not installed.
+    """
+
+    def __init__(self, address: str) -> None:
+        known = address_of(address)
+        if known is None or known.partition(":")[0] not in WRITABLE:
+            schemes = " or ".join(f"{scheme}://" for scheme in WRITABLE)
+            raise RunError(
+                f"copy_to={address:.80}: expected an address of {schemes}. Give one, such as s3://bucket/run"
+            )
+        self.address, self.store = known.rstrip("/"), Store(known)
+
+    @property
+    def holds_a_run(self) -> bool:
+        """Whether there is one to go on with. Raises ClearwayError where the store cannot be asked."""
+        return RUN_FILE in self.store.names(self.address)
+
+    def update(self, folder: Path) -> None:
+        """Make the copy agree with a run folder.
+
+        Raises:
+            ClearwayError: the store cannot be written to; what it holds can still be gone on with.
+        """
+        there, here = self._checkpoints(), {path.name: path for path in checkpoints(folder / CHECKPOINTS)}
+        self._put(folder, METRICS_FILE, SETTINGS_FILE)
+        for name in sorted(set(here) - set(there)):
+            for part in PARTS:
+                self.store.upload(here[name] / part, self._place(CHECKPOINTS, name, part))
+        self._put(folder, RUN_FILE)
+        for old in sorted({*there, *here})[:-KEPT]:
+            for part in reversed(PARTS):
+                self.store.remove(self._place(CHECKPOINTS, old, part))
+
+    def tried_update(self, folder: Path) -> None:
+        """Likewise, in the midst of a training, which goes on without: the next checkpoint is copied again.
+
+        Warns:
+            UserWarning: the store cannot be written to.
+        """
+        try:
+            self.update(folder)
+        except ClearwayError as fault:
+            warnings.warn(f"not copied: {fault}. Training goes on", stacklevel=2)
+
+    def restore(self, folder: Path) -> bool:
+        """Fetch the run into a folder that is not there or empty, whole or not at all; False where there is no copy.
+
+        Raises:
+            ClearwayError: the store cannot be read, or the folder holds something.
+        """
+        names = self.store.names(self.address)
+        if RUN_FILE not in names:
+            return False
+        with folder_written_whole(folder) as part:
+            for name in self._checkpoints():
+                (part / CHECKPOINTS / name).mkdir(parents=True)
+                for file in PARTS:
+                    self._fetch(part, CHECKPOINTS, name, file)
+            for file in (METRICS_FILE, SETTINGS_FILE, RUN_FILE):
+                if file in names:
+                    self._fetch(part, file)
+        return True
+
+    def _put(self, folder: Path, *names: str) -> None:
+        """Those that there are."""
+        for name in names:
+            if (folder / name).exists():
+                self.store.upload(folder / name, self._place(name))
+
+    def _fetch(self, folder: Path, *parts: str) -> None:
+        self.store.download(self.store.file(self._place(*parts)), folder.joinpath(*parts))
+
+    def _checkpoints(self) -> list[str]:
+        """Names of those that are whole, ascending."""
+        found = self.store.names(self._place(CHECKPOINTS))
+        return sorted(name for name in found if MANIFEST_FILE in self.store.names(self._place(CHECKPOINTS, name)))
+
+    def _place(self, *parts: str) -> str:
+        return "/".join((self.address, *parts))

@@ -1,0 +1,130 @@
+"""A run that is copied to an object store goes on from there on another machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import ClearwayError
+from clearway.learn import train as training
+from clearway.learn.checkpoint import checkpoints, newest_checkpoint, read_network, read_training
+from clearway.learn.run_copy import RunCopy
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.trainer import Trainer
+from clearway.remote.store import Store
+from helpers.small_runs import equal_bits, small_learner, small_request
+
+S3 = Callable[[str, bytes], None]
+ADDRESS = "s3://rooms/runs/one"
+FRAMES = 480  # six updates
+REQUEST = small_request(learner=small_learner(frames=FRAMES))
+
+
+class _PowerCut(BaseException):
+    pass
+
+
+@pytest.fixture(autouse=True)
+def _every_update(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+
+
+def cut_off(folder: Path, monkeypatch: pytest.MonkeyPatch, updates: int) -> None:
+    """Train, copied, until the power goes before this update."""
+    whole = Trainer.update
+
+    def update(trainer: Trainer) -> dict[str, float]:
+        if trainer.updates == updates:
+            raise _PowerCut
+        return whole(trainer)
+
+    with monkeypatch.context() as patch, pytest.raises(_PowerCut):
+        patch.setattr(Trainer, "update", update)
+        training.train(REQUEST, folder, copy_to=ADDRESS)
+
+
+def without_times(folder: Path) -> list[dict[str, float]]:
+    return [{name: value for name, value in row.items() if name != "seconds"} for row in RunFolder(folder).metrics()]
+
+
+def test_a_run_goes_on_elsewhere_bit_for_bit(
+    s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: Path
+) -> None:
+    lost, elsewhere = tmp_path / "lost", tmp_path / "elsewhere"
+    cut_off(lost, monkeypatch, updates=4)
+    training.train(REQUEST, elsewhere, resume=True, copy_to=ADDRESS)
+    ends = [newest_checkpoint(RunFolder(folder).checkpoints) for folder in (undisturbed, elsewhere)]
+    assert equal_bits(*map(read_network, ends)) and equal_bits(*map(read_training, ends))
+    assert without_times(undisturbed) == without_times(elsewhere)
+    again = tmp_path / "again"
+    assert RunCopy(ADDRESS).restore(again)  # what is there in the end is the whole run
+    assert without_times(again) == without_times(elsewhere)
+    kept, copied = ([path.name for path in checkpoints(RunFolder(folder).checkpoints)] for folder in (elsewhere, again))
+    assert kept == copied and len(kept) == 2
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "undisturbed"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+        training.train(REQUEST, folder)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "fails_at", [1, 2, 4, 5, 7, 8, 9, 10, 12]
+)  # before, within and between what is put and removed
+def test_whatever_is_cut_off_leaves_a_whole_copy(
+    s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: Path, fails_at: int
+) -> None:
+    cut_off(tmp_path / "lost", monkeypatch, updates=2)  # a copy is there
+    training.train(REQUEST, tmp_path / "lost", resume=True)  # two checkpoints more, not copied yet
+    done, upload, remove = 0, Store.upload, Store.remove
+
+    def counted(*arguments: object) -> None:
+        nonlocal done
+        done += 1
+        if done == fails_at:
+            raise _PowerCut
+        (upload if len(arguments) == 3 else remove)(*arguments)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch, pytest.raises(_PowerCut):
+        patch.setattr(Store, "upload", counted)
+        patch.setattr(Store, "remove", counted)
+        RunCopy(ADDRESS).update(tmp_path / "lost")
+    found = tmp_path / "found"
+    assert RunCopy(ADDRESS).restore(found)
+    training.train(REQUEST, found, resume=True)
+    assert without_times(found) == without_times(undisturbed)
+
+
+def test_a_training_goes_on_without_a_store_and_says_so(
+    s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise ClearwayError("s3://rooms: is full. Make room")
+
+    monkeypatch.setattr(Store, "upload", refused)
+    warned = pytest.warns(UserWarning, match="not copied: s3://rooms: is full. Make room. Training goes on")
+    with warned, pytest.raises(ClearwayError, match="is full"):
+        training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS)
+    assert newest_checkpoint(RunFolder(tmp_path / "run").checkpoints).name.endswith(f"{FRAMES}")
+
+
+def test_what_cannot_be_copied_to_is_told_before_a_folder_is_made(s3: S3, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    for address in ("https://here/run", "runs/one", "s3:"):
+        with pytest.raises(ClearwayError, match="expected an address of s3:// or gs://"):
+            training.train(REQUEST, out, copy_to=address)
+    s3("runs/one/run.json", b"{}")
+    with pytest.raises(ClearwayError, match=r"holds a run already\. Give --resume"):
+        training.train(REQUEST, out, copy_to=ADDRESS)
+    assert not out.exists()
+
+
+def test_without_a_copy_resume_begins(s3: S3, tmp_path: Path) -> None:
+    training.train(REQUEST, tmp_path / "run", resume=True, copy_to=ADDRESS)
+    assert RunCopy(ADDRESS).holds_a_run
