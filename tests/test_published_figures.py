@@ -27,6 +27,7 @@ ROWS = [
     (THIRD, "real", "generalist", "| real plans, no tour |"),
     (FOURTH, "rooms", "generalist", "| rooms, no tour | 100 % (99.8-100) | 92.8"),
     (FOURTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing |"),
+    (FOURTH, "rooms-perturbed-tour", "generalist", "| rooms, everything perturbed, after a tour that sees it too |"),
     (FOURTH, "flats", "generalist", "| flats, no tour, now |"),
     (FOURTH, "validation-rooms", "generalist", "| validation rooms, no tour |"),
     (FOURTH, "validation-rooms-perturbed", "generalist", "| validation rooms, everything perturbed, no tour |"),

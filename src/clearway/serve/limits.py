@@ -45,8 +45,9 @@ class Limits:
     """Pictures that go through the model together."""
     connections: int = 1500
     """That are open at a time."""
-    strangers: int = 100
-    """Connections of an address on which no right token has come yet; the oldest makes room for the next."""
+    strangers: int = 300
+    """Connections of an address on which no right token has come yet; the oldest makes room for the next. As many may
+    come from a fleet behind one address at once."""
     wrong_tokens: int = 20
     """Of an address in a minute; beyond, only tokens are looked at that have come from there before."""
     bodies_bytes: int = 256 << 20
