@@ -12,7 +12,8 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import SC_STEPS
 from clearway.evaluation.quality import Criteria, Quality, quality
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
-from clearway.learn.train import Learning, RunRequest
+from clearway.learn.running import Learning
+from clearway.learn.train import RunRequest
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 

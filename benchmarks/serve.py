@@ -18,19 +18,16 @@ from __future__ import annotations
 import argparse
 import asyncio
 import io
-import os
 import re
-import subprocess
-import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import httpx
 import numpy as np
 from PIL import Image
+from serving import served
 
 from clearway.agents.agent import Agent
 from clearway.deploy.navigator import open_agent
@@ -64,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.run:
         backends = {"PyTorch": open_agent(options.run), "onnxruntime": OnnxAgent(read_onnx(options.agent, threads=1))}
         print_backends(backends)
-    with served(options.agent) as url:
+    with served(str(options.agent), environment={"CLEARWAY_TOKEN": TOKEN}) as (url, _):
         print("| clients | requests/s | p50 ms | p99 ms | pictures a batch | model's share |")
         print("| --- | --- | --- | --- | --- | --- |")
         found: dict[int, list[Row]] = {clients: [] for clients in options.clients}
@@ -109,23 +106,6 @@ def jpeg(picture: np.ndarray) -> bytes:
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "JPEG", quality=85)
     return file.getvalue()
-
-
-@contextmanager
-def served(agent: Path) -> Iterator[str]:
-    """A service in a process; gives its address."""
-    words = [sys.executable, "-m", "clearway", "serve", str(agent)]
-    environment = {**os.environ, "CLEARWAY_TOKEN": TOKEN, "COLUMNS": "500"}
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment) as process:
-        try:
-            assert process.stderr is not None
-            line = process.stderr.readline()
-            found = re.search(r"http://\S+", line)
-            if found is None:
-                sys.exit(f"the service did not start: {line}{process.stderr.read()}")
-            yield found[0]
-        finally:
-            process.terminate()
 
 
 async def measured(url: str, clients: int, seconds: float) -> Row:

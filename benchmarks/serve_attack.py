@@ -19,8 +19,6 @@ import os
 import re
 import secrets
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -31,6 +29,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 from PIL import Image
+from serving import served
 
 from clearway.children import end_with_parent
 
@@ -51,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     hostile = hostile_pictures()
     found: dict[bool, list[float]] = {False: [], True: []}
-    with served(options.agent) as (url, _):
+    with served_to_robots(options.agent) as (url, _):
         for _ in range(options.rounds):
             for attacked in (False, True):
                 with attacking(url, hostile, options.attack_per_s if attacked else 0):
@@ -84,25 +83,14 @@ def rescanned(content: bytes, more: int, most_bytes: int = (4 << 20) - 1024) -> 
 
 
 @contextmanager
-def served(agent: str) -> Iterator[tuple[str, int]]:
-    """A service in a process; gives its address, and the process's id."""
+def served_to_robots(agent: str) -> Iterator[tuple[str, int]]:
+    """A service with the tokens of the robots and of the strangers."""
     with tempfile.TemporaryDirectory() as folder:
         tokens = Path(folder) / "tokens"
         tokens.write_text("".join(f"{name} {token}\n" for name, token in TOKENS.items()), encoding="utf-8")
         tokens.chmod(0o600)
-        words = [sys.executable, "-m", "clearway", "serve", agent, "--tokens", str(tokens)]
-        with subprocess.Popen(
-            words, stderr=subprocess.PIPE, text=True, env={**os.environ, "COLUMNS": "500"}
-        ) as process:
-            try:
-                assert process.stderr is not None
-                line = process.stderr.readline()
-                found = re.search(r"http://\S+", line)
-                if found is None:
-                    sys.exit(f"the service did not start: {line}{process.stderr.read()}")
-                yield found[0], process.pid
-            finally:
-                process.terminate()
+        with served(agent, "--tokens", str(tokens)) as found:
+            yield found
 
 
 @contextmanager

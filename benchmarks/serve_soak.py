@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
-from serve_attack import attacking, hostile_pictures, served, walked
+from serve_attack import attacking, hostile_pictures, served_to_robots, walked
 
 LOOKS_EVERY_S = 5.0
 VISIT_S = 30.0
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--attack-per-s", type=float, default=2.0, help="hostile pictures a second")
     options = parser.parse_args(arguments)
     acts, seen, over = 0, list[tuple[float, float]](), threading.Event()
-    with served(options.agent) as (url, pid):
+    with served_to_robots(options.agent) as (url, pid):
         watcher = threading.Thread(target=watched, args=(pid, seen, over))
         watcher.start()
         try:

@@ -92,7 +92,8 @@ def episodes(world: World, one_scene: bool = False) -> tuple[list[Observation], 
 @pytest.mark.parametrize("name", AGENTS)
 def test_every_agent_keeps_to_the_protocol(name: str) -> None:
     make, draws = AGENTS[name]
-    check_agent(make(WORLD), *episodes(WORLD, one_scene="features" in name), draws=draws)
+    actions = check_agent(make(WORLD), *episodes(WORLD, one_scene="features" in name), draws=draws)
+    assert actions.shape[1] == EPISODES
 
 
 def test_argmax_takes_what_its_agent_holds_most_probable_at_every_step() -> None:

@@ -129,4 +129,4 @@ def test_it_keeps_the_protocol(tmp_path, kind):
         agent = MappingAgent(sight, known=map_of(state), settings=settings)
     rng = np.random.default_rng(0)
     observations = [{FEATURES: features[rng.integers(len(features), size=3)]} for _ in range(4)]
-    check_agent(agent, observations, {FEATURES: features[:3]}, draws=False)
+    assert check_agent(agent, observations, {FEATURES: features[:3]}, draws=False).shape == (4, 3)

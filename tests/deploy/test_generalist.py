@@ -81,7 +81,7 @@ def test_the_file_walks_whole_walks_as_pytorch_does(one_file) -> None:
 def test_it_keeps_the_protocol(one_file, made) -> None:
     rng = np.random.default_rng(0)
     observations = [{RGB: PICTURES[rng.integers(len(PICTURES), size=3)]} for _ in range(4)]
-    check_agent(getattr(one_file, made), observations, {RGB: PICTURES[:3]}, draws=False)
+    assert check_agent(getattr(one_file, made), observations, {RGB: PICTURES[:3]}, draws=False).shape == (4, 3)
 
 
 def test_a_navigator_tours_then_goes_by_its_map_also_from_a_file(one_file, tmp_path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from clearway.learn import train
+from clearway.learn import running, train
 from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.learner import next_steps
@@ -43,7 +43,7 @@ def test_a_run_that_is_cut_goes_on_to_the_same_bits(tmp_path: Path, monkeypatch:
     class Stop(Exception):
         pass
 
-    saved = train.save
+    saved = running.save
     monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", -1.0)
 
     def stop(*given: object) -> None:
@@ -51,10 +51,10 @@ def test_a_run_that_is_cut_goes_on_to_the_same_bits(tmp_path: Path, monkeypatch:
         if given[0].frames == 240:
             raise Stop
 
-    monkeypatch.setattr(train, "save", stop)
+    monkeypatch.setattr(running, "save", stop)
     with pytest.raises(Stop):
         train.train(request, tmp_path / "run")
-    monkeypatch.setattr(train, "save", saved)
+    monkeypatch.setattr(running, "save", saved)
     resumed = train.train(request, tmp_path / "run", resume=True)
     networks = [read_network(newest_checkpoint(folder.checkpoints)) for folder in (whole, resumed)]
     assert equal_bits(*networks)

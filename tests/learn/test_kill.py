@@ -65,16 +65,16 @@ def test_fifty_kills_leave_the_same_bits_as_none(preset: str, tmp_path: Path) ->
 FULL_DISK = """
 import resource, sys
 from pathlib import Path
-from clearway.learn import train
+from clearway.learn import running, train
 from helpers.small_runs import small_learner, small_request
 train.set_threads(1)
 train.SECONDS_BETWEEN_CHECKPOINTS = 0.0
-save = train.save
+save = running.save
 def with_a_limit(trainer, folder, seconds):
     if trainer.updates == 3:  # the network's file fits, the optimiser's does not
         resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
     save(trainer, folder, seconds)
-train.save = with_a_limit
+running.save = with_a_limit
 train.train(small_request(learner=small_learner(width=32)), Path(sys.argv[1]))
 """
 

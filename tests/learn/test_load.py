@@ -12,7 +12,8 @@ from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_network, run_scenes, run_world
 from clearway.learn.run_folder import RunFolder, record_of
-from clearway.learn.train import RunRequest, save, train
+from clearway.learn.running import save
+from clearway.learn.train import RunRequest, train
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.world import make_world

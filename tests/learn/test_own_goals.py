@@ -12,7 +12,7 @@ from torch import Tensor
 from clearway.agents.by_pose import network_on_poses
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import METRIC_NAMES, by_target
-from clearway.learn import train
+from clearway.learn import running, train
 from clearway.learn.a2c import A2C
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
 from clearway.learn.hindsight import find_segments
@@ -177,7 +177,7 @@ def test_it_goes_on_to_the_same_bits(learner: OnPolicy, tmp_path: Path, monkeypa
         if trainer.updates == 4:
             raise KeyboardInterrupt
         figures = update(trainer)
-        train.save(trainer, train.RunFolder(tmp_path / "parts"), 0.0)
+        running.save(trainer, train.RunFolder(tmp_path / "parts"), 0.0)
         return figures
 
     monkeypatch.setattr(Trainer, "update", interrupted)

@@ -15,7 +15,7 @@ import pytest
 import torch
 
 from clearway.errors import RunError
-from clearway.learn import checkpoint, train
+from clearway.learn import checkpoint, running, train
 from clearway.learn.checkpoint import Progress, newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.figures import Figures
 from clearway.learn.presets import PAPER_A2C
@@ -132,13 +132,13 @@ def test_a_run_that_is_stopped_before_it_went_on_keeps_its_checkpoint(
 
 def test_no_frame_is_saved_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
-    saved, save = [], train.save
+    saved, save = [], running.save
 
     def counted(trainer: Trainer, folder: RunFolder, seconds: float) -> None:
         saved.append(trainer.frames)
         save(trainer, folder, seconds)
 
-    monkeypatch.setattr(train, "save", counted)
+    monkeypatch.setattr(running, "save", counted)
     train.train(small_request(), tmp_path)
     assert saved == [80 * k for k in range(1, 11)]
 
@@ -247,7 +247,7 @@ def test_parameters_that_are_not_finite_are_not_saved(tmp_path: Path) -> None:
     with torch.no_grad():
         trainer.network.fusion_bias[0] = torch.inf
     with pytest.raises(RunError, match=r"network\.fusion_bias holds NaN or Inf after 0 frames"):
-        train.save(trainer, folder, 1.0)
+        running.save(trainer, folder, 1.0)
     assert not folder.checkpoints.exists()
 
 

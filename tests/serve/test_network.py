@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import signal
-import socket
 import ssl
 import subprocess
 import time
@@ -20,20 +19,10 @@ from clearway.serve.run import check_tls
 from clearway.serve.service import Service
 from clearway.serve.tokens import Tokens
 from helpers.running import PATIENT_S, running
-from helpers.serving import OWNER, TOKEN, TOKENS, grey
+from helpers.serving import OWNER, TOKEN, TOKENS, grey, until_closed
 from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
-
-
-def until_closed(connection: socket.socket) -> bytes:
-    found = b""
-    try:
-        while part := connection.recv(65536):
-            found += part
-    except ConnectionResetError:
-        pass
-    return found
 
 
 def certified(folder: Path) -> tuple[Path, Path]:

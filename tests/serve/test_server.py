@@ -22,7 +22,7 @@ import clearway
 from clearway.serve.client import KEEP_ALIVE_S as CLIENT_KEEP_ALIVE_S
 from clearway.serve.client import ServiceError
 from helpers.running import PATIENT_S, Running, running
-from helpers.serving import TOKEN, grey, picture_bytes
+from helpers.serving import TOKEN, grey, picture_bytes, until_closed
 from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
@@ -40,17 +40,6 @@ def still_serves(service: Running) -> bool:
     with service.client() as client, client.session(selection="argmax") as session:
         session.set_target(plain(1))
         return session.act(plain(2)).value == 1008
-
-
-def until_closed(connection: socket.socket) -> bytes:
-    """All that arrives before the other side closes or resets the connection."""
-    found = b""
-    try:
-        while part := connection.recv(65536):
-            found += part
-    except ConnectionResetError:
-        pass
-    return found
 
 
 @pytest.mark.slow

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from clearway.learn.load import TrainedAgent
     from clearway.learn.run_folder import RunRecord
+    from clearway.learn.running import Learning
     from clearway.learn.share import Share
-    from clearway.learn.train import Learning
     from clearway.reward import Reward
     from clearway.world.world import World
 

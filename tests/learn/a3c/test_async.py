@@ -15,7 +15,7 @@ import pytest
 import torch
 
 from clearway.errors import RunError
-from clearway.learn import statistics, train
+from clearway.learn import running, statistics, train
 from clearway.learn.a3c.parent import AsyncTrainer
 from clearway.learn.a3c.process import world_tensors
 from clearway.learn.a3c.shared import SharedTensors
@@ -233,7 +233,7 @@ def test_a_loss_that_is_not_finite_is_not_saved_either() -> None:
         trainer.update()
         trainer.shared["parameters.output_bias"][0, 4] = torch.nan
         with pytest.raises(RunError, match=r"nan after|NaN"):
-            train.save(trainer, RunFolder(Path("never made")), 1.0)
+            running.save(trainer, RunFolder(Path("never made")), 1.0)
 
 
 def test_a_process_that_cannot_be_started_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
