@@ -22,9 +22,9 @@ def test_a_line_for_each_learner_says_what_holds_and_what_does_not() -> None:
         )
     )
     assert found == (
-        "paper, 2 of the paper's claims. 1 hold: fewer collisions. 1 undecided: no more steps.",
-        "default, 1 of the paper's claims. 1 do not: fewer collisions.",
-        "paper, 1 of further claims. 1 do not: fewer than with bump.",
+        "paper, the paper's claims. Holds (1): fewer collisions. Undecided (1): no more steps.",
+        "default, the paper's claims. Does not hold (1): fewer collisions.",
+        "paper, further claims. Does not hold (1): fewer than with bump.",
     )
 
 
@@ -42,4 +42,4 @@ def test_it_is_never_longer_than_ten_lines() -> None:
 
 def test_many_claims_of_a_kind_are_counted() -> None:
     (line,) = in_short(section(*(claim(f"paper: {name}", "holds") for name in "abcde")))
-    assert line == "paper, 5 of the paper's claims. 5 hold: a; b; c; and 2 more."
+    assert line == "paper, the paper's claims. Holds (5): a; b; c; and 2 more."

@@ -37,7 +37,7 @@ def test_everything_is_shown_and_nothing_is_taken_for_markup(written, page_parts
         assert text in shown.texts
     assert not {"i", "here", "works", "smoke"} & {tag for tag, _ in shown.seen}
     assert shown.texts.count("paper: it <works>") == 2  # among all verdicts and in its section
-    assert "paper, 1 of the paper's claims. 1 hold: it <works>." in shown.texts
+    assert "paper, the paper's claims. Holds (1): it <works>." in shown.texts
     assert [each.get("id") for each in shown.all("section")] == [None, None, "first", None]
 
 

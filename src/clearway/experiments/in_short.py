@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import get_args
 
 from clearway.experiments.section import Claim, Section, Verdict
 from clearway.experiments.verdicts import LEAST_RUNS
 
 MOST_LINES = 10
 NAMED = 3  # claims of one verdict that a line names
-VERDICTS: dict[Verdict, str] = {"holds": "hold", "does not hold": "do not", "undecided": "undecided"}
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 def is_judged(sections: Sequence[Section]) -> bool:
@@ -28,20 +29,20 @@ def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
             "nothing. The tables hold what was measured.",
         )
     lines = []
-    for further, of_whom in ((False, "of the paper's claims"), (True, "of further claims")):
+    for further, whose in ((False, "the paper's claims"), (True, "further claims")):
         learners = dict.fromkeys(claim.text.partition(":")[0] for claim in claims if claim.further == further)
         for learner in learners:
             own = [c for c in claims if c.further == further and c.text.startswith(f"{learner}:")]
-            lines.append(f"{learner}, {len(own)} {of_whom}. {_told(own)}")
+            lines.append(f"{learner}, {whose}. {_told(own)}")
     more = len(lines) - MOST_LINES
     return tuple(lines) if more <= 0 else (*lines[: MOST_LINES - 1], f"And {more + 1} more learners, below.")
 
 
 def _told(claims: Sequence[Claim]) -> str:
     parts = []
-    for verdict, called in VERDICTS.items():
+    for verdict in VERDICTS:
         texts = [claim.text.partition(": ")[2] for claim in claims if claim.verdict == verdict]
         if texts:
             more = f"; and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
-            parts.append(f"{len(texts)} {called}: {'; '.join(texts[:NAMED])}{more}.")
+            parts.append(f"{verdict.capitalize()} ({len(texts)}): {'; '.join(texts[:NAMED])}{more}.")
     return " ".join(parts)
