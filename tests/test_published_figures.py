@@ -86,14 +86,25 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     assert not section.missing
     (table,) = section.tables
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
-    told = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("| planner on a learnt map")]
+    lines = page.splitlines()
+    told = [line.strip("|").split("|") for line in lines if line.startswith("| planner on a learnt map")]
     assert len(told) == 4
-    for _, frames, steps, collisions, _ in told:
+    for label, agents in (("default recipe | 3,", ["default"]), ("Q-learning, behaviour", ["q-learning", "bc"])):
+        for line in lines:
+            if line.startswith(f"| {label}"):
+                told += [[agent, *line.strip("|").split("|")[1:]] for agent in agents]
+    assert len(told) == 7
+    for agent, frames, steps, collisions, shortest in told:
         count = int(frames.replace(",", ""))
-        (row,) = [row for row in rows if row["agent"] == "planner on a learnt map" and row["frames"] == count]
+        (row,) = [row for row in rows if row["agent"] == agent.strip() and row["frames"] == count]
+        if numbers(shortest):
+            least, *most = (float(end.rstrip("%")) for end in row["shortest ways"].split(" to "))
+            expect(numbers(shortest)[0], least, "least")
+            expect(numbers(shortest)[-1], most[0], "most")
         for cell, name in ((steps, "steps"), (collisions, "collisions")):
             mean, *interval = numbers(cell)
             expect(mean, row[name], f"{name} after {count} frames")
-            assert not interval or interval == numbers(str(row[f"95 % of {name}"]))
+            recorded = numbers(str(row[f"95 % of {name}"]))
+            assert not interval or [*map(float, interval)] == [*map(float, recorded)]
     verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}

@@ -19,11 +19,11 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
     assert (
         told_time(jobs, jobs, 2, 1)
-        == f"{len(jobs)} runs, {len(jobs)} to be trained, 2 at a time: about 1 h 00 min of training here"
+        == f"{len(jobs)} runs, {len(jobs)} to be trained, 2 at a time: 1 h 00 min of training here at least"
     )
     assert told_time(jobs, [], 2, 1) == f"{len(jobs)} runs, 0 to be trained: all is there"
     slow = [replace(jobs[0], run=replace(jobs[0].run, learner=PAPER_A3C)), *jobs]
-    assert told_time(slow, slow, 1, 1).endswith("of training here, and 1 of A3C, whose time is not known")
+    assert told_time(slow, slow, 1, 1).endswith("of training here at least, and 1 of A3C, whose time is not known")
 
 
 def test_each_kind_of_learner_is_tried_once_and_nothing_is_kept(

@@ -37,7 +37,7 @@ def test_where_runs_are_too_few_one_line_says_so() -> None:
 
 def test_it_is_never_longer_than_ten_lines() -> None:
     found = in_short(section(*(claim(f"learner {number}: better", "holds") for number in range(30))))
-    assert len(found) == MOST_LINES and found[-1] == "And 21 more learners, below."
+    assert len(found) == MOST_LINES and found[-1] == "And 21 more lines, below."
 
 
 def test_many_claims_of_a_kind_are_counted() -> None:

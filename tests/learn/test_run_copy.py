@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -128,3 +129,27 @@ def test_what_cannot_be_copied_to_is_told_before_a_folder_is_made(s3: S3, tmp_pa
 def test_without_a_copy_resume_begins(s3: S3, tmp_path: Path) -> None:
     training.train(REQUEST, tmp_path / "run", resume=True, copy_to=ADDRESS)
     assert RunCopy(ADDRESS).holds_a_run
+
+
+def test_no_other_run_and_no_further_one_is_copied_over(
+    s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, elsewhere = tmp_path / "here", tmp_path / "elsewhere"
+    cut_off(here, monkeypatch, updates=2)
+    training.train(REQUEST, elsewhere, resume=True, copy_to=ADDRESS)
+    with pytest.raises(ClearwayError, match="has come further than"):
+        training.train(REQUEST, here, resume=True, copy_to=ADDRESS)
+    other = tmp_path / "other"
+    training.train(replace(REQUEST, seed=9), other)
+    with pytest.raises(ClearwayError, match="holds another experiment than"):
+        training.train(replace(REQUEST, seed=9), other, resume=True, copy_to=ADDRESS)
+    again = tmp_path / "again"
+    assert RunCopy(ADDRESS).restore(again)
+    assert RunFolder(again).read_record().seed == REQUEST.seed
+
+
+def test_a_copy_that_failed_at_the_end_is_made_up(s3: S3, tmp_path: Path) -> None:
+    training.train(REQUEST, tmp_path / "run")
+    training.train(REQUEST, tmp_path / "run", resume=True, copy_to=ADDRESS)
+    assert RunCopy(ADDRESS).restore(tmp_path / "again")
+    assert without_times(tmp_path / "again") == without_times(tmp_path / "run")

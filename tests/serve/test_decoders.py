@@ -158,7 +158,8 @@ def test_a_service_whose_decoders_cannot_start_is_not_ready(monkeypatch) -> None
                 await service.set_target(session, grey(1))
             assert not service.ready
             monkeypatch.undo()
-            await service.set_target(session, grey(1))
+            with pytest.raises(Fault, match="picture"):  # a decoder that refuses a picture has started
+                await service.set_target(session, b"no picture")
             assert service.ready
 
     asyncio.run(task())

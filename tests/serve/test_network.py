@@ -11,6 +11,8 @@ from pathlib import Path
 
 import httpx
 import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
 from clearway.errors import ClearwayError
 from clearway.serve.attempts import Attempts
@@ -108,6 +110,14 @@ def test_health_and_metrics_on_a_port_of_their_own() -> None:
             assert httpx.get(service.url + path, headers=AUTHORISED, timeout=PATIENT_S).status_code == 404
         assert httpx.get(f"{own}/agent", headers=AUTHORISED, timeout=PATIENT_S).status_code == 404
         assert httpx.get(f"{service.url}/agent", headers=AUTHORISED, timeout=PATIENT_S).status_code == 200
+        session = httpx.post(f"{service.url}/sessions", json={}, headers=AUTHORISED, timeout=PATIENT_S).json()[
+            "session_id"
+        ]
+        stream = f"ws://127.0.0.1:{{}}/sessions/{session}/stream"
+        with connect(stream.format(service.port), additional_headers=AUTHORISED):
+            pass
+        with pytest.raises(InvalidStatus), connect(stream.format(service.health_port), additional_headers=AUTHORISED):
+            pass
 
 
 @pytest.mark.parametrize("proxy", [None, "127.0.0.1"])

@@ -18,22 +18,26 @@ TRIED_S = 2.0
 
 
 def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int, threads: int) -> str:
-    """How many runs are to be trained, and for how long, in a line."""
+    """How many runs are to be trained, and for how long at least, in a line.
+
+    Runs side by side are held for as fast as one alone; so many share memory and caches, and take longer.
+    """
     counted = f"{len(jobs)} runs, {len(left)} to be trained"
     if not left:
         return f"{counted}: all is there"
     known = [job.run for job in left if not isinstance(job.run.learner, A3C)]
     speeds: dict[str, float] = {}
-    seconds = 0.0
+    seconds, longest = 0.0, 0.0
     for run in known:
         kind = _kind(run)
         if kind not in speeds:
             speeds[kind] = frames_per_second(run, threads)
         seconds += run.learner.frames / speeds[kind]
+        longest = max(longest, run.learner.frames / speeds[kind])
     beside = min(workers, len(left))
     unknown = len(left) - len(known)
     more = f", and {unknown} of A3C, whose time is not known" if unknown else ""
-    return f"{counted}, {beside} at a time: about {_duration(seconds / beside)} of training here{more}"
+    return f"{counted}, {beside} at a time: {_duration(max(longest, seconds / beside))} of training here at least{more}"
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:

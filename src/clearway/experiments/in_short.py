@@ -35,7 +35,7 @@ def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
             own = [c for c in claims if c.further == further and c.text.startswith(f"{learner}:")]
             lines.append(f"{learner}, {whose}. {_told(own)}")
     more = len(lines) - MOST_LINES
-    return tuple(lines) if more <= 0 else (*lines[: MOST_LINES - 1], f"And {more + 1} more learners, below.")
+    return tuple(lines) if more <= 0 else (*lines[: MOST_LINES - 1], f"And {more + 1} more lines, below.")
 
 
 def _told(claims: Sequence[Claim]) -> str:

@@ -29,7 +29,7 @@ FILE = "memory.json"
 PLANNER, NEAREST = "planner on a learnt map", "nearest picture"
 WALKERS = 100
 FRAMES_A_POSE = (1, 2, 4, 8, 16, 32, 64)
-"""Frames that the walkers take, for every pose of the scenes; the last has seen every step of our rooms."""
+"""Frames that the walkers take, for every pose of the scenes; the last has seen every step of the bathroom."""
 METRICS = ("success", "steps", "collisions", "spl")
 YARDSTICKS: tuple[Learner, ...] = (QLearning(), BC())
 
@@ -152,7 +152,7 @@ def _table(setting: Setting, groups: Sequence[Group], mapped: Sequence[Mapped]) 
     scenes = world.target_scene.numpy()
     rows: list[tuple[Value, ...]] = []
     for own in mapped:
-        exact = f"{min(own.exact):.1%} to {max(own.exact):.1%}"
+        exact = f"{min(own.exact):.1%} to {max(own.exact):.1%}" if own.agent == PLANNER else None
         rows.append((own.agent, "map", own.frames, *_figures(own.scores, scenes), exact))
     for group in groups:
         values = group.scores(setting.out, world.target_count)
@@ -162,7 +162,7 @@ def _table(setting: Setting, groups: Sequence[Group], mapped: Sequence[Mapped]) 
     estimates = (heading for metric in METRICS for heading in (metric, f"95 % of {metric}"))
     notes = (
         "Shortest ways: share of starts from which the map's way to a target is a shortest path, least to most of the "
-        "seeds.",
+        "seeds; who is not told poses may take others.",
     )
     return ReportTable("memory", "Memory alone", (*headings, *estimates, "shortest ways"), tuple(rows), notes)
 

@@ -7,17 +7,19 @@ or not at all, whatever is killed when. Metrics are put before it, since rows be
 
 from __future__ import annotations
 
+import tempfile
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 from clearway.errors import ClearwayError, RunError
 from clearway.files import folder_written_whole
 from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints
-from clearway.learn.run_folder import CHECKPOINTS, METRICS_FILE, RUN_FILE, SETTINGS_FILE
+from clearway.learn.run_folder import CHECKPOINTS, METRICS_FILE, RUN_FILE, SETTINGS_FILE, RunFolder
 from clearway.remote.address import address_of
 from clearway.remote.store import WRITABLE, Store
 
-PARTS = (NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE)
+FILES = (NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE)
 
 
 class RunCopy:
@@ -39,6 +41,24 @@ class RunCopy:
             )
         self.address, self.store = known.rstrip("/"), Store(known)
 
+    def check_fits(self, folder: RunFolder) -> None:
+        """Refuse to copy a run over another one, or over one that has come further elsewhere.
+
+        Raises:
+            ClearwayError: the store holds such a run, or cannot be read.
+        """
+        if not self.holds_a_run:
+            return
+        with tempfile.TemporaryDirectory() as part:
+            self._fetch(Path(part), RUN_FILE)
+            theirs, ours = RunFolder(Path(part)).read_record(), folder.read_record()
+        if not replace(theirs, learner=replace(theirs.learner, frames=ours.learner.frames)).same_experiment(ours):
+            raise RunError(f"{self.address}: holds another experiment than {folder.path}. Give another --copy-to")
+        here = [path.name for path in checkpoints(folder.checkpoints)]
+        if (there := self._checkpoints()) and (not here or there[-1] > here[-1]):
+            problem = f"{self.address}: has come further than {folder.path}, to {there[-1]}"
+            raise RunError(f"{problem}. Go on from it with an empty --out, or give another --copy-to")
+
     @property
     def holds_a_run(self) -> bool:
         """Whether there is one to go on with. Raises ClearwayError where the store cannot be asked."""
@@ -53,11 +73,11 @@ class RunCopy:
         there, here = self._checkpoints(), {path.name: path for path in checkpoints(folder / CHECKPOINTS)}
         self._put(folder, METRICS_FILE, SETTINGS_FILE)
         for name in sorted(set(here) - set(there)):
-            for part in PARTS:
+            for part in FILES:
                 self.store.upload(here[name] / part, self._place(CHECKPOINTS, name, part))
         self._put(folder, RUN_FILE)
         for old in sorted({*there, *here})[:-KEPT]:
-            for part in reversed(PARTS):
+            for part in reversed(FILES):
                 self.store.remove(self._place(CHECKPOINTS, old, part))
 
     def tried_update(self, folder: Path) -> None:
@@ -83,7 +103,7 @@ class RunCopy:
         with folder_written_whole(folder) as part:
             for name in self._checkpoints():
                 (part / CHECKPOINTS / name).mkdir(parents=True)
-                for file in PARTS:
+                for file in FILES:
                     self._fetch(part, CHECKPOINTS, name, file)
             for file in (METRICS_FILE, SETTINGS_FILE, RUN_FILE):
                 if file in names:

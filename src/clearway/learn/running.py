@@ -92,6 +92,7 @@ class Running:
         A run that is finished already is left as it is. `seconds`: trained so far.
         """
         if self._done():
+            self._copy()  # which may have failed before
             return
         log = self._log(seconds)
         try:
@@ -99,10 +100,14 @@ class Running:
         finally:
             if log:
                 log.close()
-        if self.copy is not None:
-            self.copy.update(self.folder.path)
+        self._copy()
         if not self._done():
             raise KeyboardInterrupt
+
+    def _copy(self) -> None:
+        """Bring the copy up to date, where there is to be one. Raises ClearwayError."""
+        if self.copy is not None:
+            self.copy.update(self.folder.path)
 
     def _done(self) -> bool:
         return self.trainer.finished or (self.until_solved and self.trainer.statistics.all_solved)

@@ -207,14 +207,14 @@ def opened_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy
     """A run's copy, with what it holds in the run folder where that holds no run; None: there is to be none.
 
     Raises:
-        ClearwayError: the store cannot be reached, or holds a run already that is not to be gone on with.
+        ClearwayError: the store cannot be reached, or holds a run that is not to be written over.
     """
     if address is None:
         return None
     copy = RunCopy(address)
     if folder.exists:
-        return copy
-    if resume:
+        copy.check_fits(folder)
+    elif resume:
         copy.restore(folder.path)
     elif copy.holds_a_run:
         raise RunError(f"{address}: holds a run already. Give --resume to go on with it, or another --copy-to")

@@ -161,9 +161,10 @@ def _launched(task: Task, workers: int) -> list[str | None]:
             nproc_per_node=workers,
             logs_specs=DefaultLogsSpecs(log_dir=logs),
             run_id="clearway",
-            rdzv_backend="c10d",
-            rdzv_endpoint="localhost:0",
-            local_addr="localhost",
+            rdzv_backend="static",  # the others unpickle what lies in their store
+            rdzv_endpoint=f"127.0.0.1:{_free_port()}",
+            rdzv_configs={"rank": 0},
+            local_addr="127.0.0.1",
             max_restarts=RESTARTS,
             monitor_interval=0.1,
             signals_to_handle="SIGTERM,SIGINT",
@@ -182,9 +183,16 @@ def _launched(task: Task, workers: int) -> list[str | None]:
     return [outcomes[rank] for rank in sorted(outcomes)]
 
 
+def _free_port() -> int:
+    """A port of this machine's loopback device that nobody listens at."""
+    with socket.socket() as plug:
+        plug.bind(("127.0.0.1", 0))
+        return int(plug.getsockname()[1])
+
+
 def given_up(task: Task, reason: str) -> RunError:
     """The error of a training whose workers were lost too often, and how the last one was."""
-    return RunError(f"{task.out}: workers were lost {RESTARTS} times ({reason}). Look for what ends them")
+    return RunError(f"{task.out}: workers were lost {RESTARTS + 1} times ({reason}). Look for what ends them")
 
 
 def work(task: Task) -> str | None:

@@ -15,6 +15,7 @@ import os
 import shutil
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -140,7 +141,7 @@ def _fetch(files: dict[RemoteFile, Store], places: dict[RemoteFile, Path], folde
 
 def _entry(file: RemoteFile) -> str:
     """The name of a file's folder: what it is, and its bytes."""
-    digest = hashlib.sha256(f"{without_query(file.address)}\n{file.version}".encode()).hexdigest()
+    digest = hashlib.sha256(f"{file.address}\n{file.version}".encode()).hexdigest()
     return f"{digest[:32]}-{file.size}"
 
 
@@ -194,7 +195,8 @@ def _leased(folder: Path) -> set[str]:
         if path != own.path and _is_free(Path(f"{path}.lock")):
             path.unlink(missing_ok=True)
             continue
-        entries.update(read_text(path, MAX_LIST_BYTES).split())
+        with suppress(FileNotFoundError):  # its process has given it back meanwhile
+            entries.update(read_text(path, MAX_LIST_BYTES).split())
     return entries
 
 

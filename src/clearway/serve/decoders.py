@@ -258,5 +258,8 @@ class Decoders:
             self._failed = True
             logging.getLogger("clearway.serve").error("no decoder can be started (%s)", fault.strerror)
             raise Fault("overloaded", "no picture can be decoded now. Try again") from fault
+        except Fault:  # a decoder has answered, if only to refuse the picture
+            self._failed = False
+            raise
         self._failed = False
         return picture

@@ -26,13 +26,15 @@ def protected(
     """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted.
 
     It finds the name of the token in the scope, under `OWNER`. Where there is a `health_port`, what `WATCHED` names is
-    answered there, without a token, and nothing else; and nowhere else. `log` is told of every answer.
+    answered there, without a token, and nothing else; and nowhere else. `log` is told of every answer over HTTP.
     """
     limits, metrics = service.limits, service.metrics
 
     async def guard(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
             try:
+                if scope["server"][1] == health_port:
+                    raise Fault("not_found", "there is nothing here on this port")
                 scope[OWNER] = _owner(scope, service)
             except Fault as fault:
                 return await _refuse_socket(send, fault)

@@ -16,7 +16,7 @@ KNOWN = "clearway.known"  # in the state of a request: to be called once its tok
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
 MOST_BYTES = 1 << 20  # of a file of tokens
-MOST_SHARES = 4  # an owner gets no less than this part of what all owners share
+MOST_SHARES = 4  # into which what all owners share is divided; where there are more owners, four can take it all
 
 
 class Tokens:
