@@ -53,7 +53,8 @@ def compiled(path: Path, agent: AgentShape, files: ModelFiles | None = None) -> 
     from clearway.rooms.render_worker import model_of_binary
 
     files = files or files_of_model(path)
-    search = [folder or os.getcwd() for folder in sys.path]
+    search = [os.path.abspath(folder) for folder in sys.path]  # the child runs in another folder
+    environment = {**os.environ, "MUJOCO_GL": "disabled", "PYTHONPATH": os.pathsep.join(search)}
     limits = {"memory_bytes": MEMORY_LIMIT_BYTES, "seconds": TIME_LIMIT_S}
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as given:
         _write_job(given, files, {"agent": asdict(agent), "limits": limits})
@@ -63,7 +64,7 @@ def compiled(path: Path, agent: AgentShape, files: ModelFiles | None = None) -> 
                 stdin=given,
                 capture_output=True,
                 cwd=folder,
-                env={**os.environ, "MUJOCO_GL": "disabled"},
+                env=environment,
                 timeout=TIME_LIMIT_S,
             )
         except subprocess.TimeoutExpired as fault:

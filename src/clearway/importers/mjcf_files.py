@@ -66,7 +66,7 @@ class _Document:
 
     @property
     def is_urdf(self) -> bool:
-        """MuJoCo leaves out there what is only seen, whose files may be missing, and looks at names' last part alone."""
+        """There MuJoCo leaves out what is only seen, whose files may be missing, and looks at names' last parts."""
         return self.root == "robot"
 
     def _begin(self, element: str, attributes: dict[str, str]) -> None:
@@ -117,15 +117,16 @@ class _Reading:
         if text is None:
             raise SceneError(self.path, "there is no such file", "Check the path")
         found = ModelFiles(text)
-        left, documents, seen = [("", text)], list[tuple[str, _Document]](), {""}
+        left, documents, seen = [("", text)], list[tuple[str, _Document]](), {self.path.resolve()}
         while left:
             folder, text = left.pop()
             document = self._document(text)
             documents.append((folder, document))
             for name in document.models:
                 keys = self._take(name, {"": None, folder: None}, found.models, document)
-                left += [(os.path.dirname(key), found.models[key]) for key in keys if key not in seen]
-                seen |= set(keys)
+                new = {self._place(key, name): key for key in keys}
+                left += [(os.path.dirname(key), found.models[key]) for place, key in new.items() if place not in seen]
+                seen |= set(new)
         self._take_assets(documents, found.assets)
         found.outside = self.outside.hexdigest() if self.has_outside else ""
         if isinstance(self.trust, str) and found.outside != self.trust:
