@@ -227,7 +227,7 @@ def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Secti
 
 def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
-    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step
+    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step; ablations
     assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2 + 4 + 5 * 2 + 6 * 2
     assert len({claim.text for section in ("table2", "table3") for claim in sections[section].claims}) == 2 * 2 * 5
     learners = ("paper: ", "paper, unclipped: ", "default: ", "q-learning: ", "bc: ")
