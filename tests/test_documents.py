@@ -75,6 +75,9 @@ def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
     ids = [f'id="clearway.{name}"' for name in ("api.training.train", "scenes.thor_v1.read_scene")]  # from docstrings
     first, later = map(reference.index, ids)
     assert first < later
+    assert 'id="clearway.train"' in reference  # by the name that a program writes
+    commands = re.sub("<[^>]*>", "", (tmp_path / "site/commands/index.html").read_text())
+    assert "# what comes along, and how to open it\nclearway examples\n" in commands  # no comment is cut
     assert "Made with" not in (tmp_path / "site/index.html").read_text()
 
 

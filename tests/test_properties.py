@@ -184,16 +184,16 @@ def test_expected_figures_are_those_of_walking_all_ways(scene: Scene, seed: int)
     mass = np.zeros(scene.state_count)
     mass[task.starts] = 1 / len(task.starts)
     steps = collisions = visits = 0.0
+    moved = np.zeros((scene.state_count, scene.state_count))
+    np.add.at(moved, (np.arange(scene.state_count)[:, None], task.next_state), policy)
+    moved[:, task.target] = 0
+    bumps = (policy * task.blocked).sum(1)
     for _ in range(200_000):
         if mass.sum() < 1e-12:
             break
         steps += mass.sum()
-        after = np.zeros_like(mass)
-        for action in range(4):
-            share = mass * policy[:, action]
-            collisions += share[task.blocked[:, action]].sum()
-            np.add.at(after, task.next_state[:, action], share)
-        after[task.target] = 0
+        collisions += mass @ bumps
+        after = mass @ moved
         visits += after[task.zone == Zone.COLLISION].sum()
         mass = after
     np.testing.assert_allclose(

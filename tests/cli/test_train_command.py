@@ -66,7 +66,7 @@ def test_the_command_that_makes_a_run_longer(tmp_path, words, expected):
 
 
 def test_a_training_may_end_once_all_is_solved(clearway, trained, tmp_path):
-    run, words = tmp_path / "run", ("--set", "envs=20", "rollout_steps=8", "width=16", "clip_rewards=true")
+    run, words = tmp_path / "run", ("--set", "envs=100", "width=128")
     answer = clearway(
         "train", trained.scene, "--out", run, "--targets", 26, "--frames", "2e6", "--until", "solved", *words
     )

@@ -31,12 +31,10 @@ from clearway.experiments.job import do, episodes_of, is_done, trial_path
 from clearway.experiments.reproduce import planned
 from clearway.experiments.section import ReportTable, Section
 from clearway.experiments.setting import Setting
-from clearway.learn.presets import DEFAULT
 from clearway.reward import COLLISION_AWARE
 from clearway.viz import report
 from clearway.viz.report import HTML, JSON, MARKDOWN, write_report
-from helpers.small_runs import small_learner
-from helpers.small_setting import small_setting
+from helpers.small_setting import FRAMES, small_setting
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +159,7 @@ def test_figures_halfway_and_in_the_end_are_those_of_their_trials(
             group for group in compared(setting, (COLLISION_AWARE,), halfway=halfway) if group.learner == "default"
         ]
         steps = group.scores(setting.out, 5).of("steps")
-        frames = small_learner(DEFAULT).frames // (2 if halfway else 1)
+        frames = setting.learners["default"].frames // (2 if halfway else 1)
         (row,) = [row for row in table.rows if row[:3] == ("default", "collision-aware", frames)]
         expected = (steps[:, :3].mean(1) + steps[:, 3:].mean(1)).mean() / 2
         assert dict(zip(table.headings, row, strict=True))["steps"] == pytest.approx(expected)
@@ -176,7 +174,7 @@ def test_bands_reach_from_the_smallest_to_the_largest_seed(setting: Setting, sec
 
 def test_table3_s_agents_are_trained_twice_as_long(setting: Setting) -> None:
     frames = [{each.run.learner.frames for each in planned(setting, [name])} for name in ("table2", "table3")]
-    assert frames == [{800}, {1600}]
+    assert frames == [{FRAMES}, {2 * FRAMES}]
 
 
 def test_figure_3_shows_the_best_and_the_worst_seed(setting: Setting, sections: dict[str, Section]) -> None:

@@ -15,6 +15,8 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import grid_scene
 from helpers.small_runs import FEATURES, small_learner
 
+PRESETS = {"paper": PAPER_A2C, "default": DEFAULT}
+FRAMES = 400
 BUDGET = replace(SMOKE, episodes_per_target=3, step_limit=60)
 
 
@@ -42,5 +44,5 @@ def small_setting(out: Path, seeds: int = 2) -> Setting:
         targets=((0, 13, 30), (5, 22)),
         budget=BUDGET,
         seeds=tuple(range(seeds)),
-        learners={"paper": small_learner(PAPER_A2C), "default": small_learner(DEFAULT)},
+        learners={name: small_learner(preset, frames=FRAMES) for name, preset in PRESETS.items()},
     )

@@ -105,6 +105,10 @@ def test_the_page_plays(browser: Browser, addresses: dict[str, str], how: str) -
     page.locator("#speed").fill("5")
     page.get_by_role("button", name="Play").click()
     expect(page.locator(".badge.good")).to_have_count(2)
+    walked = [tuple(map(int, card.locator("dd").all_inner_texts()[:2])) for card in page.locator(".walker").all()]
+    tie = len(set(walked)) == 1  # steps and collisions
+    badges = ["winner" if own == min(walked) and not tie else "reached" for own in walked]
+    expect(page.locator(".badge.good")).to_have_text(badges)
     assert page.evaluate("[...document.images].every((image) => image.decode())")
     page.get_by_text("Value", exact=True).first.click()
     expect(page.locator("#legend")).to_contain_text("value")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import ClearwayError
-from clearway.files import folder_written_whole
+from clearway.files import check_free, folder_written_whole
 from clearway.view.bundle import bundled
 from clearway.view.content import jpeg, map_json, page_files, stage_json
 from clearway.view.episode import Episode, read_episode
@@ -57,6 +57,7 @@ def save_page(stage: Stage, folder: Path, *, first: str = "", episodes: int = EP
         ClearwayError: the folder holds something, nobody walks, there would be too many episodes, or the first one does
             not fit the stage.
     """
+    check_free(folder)
     if not stage.agents:
         raise ClearwayError("a saved page shows how agents walk, and there is none. Name a run folder")
     wanted = list(_wanted(stage, first, episodes))
