@@ -20,9 +20,6 @@ def written(tmp_path, text: str, mode: int = 0o600):
 def test_a_file_of_tokens(tmp_path) -> None:
     tokens = read_tokens(written(tmp_path, f"# whose\n\nred {RED}\n  blue\t{BLUE}\nred {NEW}\n"))
     assert [tokens.owner_of(given) for given in (RED, BLUE, NEW, "", RED[:-1])] == ["red", "blue", "red", None, None]
-    assert tokens.share(1000) == 500  # of two owners
-    many = Tokens([(str(number), str(number) * 16) for number in range(9)])
-    assert (many.share(1000), many.share(1), Tokens([("one", RED)]).share(7)) == (250, 1, 7)
 
 
 @pytest.mark.parametrize(

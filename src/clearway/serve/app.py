@@ -252,15 +252,18 @@ async def _picture(request: Request) -> bytes:
 
 async def _stream(service: Service, socket: WebSocket, session_id: str) -> None:
     """Answer the pictures of a session, one after the other, until either side ends it."""
+    owner = _owner(socket)
     try:
-        service.sessions.get(session_id, _owner(socket))
-        if service.streams.locked():
-            raise Fault("overloaded", f"{service.limits.sessions} streams are open. Try again later")
+        service.sessions.get(session_id, owner)
+        if not service.streams.take(owner):
+            raise Fault("overloaded", "too many streams are open. Close one, or try again later")
     except Fault as fault:
         return await socket.send_denial_response(_fault_response(fault))
-    async with service.streams:
+    try:
         await socket.accept()
         await _answer_messages(service, socket, session_id)
+    finally:
+        service.streams.free(owner)
 
 
 async def _answer_messages(service: Service, socket: WebSocket, session_id: str) -> None:

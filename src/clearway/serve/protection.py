@@ -106,13 +106,14 @@ class _Exchange:
             if self._read_bytes > self._most_bytes:
                 self.too_large = self._fault()
                 raise self.too_large
-            self._service.hold_bytes(self._scope.get(OWNER, ""), arrived)
+            if not self._service.bodies.take(self._scope.get(OWNER, ""), arrived):
+                raise Fault("overloaded", "too many large requests are under way. Try again")
             self._held_bytes += arrived
         return message
 
     def free(self) -> None:
         """Its body is held no more."""
-        self._service.free_bytes(self._scope.get(OWNER, ""), self._held_bytes)
+        self._service.bodies.free(self._scope.get(OWNER, ""), self._held_bytes)
 
     def _fault(self) -> Fault:
         return Fault("body_too_large", f"at most {self._most_bytes} bytes are taken")
