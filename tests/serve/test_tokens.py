@@ -5,7 +5,7 @@ import os
 import pytest
 
 from clearway.errors import ClearwayError
-from clearway.serve.tokens import Tokens, read_tokens
+from clearway.serve.tokens import read_tokens
 
 RED, BLUE, NEW = 16 * "r", 16 * "b", 16 * "n"
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from clearway.deploy.navigator import Selection
 from clearway.errors import ClearwayError
 from clearway.serve.decoding import CONTENT_TYPES
-from clearway.serve.faults import STATUS, Code, Fault, FaultBody
+from clearway.serve.faults import INTERNAL, POLICY, STATUS, Code, Fault, FaultBody
 from clearway.serve.service import Answer, Service
 from clearway.serve.tokens import OWNER
 from clearway.version import __version__
@@ -33,7 +33,6 @@ Open a session, send the picture of its target, then the picture after every ste
 is a WebSocket for the steps of a session: every binary message is a picture file, every answer the JSON of a step, or
 of a refusal, after which the session goes on as it was.
 """
-POLICY, INTERNAL = 1008, 1011  # WebSocket close codes
 ID = r"^[A-Za-z0-9_-]{1,64}$"
 MOST_SEED = (1 << 53) - 1  # JSON's exact whole numbers
 
