@@ -10,7 +10,7 @@ import asyncio
 import socket
 import struct
 from collections import deque
-from typing import Any
+from typing import Any, cast
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -249,10 +249,13 @@ class ImpatientSocket(_Impatient, WebSocketsSansIOProtocol):
     def _take(self, count: int) -> bool:
         """Whether there were places; `count` in all."""
         more = count - self._held
-        if more > 0 and not self.bodies.take(self.scope[OWNER], more):
+        if not more:
+            return True  # also before there is a scope
+        scope = cast(dict[str, Any], self.scope)
+        if more > 0 and not self.bodies.take(scope[OWNER], more):
             return False
         if more < 0:
-            self.bodies.free(self.scope[OWNER], -more)
+            self.bodies.free(scope[OWNER], -more)
         self._held = count
         return True
 

@@ -81,10 +81,10 @@ class FairTurns:
 
 
 class Places:
-    """Places that owners share: sessions, pictures that wait, bytes. Each finds its own part free, whatever others hold.
+    """Places that owners share: sessions, pictures that wait, bytes. Each finds a part free, whatever others hold.
 
-    Half of the places are kept for the owners, as many for each, but at least one where that is possible. The others are
-    for whoever comes first, to a quarter of all places for an owner; a half or a third where there are two or three.
+    Half of the places are kept for the owners, as many for each, but at least one where that is possible. The others
+    are for whoever comes first, to a quarter of all places for an owner; a half or a third of two or three owners.
 
     Args:
         most: places there are.
