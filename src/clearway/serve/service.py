@@ -52,12 +52,8 @@ class Service:
         def places(most: int) -> Places:
             return Places(most, lambda: tokens.owners)
 
-        self.card, self.limits, self.tokens, self.sessions = (
-            agent.card,
-            limits,
-            tokens,
-            Sessions(limits, places(limits.sessions)),
-        )
+        self.card, self.limits, self.tokens = agent.card, limits, tokens
+        self.sessions = Sessions(limits, places(limits.sessions))
         self.decoders = Decoders(limits)
         self.attempts = Attempts(limits.wrong_tokens)
         self.bodies = places(limits.bodies_bytes)  # bytes of requests and messages under way
