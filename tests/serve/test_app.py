@@ -13,6 +13,7 @@ from clearway.errors import DeployError
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
+from clearway.serve.tokens import ANSWERED
 from clearway.serve.tokens import OWNER as OWNER_KEY
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, picture_bytes
 from helpers.sums import CARD, Sums, plain
@@ -279,6 +280,7 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
         "path": path,
         "headers": [],
         OWNER_KEY: OWNER,
+        ANSWERED: lambda begun, status: None,
         "query_string": b"",
         "extensions": extensions,
     }

@@ -216,6 +216,11 @@ class ImpatientSocket(_Impatient, WebSocketsSansIOProtocol):
         self._hold()
         return message
 
+    async def send(self, message: Any) -> None:
+        """Pass a message on; a refusal completes the handshake, of which uvicorn would complain."""
+        await super().send(message)
+        self.handshake_complete = self.handshake_complete or self.close_sent
+
     def pause_writing(self) -> None:
         """Read no more meanwhile: who does not read could have answers to pings pile up."""
         super().pause_writing()

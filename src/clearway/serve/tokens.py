@@ -12,6 +12,7 @@ from clearway.regular_files import opened, read_at_most
 from clearway.web.guard import same_token
 
 OWNER = "clearway.owner"  # in the scope of a request: the name of its token
+ANSWERED = "clearway.answered"  # in the scope of a WebSocket: to be called of every answer
 KNOWN = "clearway.known"  # in the state of a request: to be called once its token was right
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
