@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import ssl
-import subprocess
 import time
 from pathlib import Path
 
@@ -19,35 +17,12 @@ from clearway.serve.attempts import Attempts
 from clearway.serve.limits import Limits
 from clearway.serve.run import check_tls
 from clearway.serve.service import Service
+from helpers.certificates import certified
 from helpers.running import PATIENT_S, running
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, until_closed
 from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
-
-
-def certified(folder: Path) -> tuple[Path, Path]:
-    """A certificate for 127.0.0.1 that is its own authority, and its key."""
-    if shutil.which("openssl") is None:
-        pytest.skip("openssl, which makes the certificate, is not installed")
-    certificate, key = folder / "cert.pem", folder / "key.pem"
-    words = [
-        "openssl",
-        "req",
-        "-x509",
-        "-newkey",
-        "ec",
-        "-pkeyopt",
-        "ec_paramgen_curve:prime256v1",
-        "-nodes",
-        "-days",
-        "1",
-        "-subj",
-        "/CN=127.0.0.1",
-    ]
-    more = ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
-    subprocess.run([*words, *more], check=True, capture_output=True)
-    return certificate, key
 
 
 def test_over_tls_an_episode_is_walked_and_plain_http_is_not_answered(tmp_path) -> None:
