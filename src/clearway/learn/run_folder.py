@@ -15,7 +15,7 @@ import json
 import math
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -35,7 +35,9 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.regular_files import read_bytes, read_text
 from clearway.remote.address import origin
 from clearway.reward import Reward, reward_from_json
+from clearway.scenes.features import FileFeatures
 from clearway.scenes.scene import Scene
+from clearway.spread.many import of_each
 from clearway.version import __version__
 
 if TYPE_CHECKING:
@@ -123,9 +125,16 @@ def scene_digest(scene: Scene) -> str:
     return digest.hexdigest()[:16]
 
 
+def without_pictures(scenes: Sequence[Scene]) -> list[Scene]:
+    """Scenes with what training sees of them alone, as messages for other processes."""
+    return [replace(scene, observations=None, top_view=None, further=()) for scene in scenes]
+
+
 def record_of(request: RunRequest) -> RunRecord:
     """The record of a run that is about to start."""
     paths = request.paths or {}
+    in_files = all(isinstance(scene.features, FileFeatures) for scene in request.scenes)
+    digests = of_each(scene_digest, without_pictures(request.scenes)) if in_files else map(scene_digest, request.scenes)
     return RunRecord(
         learner=request.learner,
         reward=request.paid,
@@ -135,11 +144,11 @@ def record_of(request: RunRequest) -> RunRecord:
             SceneRecord(
                 name=scene.name,
                 path=origin(paths[scene.name]) if scene.name in paths else None,
-                digest=scene_digest(scene),
+                digest=digest,
                 encoder=scene.encoder_name,
                 targets=tuple(int(target) for target in request.targets[scene.name]),
             )
-            for scene in request.scenes
+            for scene, digest in zip(request.scenes, digests, strict=True)
         ),
         versions=package_versions(),
         hardware=hardware(request.device) | {"feature_store": request.feature_store},

@@ -26,7 +26,7 @@ from clearway.children import end_with_parent
 from clearway.choices import TrackerName
 from clearway.errors import ClearwayError, RunError
 from clearway.learn.peers import LostPeer, Peers
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder, record_of, without_pictures
 from clearway.learn.tracking import check_tracker
 from clearway.learn.train import (
     SECONDS_BETWEEN_CHECKPOINTS,
@@ -117,7 +117,7 @@ def train_by_workers(
         if on_begin is not None:
             on_begin(out)
     task = Task(
-        replace(request, scenes=[replace(s, observations=None, top_view=None, further=()) for s in request.scenes]),
+        replace(request, scenes=without_pictures(request.scenes)),
         out,
         os.getpid(),
         show_progress,
