@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shutil
 import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -47,6 +48,8 @@ FORMAT_VERSION = 2
 SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 MAX_METRICS_BYTES = 1024**3
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
+LOCK_FILE = ".lock"
+COPIED = ".copied-"  # begins the name of what is being copied elsewhere
 SETTINGS_FILE = "run.yaml"  # what repeats the run
 
 
@@ -187,7 +190,7 @@ class RunFolder:
         """
         from filelock import FileLock, Timeout
 
-        lock = FileLock(self.path / ".lock", timeout=0)
+        lock = FileLock(self.path / LOCK_FILE, timeout=0)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             lock.acquire()
@@ -196,12 +199,39 @@ class RunFolder:
         except OSError as error:
             raise RunError(f"{self.path}: not a folder to write to ({error}). Choose another with --out") from error
         try:
-            for name in (RUN_FILE, METRICS_FILE):
-                for part in self.path.glob(f".{name}.*.part"):  # by a process that was killed
-                    part.unlink()
+            self.clear_parts()
             yield
         finally:
             lock.release()
+
+    def clear_parts(self) -> None:
+        """Remove what a process that was killed left unfinished."""
+        for name in (RUN_FILE, METRICS_FILE):
+            for part in self.path.glob(f".{name}.*.part"):
+                part.unlink()
+        for part in self.path.glob(f"{COPIED}*"):
+            shutil.rmtree(part)
+
+    @contextmanager
+    def begun(self, record: RunRecord, resume: bool) -> Iterator[list[str] | None]:
+        """As `begin`; where the run begins, and fails before its first checkpoint, it is removed again."""
+        fresh = not self.exists
+        other_bits = self.begin(record, resume)
+        try:
+            yield other_bits
+        except Exception:
+            if fresh and not any(self.checkpoints.glob("frames-*")):
+                self._forget()
+            raise
+
+    def _forget(self) -> None:
+        """Remove the run, and the folder where it holds nothing else."""
+        for name in (RUN_FILE, METRICS_FILE, SETTINGS_FILE):
+            (self.path / name).unlink(missing_ok=True)
+        for folder in (self.checkpoints, self.path / MILESTONES):
+            shutil.rmtree(folder, ignore_errors=True)
+        if not any(path.name != LOCK_FILE for path in self.path.iterdir()):
+            shutil.rmtree(self.path)
 
     def begin(self, record: RunRecord, resume: bool) -> list[str] | None:
         """Begin a run here, or find one to go on with.
