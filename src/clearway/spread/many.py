@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from typing import TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from clearway.errors import ClearwayError
 from clearway.spread.workers import Work, workers_for
@@ -15,6 +15,8 @@ AT_ONCE = 50  # things in a part
 
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
+_Part: TypeAlias = tuple[Callable[[Any], Any], Sequence[Any]]
+_Done: TypeAlias = tuple[list[Any], list[tuple[str, type[Warning]]]]  # results, and what was warned of
 
 
 def of_each(function: Callable[[Thing], Result], things: Sequence[Thing]) -> Iterator[Result]:
@@ -29,7 +31,8 @@ def of_each(function: Callable[[Thing], Result], things: Sequence[Thing]) -> Ite
         return
     parts = [(function, things[first : first + AT_ONCE]) for first in range(0, len(things), AT_ONCE)]
     environment = {"OMP_NUM_THREADS": "1"}
-    with workers_for(Work(_nothing, _done, _died, environment=environment), workers=cores) as crew:
+    work: Work[None, _Part, _Done] = Work(_nothing, _done, _died, environment=environment)
+    with workers_for(work, workers=cores) as crew:
         for results, told in crew.results(parts):
             for message, kind in told:
                 warnings.warn(message, kind, stacklevel=2)
@@ -40,9 +43,7 @@ def _nothing() -> None:
     """No tool is needed."""
 
 
-def _done(
-    _: None, part: tuple[Callable[[Thing], Result], Sequence[Thing]]
-) -> tuple[list[Result], list[tuple[str, type[Warning]]]]:
+def _done(_: None, part: _Part) -> _Done:
     """The results of a part, and what was warned of."""
     function, things = part
     with warnings.catch_warnings(record=True) as caught:
@@ -51,5 +52,5 @@ def _done(
     return results, [(str(one.message), one.category) for one in caught]
 
 
-def _died(part: tuple[Callable[[Thing], Result], Sequence[Thing]], how: str) -> ClearwayError:
+def _died(part: _Part, how: str) -> ClearwayError:
     return ClearwayError(f"a process that was to look at {len(part[1])} things {how}. Look for what ends it")
