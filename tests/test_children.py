@@ -85,3 +85,22 @@ def test_a_child_gets_no_more_memory_than_its_limit() -> None:
     program = "from clearway.children import limit\nlimit(memory_bytes=1 << 28)\nbytearray(1 << 28)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 1 and done.stderr.endswith("MemoryError\n")
+
+
+CLOSED = """
+import socket, sys
+from clearway.children import open_nothing_more
+
+open_nothing_more()
+for opened in (lambda: open("/etc/hostname"), lambda: open("left", "w"), socket.socket):
+    try:
+        opened()
+    except OSError as fault:
+        print(fault.strerror)
+"""
+
+
+@posix
+def test_a_child_that_is_shut_off_opens_nothing_and_still_speaks() -> None:
+    said = subprocess.run([sys.executable, "-c", CLOSED], capture_output=True, text=True, check=True)
+    assert said.stdout == "Too many open files\n" * 3

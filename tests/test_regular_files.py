@@ -118,7 +118,8 @@ OPENERS = {
     "AutoModel.from_pretrained",
     "onnxruntime.InferenceSession",
 }
-METHODS = {"open", "read_text", "read_bytes"}
+MUJOCO = {"from_file", "from_string", "from_zip", "from_xml_path", "from_xml_string", "from_binary_path"}
+METHODS = {"open", "read_text", "read_bytes", *MUJOCO}
 WRITES = "wax"
 DOOR = "regular_files.py"
 CONTENT = {"file", "io.BytesIO(content)", "io.BytesIO(jpeg)", "content"}
@@ -138,6 +139,11 @@ BESIDE = {
     ("worker.py", "os.open(os.devnull, os.O_RDONLY)"): "stands in for standard input",
     ("hdf5.py", "h5py.is_hdf5(path)"): "after `check_regular`: the library wants names",
     ("hdf5.py", "h5py.File(path, 'r')"): "after `check_regular`: the library wants names",
+    ("mjcf_compile.py", "mujoco.MjSpec.from_string(EMPTY)"): "names no file",
+    ("mjcf_compile.py", "mujoco.MjSpec.from_string(files.text, include=files.models, assets=files.assets)"): (
+        "in a process that can open nothing, see tests/importers/test_mjcf_compile.py"
+    ),
+    ("render_worker.py", "mujoco.MjModel.from_binary_path(MODEL_FILE, {MODEL_FILE: content})"): "compiled by us",
     ("pretrained.py", "AutoModel.from_pretrained"): "after all of its files were read through the door, for their hash",
     ("app.py", "service.open"): "a session",
     ("service.py", "self.sessions.open"): "a session",
@@ -193,6 +199,8 @@ def test_files_are_read_through_the_door(path: Path) -> None:
         "Image.open(io.BytesIO(path.read_bytes()))",
         "zipfile.ZipFile(path)",
         "os.open(path, os.O_RDONLY)",
+        "mujoco.MjModel.from_xml_path(str(path))",
+        "mujoco.MjSpec.from_file(str(path))",
     ],
 )
 def test_a_way_past_the_door_would_be_noticed(source: str) -> None:

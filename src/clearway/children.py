@@ -4,6 +4,7 @@ A child says so itself, first of all:
 
     end_with_parent(parent)  # the parent's process id, told by the parent
     limit(memory_bytes=1 << 30, seconds=60)
+    open_nothing_more()  # once all is read that it needs
 """
 
 from __future__ import annotations
@@ -91,6 +92,14 @@ def limit(*, memory_bytes: int | None = None, seconds: int | None = None) -> Non
     if seconds is not None and sys.platform != "win32":
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.alarm(seconds)
+
+
+def open_nothing_more() -> None:
+    """From now on this process can open no file, pipe or socket; what is open stays so. No effect on Windows."""
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
 
 
 @contextmanager

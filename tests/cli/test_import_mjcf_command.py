@@ -22,5 +22,5 @@ def test_a_model_with_a_missing_mesh_is_one_line_and_nothing_is_written(clearway
     model = tmp_path / "hall.xml"
     model.write_text('<mujoco><asset><mesh file="gone.stl"/></asset></mujoco>')
     answer = clearway("scenes", "import", "mjcf", model, "--out", tmp_path / "scenes")
-    assert answer.refusal("hall.xml", "MuJoCo cannot use it", "gone.stl")
+    assert answer.refusal("hall.xml", "names 'gone.stl', which is not there")
     assert [path.name for path in tmp_path.iterdir()] == ["hall.xml"]

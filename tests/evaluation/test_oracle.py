@@ -103,6 +103,18 @@ def test_policies_agree_with_brute_force(reward):
     np.testing.assert_allclose(soft_policy(task, 0.99, 0.05), policy, atol=1e-7)
 
 
+@pytest.mark.parametrize("reward", [replace(SHORTEST, clip=True), COLLISION_AWARE])
+@pytest.mark.parametrize("entropy_weight", [0.001, 0.01, 0.1])
+def test_no_other_soft_policy_is_found_from_other_values(reward: Reward, entropy_weight: float) -> None:
+    scene, rng = grid_scene(3), np.random.default_rng(0)
+    task = make_task(scene.graph, pose_zones(scene.graph), int(np.flatnonzero(scene.components == 0)[5]), reward)
+    own = soft_policy(task, 0.99, entropy_weight)
+    for scale in (0.01, 1.0, 100.0):
+        for drawn in (rng.normal(0, scale, len(own)), np.full(len(own), scale), np.full(len(own), -scale)):
+            found = soft_policy(task, 0.99, entropy_weight, drawn)
+            np.testing.assert_allclose(found[task.starts], own[task.starts], atol=1e-7)
+
+
 def test_a_dear_collision_zone_lengthens_the_way():
     scene = grid_scene(3)
     target = int(np.flatnonzero(scene.components == 0)[5])

@@ -227,8 +227,8 @@ def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Secti
 
 def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
-    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step
-    assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2 + 4 + 5 * 2
+    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step; ablations
+    assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2 + 4 + 5 * 2 + 6 * 2
     assert len({claim.text for section in ("table2", "table3") for claim in sections[section].claims}) == 2 * 2 * 5
     learners = ("paper: ", "paper, unclipped: ", "default: ", "q-learning: ", "bc: ")
     assert all(claim.text.startswith(learners) for claim in claims)
@@ -406,7 +406,7 @@ def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[
     assert "paper, unclipped: fewer collisions than with the shortest-path reward" in further
     assert "paper: fewer collisions than with the shortest-path reward" not in further
     summary = report._summary(list(judged(sections).values()))
-    assert [len(table.rows) for table in summary] == [30, 28]
+    assert [len(table.rows) for table in summary] == [30, 40]
 
 
 def test_a_report_takes_with_it_what_one_that_was_cut_off_left(

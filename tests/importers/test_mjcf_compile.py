@@ -11,10 +11,12 @@ import pytest
 from clearway.errors import SceneError
 from clearway.importers import mjcf_compile
 from clearway.importers.mjcf_compile import compiled
+from clearway.importers.mjcf_files import ModelFiles, files_of_model
 from clearway.rooms.obstacles import AgentShape, body_geoms
 
 URDF = """<robot name="hut"><link name="base">
 <collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>"""
+SPIKE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 AGENT = AgentShape(radius_m=0.3, height_m=1.0, step_m=0.4)
 
 
@@ -28,9 +30,7 @@ def test_meshes_and_included_files_are_found_and_the_models_defaults_leave_the_b
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "assets").mkdir()
-    (tmp_path / "assets" / "spike.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    )
+    (tmp_path / "assets" / "spike.obj").write_text(SPIKE)
     written(tmp_path, '<worldbody><geom name="included" size="1"/></worldbody>', "more.xml")
     written(
         tmp_path,
@@ -55,8 +55,7 @@ def test_meshes_and_included_files_are_found_and_the_models_defaults_leave_the_b
 @pytest.mark.parametrize(
     ("words", "problem"),
     [
-        pytest.param("<worldbody>", "XML", id="no XML", marks=pytest.mark.slow),
-        pytest.param('<asset><mesh file="gone.stl"/></asset>', r"gone\.stl", id="missing mesh"),
+        pytest.param('<worldbody><geom size="none"/></worldbody>', "size", id="no number"),
         pytest.param(
             '<extension><plugin plugin="their.own"/></extension>',
             "plugin their.own not found",
@@ -64,6 +63,7 @@ def test_meshes_and_included_files_are_found_and_the_models_defaults_leave_the_b
             marks=pytest.mark.slow,
         ),
         pytest.param('<include file="world.xml"/>', "world.xml", id="includes itself", marks=pytest.mark.slow),
+        pytest.param("<worldbody>" + "<body>" * 5000 + "</body>" * 5000 + "</worldbody>", "", id="too deep"),
         pytest.param('<size memory="1T"/>', "memory", id="huge data"),
     ],
 )
@@ -90,12 +90,49 @@ def test_a_model_that_asks_for_all_memory_gets_no_more_than_the_limit(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 def test_a_model_that_takes_too_long_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mjcf_compile, "TIME_LIMIT_S", 3)
-    os.mkfifo(tmp_path / "silent.stl")
-    with pytest.raises(SceneError, match="took more than 3 s"):
-        compiled(written(tmp_path, '<asset><mesh file="silent.stl"/></asset>'), AGENT)
+    monkeypatch.setattr(mjcf_compile, "TIME_LIMIT_S", 1)
+    large = '<asset><texture name="t" type="2d" builtin="checker" width="16000" height="16000"/></asset>'
+    with pytest.raises(SceneError, match=r"took more than 1 s|SIGALRM"):
+        compiled(written(tmp_path, large), AGENT)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="files are shut off by a limit of POSIX")
+@pytest.mark.parametrize("place", ["inside", "outside"])
+def test_mujoco_itself_opens_no_file(place: str, tmp_path: Path) -> None:
+    """Even where a name were overlooked: the file is there and sound, and MuJoCo was not handed it."""
+    beside = tmp_path / place
+    beside.mkdir()
+    (beside / "spike.obj").write_text(SPIKE)
+    files = ModelFiles(f'<mujoco><asset><mesh file="{beside / "spike.obj"}"/></asset></mujoco>'.encode())
+    with pytest.raises(SceneError, match="MuJoCo cannot use it"):
+        compiled(tmp_path / "world.xml", AGENT, files)
+
+
+def test_files_of_the_same_name_and_of_attached_models_are_each_found(tmp_path: Path) -> None:
+    for folder, size in (("a", "1"), ("b", "5")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "spike.obj").write_text(SPIKE.replace("1 0 0", f"{size} 0 0"))
+    body = '<worldbody><body name="b"><geom type="mesh" mesh="spike"/></body></worldbody>'
+    written(tmp_path / "b", f'<asset><mesh file="spike.obj"/></asset>{body}', "child.xml")
+    words = (
+        '<asset><mesh file="./a/spike.obj"/><model name="child" file="b\\child.xml"/></asset>'
+        '<worldbody><geom type="mesh" mesh="spike"/>'
+        '<frame><attach model="child" body="b" prefix="p"/></frame></worldbody>'
+    )
+    model = compiled(written(tmp_path, words), AGENT)
+    assert model.mesh_vertnum.tolist() == [4, 4]
+    near, far = model.mesh_vert[:4], model.mesh_vert[4:]
+    assert np.ptp(near, axis=0).max() < 2 < np.ptp(far, axis=0).max()
+
+
+def test_files_outside_a_model_s_folder_take_trust(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    written(tmp_path, '<worldbody><geom name="included" size="1"/></worldbody>', "more.xml")
+    path = written(tmp_path / "home", '<include file="../more.xml"/>')
+    with pytest.raises(SceneError, match=r"names '\.\./more\.xml', which lies outside its folder\. .*--trust"):
+        compiled(path, AGENT)
+    assert compiled(path, AGENT, files_of_model(path, trust=True)).ngeom == 4
 
 
 def test_a_process_that_dies_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,6 +68,20 @@ def test_where_the_floor_ends_the_move_ends(tmp_path: Path) -> None:
     assert body.place_m[0] == pytest.approx(-2.1, abs=0.002)
 
 
+def test_a_model_that_was_trusted_is_walked_in_as_long_as_its_files_are_the_same(tmp_path: Path) -> None:
+    (tmp_path / "home").mkdir()
+    (tmp_path / "more.xml").write_text("<mujoco><custom/></mujoco>")
+    path = written(tmp_path / "home", SLAB)
+    path.write_text(path.read_text().replace("<worldbody>", '<include file="../more.xml"/><worldbody>'))
+    with pytest.raises(SceneError, match=r"lies outside its folder\. .*--trust"):
+        read_mjcf(path, CHOICE, AGENT)
+    scene = read_mjcf(path, CHOICE, AGENT, workers=1, trust=True, **SMALL)
+    assert live_room(scene).world is not None
+    (tmp_path / "more.xml").write_text("<mujoco><!-- changed --><custom/></mujoco>")
+    with pytest.raises(SceneError, match=r"outside its folder have changed since it was imported"):
+        live_room(scene)
+
+
 def test_the_edge_of_what_counts_as_floor_is_a_wall(live: LiveRoom) -> None:
     body = live.body(live.as_built())
     body.stand_at(np.array([-2.0, -1.0]))

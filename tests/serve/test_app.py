@@ -13,6 +13,7 @@ from clearway.errors import DeployError
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
+from clearway.serve.tokens import ANSWERED
 from clearway.serve.tokens import OWNER as OWNER_KEY
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, picture_bytes
 from helpers.sums import CARD, Sums, plain
@@ -319,6 +320,7 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
         "path": path,
         "headers": [],
         OWNER_KEY: OWNER,
+        ANSWERED: lambda begun, status: None,
         "query_string": b"",
         "extensions": extensions,
     }
@@ -327,14 +329,14 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
 
 def test_a_stream_that_nobody_uses_is_closed() -> None:
     service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1), TOKENS), []
-    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None, 1).id, sent))
+    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None).id, sent))
     assert [message["type"] for message in sent] == ["websocket.accept", "websocket.close"]
     assert (sent[1]["code"], sent[1]["reason"]) == (1008, "unused for too long")
 
 
 def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
     service = Service(Sums(), Limits(sessions=1), TOKENS)
-    session = service.sessions.open(OWNER, "sampled", None, 1)
+    session = service.sessions.open(OWNER, "sampled", None)
 
     async def two() -> tuple[list[dict], list[dict]]:
         first, second = [], []
@@ -350,7 +352,7 @@ def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
     assert [message["type"] for message in first] == ["websocket.accept"]
     assert refusal["status"] == 503
     assert json.loads(body["body"])["error"]["code"] == "overloaded"
-    assert not service.streams.locked()
+    assert service.streams.taken == 0
 
 
 def test_figures_for_prometheus(client) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import ssl
-import subprocess
 import time
 from pathlib import Path
 
@@ -19,36 +17,12 @@ from clearway.serve.attempts import Attempts
 from clearway.serve.limits import Limits
 from clearway.serve.run import check_tls
 from clearway.serve.service import Service
-from clearway.serve.tokens import Tokens
+from helpers.certificates import certified
 from helpers.running import PATIENT_S, running
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, until_closed
 from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
-
-
-def certified(folder: Path) -> tuple[Path, Path]:
-    """A certificate for 127.0.0.1 that is its own authority, and its key."""
-    if shutil.which("openssl") is None:
-        pytest.skip("openssl, which makes the certificate, is not installed")
-    certificate, key = folder / "cert.pem", folder / "key.pem"
-    words = [
-        "openssl",
-        "req",
-        "-x509",
-        "-newkey",
-        "ec",
-        "-pkeyopt",
-        "ec_paramgen_curve:prime256v1",
-        "-nodes",
-        "-days",
-        "1",
-        "-subj",
-        "/CN=127.0.0.1",
-    ]
-    more = ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
-    subprocess.run([*words, *more], check=True, capture_output=True)
-    return certificate, key
 
 
 def test_over_tls_an_episode_is_walked_and_plain_http_is_not_answered(tmp_path) -> None:
@@ -182,16 +156,6 @@ def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_pat
         signal.signal(signal.SIGHUP, before)
 
 
-def test_large_bodies_together_are_bounded() -> None:
-    service = Service(Sums(), Limits(bodies_bytes=100), Tokens([("crowd", 20 * "c"), ("guest", 20 * "g")]))
-    service.hold_bytes("crowd", 50)
-    with pytest.raises(Exception, match="too many large requests"):
-        service.hold_bytes("crowd", 1)
-    service.hold_bytes("guest", 50)
-    service.free_bytes("crowd", 50)
-    service.hold_bytes("crowd", 50)
-
-
 def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
     service = Service(Sums(), Limits(bodies_bytes=1000), TOKENS)
     client = called(service)
@@ -200,7 +164,7 @@ def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
     for _ in range(3):
         assert client.put(path, content=bytes(2000), headers=kind).json()["error"]["code"] == "overloaded"
         assert client.put(path, content=grey(1), headers=kind).status_code == 204
-    assert service._bodies.total() == 0
+    assert service.bodies.taken == 0
 
 
 def test_it_ends_in_time_whatever_is_under_way_and_tells_who_waits() -> None:

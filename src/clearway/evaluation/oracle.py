@@ -165,16 +165,28 @@ def optimal_policy(task: Task, discount: float = DISCOUNT) -> np.ndarray:
     raise AssertionError("policy iteration did not end")
 
 
-def soft_policy(task: Task, discount: float = DISCOUNT, entropy_weight: float = ENTROPY_WEIGHT) -> np.ndarray:
+def soft_policy(
+    task: Task,
+    discount: float = DISCOUNT,
+    entropy_weight: float = ENTROPY_WEIGHT,
+    first_value: np.ndarray | None = None,
+) -> np.ndarray:
     """The fixed point pi = softmax(Q^pi / entropy_weight), (S, A).
 
     Far from it each policy is evaluated exactly; near it Newton's method solves V = sum_a pi_V(a) Q_V(a), with
-    d V / d Q_a = pi(a) (1 + (Q_a - V) / entropy_weight).
+    d V / d Q_a = pi(a) (1 + (Q_a - V) / entropy_weight). Nothing proves that there is one alone: `first_value` is for
+    looking for others.
+
+    Args:
+        task: see there.
+        discount: of rewards to come.
+        entropy_weight: of the bonus.
+        first_value: (S,) values of states to begin from; None: zeros.
 
     Raises:
         SceneError: the policies do not settle, which a larger entropy weight or a smaller discount mends.
     """
-    value = np.zeros(len(task.reward))
+    value = np.zeros(len(task.reward)) if first_value is None else first_value
     for _ in range(MOST_ROUNDS):
         values = action_values(task, value, discount)
         policy = np.exp((values - values.max(1, keepdims=True)) / entropy_weight)

@@ -60,25 +60,30 @@ def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = 
         groups: of any learners and rewards, all trained on the same targets.
         where: behind each claim, for example " on hard targets".
     """
-    mark = mark_steps(setting, groups[0].trial.targets)
-    found = {(group.learner, group.agent): frames_until_settled(setting.out, group, mark) for group in groups}
-    rows: list[tuple[Value, ...]] = []
-    for (learner, agent), (frames, settled) in found.items():
-        estimate = mean_estimate(frames, ONE_TARGET) if len(frames) else None
-        values = (None, None) if estimate is None else (estimate.value, estimate.ends)
-        rows.append((learner, agent, len(frames), settled, *values))
+    found = _until_settled(setting, groups)
     claims = []
     for learner in dict.fromkeys(group.learner for group in groups):
         ours, baseline = (found[learner, reward.name][0] for reward in (COLLISION_AWARE, SHORTEST))
         text = f"{learner}: learns faster (fewer frames until training has settled){where}"
         claims.append(judged_less(text, "frames until settled", ours, baseline, ONE_TARGET))
+    return settling_table(name, setting, groups), claims
+
+
+def settling_table(name: str, setting: Setting, groups: Sequence[Group]) -> ReportTable:
+    """How long each group trains until it has settled; arguments as of `settling`."""
+    rows: list[tuple[Value, ...]] = []
+    for (learner, agent), (frames, settled) in _until_settled(setting, groups).items():
+        estimate = mean_estimate(frames, ONE_TARGET) if len(frames) else None
+        values = (None, None) if estimate is None else (estimate.value, estimate.ends)
+        rows.append((learner, agent, len(frames), settled, *values))
     headings = ("learner", "agent", "seeds", "settled", "frames", "95 %")
+    mark = mark_steps(setting, groups[0].trial.targets)
     note = (
         f"Frames from which on {ARRIVING:.0%} of training episodes reach their target, and all take at most {mark:.3g} "
         f"steps on average, {DETOUR:g} times the shortest paths'. A run that never gets there, or fails a target in "
         "the end, counts with all its frames; one whose metrics.jsonl was removed does not count."
     )
-    return ReportTable(f"{name}_settled", "Frames until training has settled", headings, tuple(rows), (note,)), claims
+    return ReportTable(f"{name}_settled", "Frames until training has settled", headings, tuple(rows), (note,))
 
 
 def frames_until_settled(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
@@ -92,3 +97,9 @@ def frames_until_settled(out: Path, group: Group, mark: float) -> tuple[np.ndarr
         settled += row is not None
         frames.append(run.learner.frames if row is None else row["frames"])
     return np.array(frames, dtype=np.float64).reshape(-1, 1), settled
+
+
+def _until_settled(setting: Setting, groups: Sequence[Group]) -> dict[tuple[str, str], tuple[np.ndarray, int]]:
+    """`frames_until_settled` by learner and agent."""
+    mark = mark_steps(setting, groups[0].trial.targets)
+    return {(group.learner, group.agent): frames_until_settled(setting.out, group, mark) for group in groups}

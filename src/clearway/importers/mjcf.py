@@ -40,11 +40,12 @@ def read_mjcf(
     workers: int | None = None,
     ray: str | None = None,
     progress: bool = False,
+    trust: bool = False,
 ) -> Scene:
     """The scene that an MJCF file describes, with pictures in memory and without features.
 
     Args:
-        path: the file; meshes, textures and included files lie where it says.
+        path: the file; meshes, textures and included files lie where it says, in its folder.
         choice: what the file does not say.
         agent: the agent's body and step.
         name: of the scene; None: the file's.
@@ -54,15 +55,17 @@ def read_mjcf(
         workers: number of renderer processes; None: one a core.
         ray: a Ray cluster that renders instead, see `ray_cluster.connected`.
         progress: show a progress bar, if standard error is a terminal.
+        trust: the files that it names may lie outside its folder.
 
     Raises:
-        SceneError: MuJoCo refuses the model, the world is too large, the agent fits nowhere, or a sensor is unknown.
+        SceneError: the model names what it may not, MuJoCo refuses it, the world is too large, the agent fits nowhere,
+            or a sensor is unknown.
         RenderError: MuJoCo cannot render on this machine.
     """
     check_names(sensors)
     title = path.stem if name is None else name
     check_picture_size(path, height_px, width_px)
-    world = open_world(path, choice, agent)
+    world = open_world(path, choice, agent, trust=trust)
     grid, model, floor_m = world.grid, world.model, world.choice.floor_m
     pose_bytes = sum(SENSORS[name](height_px, width_px).kept_bytes for name in sensors)
     check_picture_count(path, len(grid.graph), height_px, width_px, SMALLER, pose_bytes)

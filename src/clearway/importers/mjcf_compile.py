@@ -1,8 +1,9 @@
 """MuJoCo models of others, compiled in a process of their own with bounded memory and time.
 
-MuJoCo reads whatever files a model names and makes whatever sizes it asks for; a model that is broken, or meant to do
-harm, ends that process and not ours. The process writes the model in MuJoCo's binary format to standard output, or
-the reason why there is none to standard error.
+MuJoCo makes whatever sizes a model asks for; a model that is broken, or meant to do harm, ends that process and not
+ours. The process is given the model and all files that it names on standard input (see `mjcf_files`), and can open none
+itself. It writes the model in MuJoCo's binary format to standard output, or the reason why there is none to standard
+error.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ import sys
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, BinaryIO
 
-from clearway.children import limit
+from clearway.children import limit, open_nothing_more
 from clearway.errors import SceneError
+from clearway.importers.mjcf_files import REMEDY, ModelFiles, files_of_model
 
 if TYPE_CHECKING:
     import mujoco
@@ -34,30 +36,35 @@ COMMAND = (
 )
 REFUSED = 3
 MESSAGE_LENGTH = 300
-REMEDY = "Correct the model; the files that it names must lie where it says"
+EMPTY = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
 
 
-def compiled(path: Path, agent: AgentShape) -> mujoco.MjModel:
+def compiled(path: Path, agent: AgentShape, files: ModelFiles | None = None) -> mujoco.MjModel:
     """The model in an MJCF file, with the agent's body in it (see `obstacles.add_body`).
 
+    Args:
+        path: the file.
+        agent: the body.
+        files: that and what it names; None: read here, all of it in the model's folder.
+
     Raises:
-        SceneError: there is no such file, MuJoCo refuses it, or it takes more than the limits of memory and time.
+        SceneError: as `files_of_model`; MuJoCo refuses it, or it takes more than the limits of memory and time.
     """
     from clearway.rooms.render_worker import model_of_binary
 
-    if not path.is_file():
-        raise SceneError(path, "there is no such file", "Check the path")
-    search = [folder or os.getcwd() for folder in sys.path]
+    files = files or files_of_model(path)
+    search = [os.path.abspath(folder) for folder in sys.path]  # the child runs in another folder
+    environment = {**os.environ, "MUJOCO_GL": "disabled", "PYTHONPATH": os.pathsep.join(search)}
     limits = {"memory_bytes": MEMORY_LIMIT_BYTES, "seconds": TIME_LIMIT_S}
-    job = json.dumps({"path": str(path.resolve()), "agent": asdict(agent), "limits": limits})
-    with tempfile.TemporaryDirectory() as folder:  # MuJoCo leaves a log of warnings where it runs
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as given:
+        _write_job(given, files, {"agent": asdict(agent), "limits": limits})
         try:
             done = subprocess.run(
-                [sys.executable, "-c", COMMAND.format(path=search, parent=os.getpid()), job],
-                stdin=subprocess.DEVNULL,
+                [sys.executable, "-c", COMMAND.format(path=search, parent=os.getpid())],
+                stdin=given,
                 capture_output=True,
                 cwd=folder,
-                env={**os.environ, "MUJOCO_GL": "disabled"},
+                env=environment,
                 timeout=TIME_LIMIT_S,
             )
         except subprocess.TimeoutExpired as fault:
@@ -65,6 +72,25 @@ def compiled(path: Path, agent: AgentShape) -> mujoco.MjModel:
     if done.returncode != 0:
         raise SceneError(path, _failure(done.returncode, done.stderr), REMEDY)
     return model_of_binary(done.stdout)
+
+
+def _write_job(file: BinaryIO, files: ModelFiles, job: dict[str, Any]) -> None:
+    """A line of JSON with the length of every file, then the files, one after the other; ready to be read."""
+    parts = {"models": files.models, "assets": files.assets}
+    sizes = {part: {name: len(content) for name, content in named.items()} for part, named in parts.items()}
+    file.write(json.dumps({**job, "text": len(files.text), **sizes}).encode() + b"\n")
+    for content in (files.text, *files.models.values(), *files.assets.values()):
+        file.write(content)
+    file.seek(0)
+
+
+def _read_job(file: BinaryIO) -> tuple[dict[str, Any], ModelFiles]:
+    """What `_write_job` wrote."""
+    job = json.loads(file.readline())
+    text = file.read(job["text"])
+    models = {name: file.read(size) for name, size in job["models"].items()}
+    assets = {name: file.read(size) for name, size in job["assets"].items()}
+    return job, ModelFiles(text, models, assets)
 
 
 def _failure(code: int, messages: bytes) -> str:
@@ -78,18 +104,20 @@ def _failure(code: int, messages: bytes) -> str:
 
 
 def main() -> None:
-    """Compile the model that the command line names; the process's work."""
+    """Compile the model on standard input; the process's work."""
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as output:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what MuJoCo prints must not mix with the model
-        job = json.loads(sys.argv[1])
+        job, files = _read_job(sys.stdin.buffer)
         limit(**job["limits"])
         import mujoco
 
         from clearway.rooms.obstacles import AgentShape, add_body
         from clearway.rooms.render_worker import binary_model
 
+        mujoco.MjSpec.from_string(EMPTY).compile()  # whatever is loaded late has been by now
+        open_nothing_more()
         try:
-            spec = mujoco.MjSpec.from_file(job["path"])
+            spec = mujoco.MjSpec.from_string(files.text, include=files.models, assets=files.assets)
             spec.compiler.discardvisual = False  # the agent's body collides with nothing, and must stay
             add_body(spec, AgentShape(**job["agent"]))
             model = spec.compile()

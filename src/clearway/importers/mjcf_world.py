@@ -18,6 +18,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.importers.mjcf_compile import compiled
+from clearway.importers.mjcf_files import IMPORT_AGAIN, files_of_model
 from clearway.importers.mjcf_floor import FloorChoice, find_cells, floor_of, on_floor, span_of
 from clearway.rooms.build import shaping_versions
 from clearway.rooms.navigation import Floor, NavigationGrid
@@ -28,7 +29,6 @@ SOURCE = "mjcf"
 SHOWN_GROUPS = (0, 1, 2)  # as MuJoCo's own viewer starts
 NEAR_M = 0.05  # nothing nearer is drawn
 DIGEST_LENGTH = 16
-REIMPORT = "Import the model again (clearway scenes import mjcf)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,7 @@ class ModelWorld:
         grid: where it fits there.
         top_m: height of the highest finite thing, or of the floor where that is higher.
         digest: hash of the compiled model, the same with the same version of MuJoCo.
+        outside: SHA-256 of the files outside its folder that it names; empty where there are none.
     """
 
     path: Path
@@ -56,6 +57,7 @@ class ModelWorld:
     grid: NavigationGrid
     top_m: float
     digest: str
+    outside: str = ""
 
     def carries(self, points_m: np.ndarray) -> np.ndarray:
         """Whether there is a floor at each of (N, 2) points, (N,) bool."""
@@ -72,33 +74,39 @@ class ModelWorld:
                 "digest": self.digest,
                 "world": asdict(self.choice),
                 "agent": asdict(self.agent),
+                **({"outside": self.outside} if self.outside else {}),
             },
         )
 
 
-def open_world(path: Path, choice: FloorChoice | None = None, agent: AgentShape | None = None) -> ModelWorld:
+def open_world(
+    path: Path, choice: FloorChoice | None = None, agent: AgentShape | None = None, *, trust: bool | str = False
+) -> ModelWorld:
     """The world of an MJCF or URDF file.
 
     Args:
-        path: the file; meshes, textures and included files lie where it says.
+        path: the file; meshes, textures and included files lie where it says, in its folder.
         choice: what the file does not say.
         agent: the agent's body and step.
+        trust: they may lie elsewhere, see `files_of_model`.
 
     Raises:
-        SceneError: MuJoCo refuses the model, the world is too large, or the agent fits nowhere.
+        SceneError: the model names what it may not, MuJoCo refuses it, the world is too large, or the agent fits
+            nowhere.
     """
     choice, agent = choice or FloorChoice(), agent or AgentShape()
     if agent.height_m <= 2 * agent.radius_m:
         problem = f"an agent {agent.height_m:g} m high and {2 * agent.radius_m:g} m wide is no standing capsule"
         raise SceneError(path, problem, "Make it higher or thinner")
-    model = compiled(path, agent)
+    files = files_of_model(path, trust=trust)
+    model = compiled(path, agent, files)
     digest = _digest(model)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     floor = floor_of(path, model, data, choice, agent.step_m)
     grid = find_cells(path, model, data, floor, choice, agent)
     top_m = _set_lens(model, data, floor, choice.floor_m)
-    return ModelWorld(path, model, data, choice, agent, floor, grid, top_m, digest)
+    return ModelWorld(path, model, data, choice, agent, floor, grid, top_m, digest, files.outside)
 
 
 def world_of(scene: Scene) -> ModelWorld:
@@ -108,16 +116,18 @@ def world_of(scene: Scene) -> ModelWorld:
         SceneError: its record does not name the model or is damaged; the model is missing or another one by now.
     """
     notes = scene.made_by.notes
-    path, digest = notes.get("path"), notes.get("digest")
-    if not isinstance(path, str) or not isinstance(digest, str):
-        raise SceneError(scene.name, "it does not say where its MuJoCo model lies", REIMPORT)
+    path, digest, outside = notes.get("path"), notes.get("digest"), notes.get("outside", "")
+    if not isinstance(path, str) or not isinstance(digest, str) or not isinstance(outside, str):
+        raise SceneError(scene.name, "it does not say where its MuJoCo model lies", IMPORT_AGAIN)
     choice, agent = _recorded(scene, FloorChoice, "world"), _recorded(scene, AgentShape, "agent")
     if not Path(path).is_file():
-        raise SceneError(scene.name, f"its MuJoCo model {path} is missing", f"Put it back there, or {_lower(REIMPORT)}")
-    world = open_world(Path(path), choice, agent)
+        raise SceneError(
+            scene.name, f"its MuJoCo model {path} is missing", f"Put it back there, or {_lower(IMPORT_AGAIN)}"
+        )
+    world = open_world(Path(path), choice, agent, trust=outside)
     same = scene.made_by.versions.get("mujoco") != mujoco.__version__ or world.digest == digest
     if not same or not _same_grid(world.grid, scene):
-        raise SceneError(scene.name, f"its MuJoCo model {path} has changed since it was imported", REIMPORT)
+        raise SceneError(scene.name, f"its MuJoCo model {path} has changed since it was imported", IMPORT_AGAIN)
     return world
 
 
@@ -147,7 +157,7 @@ def _recorded(scene: Scene, kind: type[Any], name: str) -> Any:
         expected = asdict(kind())
         if all(_alike(value, expected[key], key) for key, value in values.items()):
             return kind(**values)
-    raise SceneError(scene.name, f"the record of its MuJoCo model's {name} is damaged", REIMPORT)
+    raise SceneError(scene.name, f"the record of its MuJoCo model's {name} is damaged", IMPORT_AGAIN)
 
 
 PAIRS = {"spawn_m": 2, "extent_m": 4}

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from http import HTTPStatus
 from typing import Annotated, Any
 
 from clearway.deploy.navigator import Selection
 from clearway.errors import ClearwayError
 from clearway.serve.decoding import CONTENT_TYPES
-from clearway.serve.faults import STATUS, Code, Fault, FaultBody
+from clearway.serve.faults import INTERNAL, POLICY, STATUS, Code, Fault, FaultBody
 from clearway.serve.service import Service
 from clearway.serve.sessions import Answer
-from clearway.serve.tokens import OWNER
+from clearway.serve.tokens import ANSWERED, OWNER
 from clearway.version import __version__
 
 try:
@@ -35,7 +37,6 @@ is a WebSocket for the steps of a session: every binary message is a picture fil
 of a refusal, after which the session goes on as it was. Where a stream broke, open the next one with `?step=` and the
 number of the step that was not answered: its picture, sent again, is not walked twice.
 """
-POLICY, INTERNAL = 1008, 1011  # WebSocket close codes
 ID = r"^[A-Za-z0-9_-]{1,64}$"
 MOST_SEED = (1 << 53) - 1  # JSON's exact whole numbers
 Number = Annotated[int | None, Query(ge=1, le=MOST_SEED)]
@@ -265,15 +266,18 @@ async def _picture(request: Request) -> bytes:
 
 async def _stream(service: Service, socket: WebSocket, session_id: str, step: int | None) -> None:
     """Answer the pictures of a session, one after the other, until either side ends it."""
+    owner = _owner(socket)
     try:
-        service.sessions.get(session_id, _owner(socket))
-        if service.streams.locked():
-            raise Fault("overloaded", f"{service.limits.sessions} streams are open. Try again later")
+        service.sessions.get(session_id, owner)
+        if not service.streams.take(owner):
+            raise Fault("overloaded", "too many streams are open. Close one, or try again later")
     except Fault as fault:
         return await socket.send_denial_response(_fault_response(fault))
-    async with service.streams:
+    try:
         await socket.accept()
         await _answer_messages(service, socket, session_id, step)
+    finally:
+        service.streams.free(owner)
 
 
 async def _answer_messages(service: Service, socket: WebSocket, session_id: str, step: int | None) -> None:
@@ -284,22 +288,17 @@ async def _answer_messages(service: Service, socket: WebSocket, session_id: str,
                 message = await socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
+            begun, status = time.perf_counter(), int(HTTPStatus.OK)
             try:
-                session = service.sessions.get(session_id, _owner(socket))
-                content = message.get("bytes")
-                if content is None:
-                    raise Fault("invalid_request", "send pictures as binary messages")
-                async with asyncio.timeout(service.limits.deadline_s):
-                    answer = await service.step(session, content, step)
+                answer = await _answer_message(service, _owner(socket), session_id, message.get("bytes"), step)
                 step = None
-                await socket.send_text(_answer(service, answer).model_dump_json())
-            except TimeoutError:
-                fault = Fault("deadline_passed", f"not answered within {service.limits.deadline_s:g} s. Try again")
-                await _refuse_message(service, socket, fault)
             except Fault as fault:
-                await _refuse_message(service, socket, fault)
-                if fault.code == "no_such_session":
-                    return await socket.close(POLICY, "the session has ended")
+                service.metrics.faults.labels(fault.code).inc()
+                answer, status = fault.body().decode(), fault.status
+            await socket.send_text(answer)
+            socket.scope[ANSWERED](begun, status)
+            if status == HTTPStatus.NOT_FOUND:
+                return await socket.close(POLICY, "the session has ended")
     except WebSocketDisconnect:
         return
     except TimeoutError:
@@ -309,9 +308,19 @@ async def _answer_messages(service: Service, socket: WebSocket, session_id: str,
         await socket.close(INTERNAL, "the service failed. Its log says why")
 
 
-async def _refuse_message(service: Service, socket: WebSocket, fault: Fault) -> None:
-    service.metrics.faults.labels(fault.code).inc()
-    await socket.send_text(fault.body().decode())
+async def _answer_message(
+    service: Service, owner: str, session_id: str, content: bytes | None, step: int | None
+) -> str:
+    """The answer to a message. Raises Fault."""
+    session = service.sessions.get(session_id, owner)
+    if content is None:
+        raise Fault("invalid_request", "send pictures as binary messages")
+    try:
+        async with asyncio.timeout(service.limits.deadline_s):
+            return _answer(service, await service.step(session, content, step)).model_dump_json()
+    except TimeoutError as late:
+        told = f"not answered within {service.limits.deadline_s:g} s. Try again"
+        raise Fault("deadline_passed", told) from late
 
 
 def _fault_response(fault: Fault) -> Response:

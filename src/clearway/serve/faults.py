@@ -45,6 +45,7 @@ STATUS: dict[Code, HTTPStatus] = {
     "deadline_passed": HTTPStatus.GATEWAY_TIMEOUT,
     "internal": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
+POLICY, TOO_BIG, INTERNAL, AGAIN = 1008, 1009, 1011, 1013  # WebSocket close codes
 
 
 class FaultDetail(BaseModel):

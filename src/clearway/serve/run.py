@@ -148,7 +148,8 @@ def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: 
     for listener in network.listeners():
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     health_port = port_of(network.health) if network.health else None
-    http, sockets = impatient(limits.patience_s, Strangers(limits.strangers, network.proxy), health_port)
+    strangers = Strangers(limits.strangers, network.proxy)
+    http, sockets = impatient(limits, service.bodies, strangers, health_port)
     tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     logging.getLogger("uvicorn.error").addFilter(Sparing())

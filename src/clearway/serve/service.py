@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -21,6 +19,7 @@ from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import Metrics
 from clearway.serve.sessions import Answer, Progress, Session, Sessions
+from clearway.serve.shares import Places
 from clearway.serve.tokens import Tokens
 
 
@@ -40,19 +39,24 @@ class Service:
         if not agent.card.takes_pictures:
             problem = f"the agent for scene {agent.card.scene} was exported without its encoder"
             raise DeployError(f"{problem}, so that it takes no pictures. Export it with its encoder")
-        self.card, self.limits, self.tokens, self.sessions = agent.card, limits, tokens, Sessions(limits)
+
+        def places(most: int) -> Places:
+            return Places(most, lambda: tokens.owners)
+
+        self.card, self.limits, self.tokens = agent.card, limits, tokens
+        self.sessions = Sessions(limits, places(limits.sessions))
         self.decoders = Decoders(limits)
         self.attempts = Attempts(limits.wrong_tokens)
-        self._bodies = Counter[str]()  # bytes of requests under way, by owner
-        self._pictures = Counter[str]()  # under way, by owner
+        self.bodies = places(limits.bodies_bytes)  # bytes of requests and messages under way
+        self.pictures = places(limits.waiting)  # under way
+        self.streams = places(limits.sessions)  # WebSockets that are open
         self.metrics = Metrics(lambda: len(self.sessions), lambda: self.waiting, lambda: self.decoders.replaced)
         self.batcher = Batcher(agent, limits, self.metrics.computed)
-        self.streams = asyncio.Semaphore(limits.sessions)  # WebSockets that may be open
 
     @property
     def waiting(self) -> int:
         """Pictures that wait, to be decoded or for the agent."""
-        return self._pictures.total()
+        return self.pictures.taken
 
     @property
     def ready(self) -> bool:
@@ -65,7 +69,7 @@ class Service:
             check_selection(selection, self.card)
         except DeployError as fault:
             raise Fault("invalid_request", str(fault)) from fault
-        return self.sessions.open(owner, selection, seed, self.tokens.share(self.limits.sessions))
+        return self.sessions.open(owner, selection, seed)
 
     async def set_target(self, session: Session, content: bytes, episode: int | None = None) -> None:
         """Begin an episode with the picture file of a target; on a Fault the session stays as it was.
@@ -111,28 +115,15 @@ class Service:
             session.progress = Progress(before.episode, answer.step, state, file, answer)
             return answer
 
-    def hold_bytes(self, owner: str, count: int) -> None:
-        """Count bytes of a body that arrives. Raises Fault where the bodies under way are too large together."""
-        most = self.limits.bodies_bytes
-        if self._bodies.total() + count > most or self._bodies[owner] + count > self.tokens.share(most):
-            raise Fault("overloaded", "too many large requests are under way. Try again")
-        self._bodies[owner] += count
-
-    def free_bytes(self, owner: str, count: int) -> None:
-        """The request whose body was counted is over."""
-        self._bodies[owner] -= count
-
     @contextmanager
     def _place(self, owner: str) -> Iterator[None]:
         """A place among the pictures that wait. Raises Fault where none is free, or none for this owner."""
-        most = self.limits.waiting
-        if self.waiting >= most or self._pictures[owner] >= self.tokens.share(most):
+        if not self.pictures.take(owner):
             raise Fault("overloaded", "too many pictures wait for the agent. Try again")
-        self._pictures[owner] += 1
         try:
             yield
         finally:
-            self._pictures[owner] -= 1
+            self.pictures.free(owner)
 
     async def _decoded(self, session: Session, content: bytes) -> np.ndarray:
         picture = await self.decoders.decode(content, session.owner, session.standing)

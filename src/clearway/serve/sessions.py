@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections import Counter, OrderedDict
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -18,6 +18,7 @@ from clearway.scenes.sensors import RGB
 from clearway.serve.decoders import Standing
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
+from clearway.serve.shares import Places
 
 ID_BYTES = 16
 SEED_BITS = 64  # of a session that was given none
@@ -93,13 +94,13 @@ class Sessions:
     """All open sessions.
 
     Args:
-        limits: how many, and how long they live unused.
+        limits: how long they live unused.
+        places: for them.
         clock: seconds, monotonic.
     """
 
-    def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
-        self._limits, self._clock = limits, clock
-        self._owned = Counter[str]()  # open sessions of each owner
+    def __init__(self, limits: Limits, places: Places, clock: Callable[[], float] = time.monotonic) -> None:
+        self._limits, self._places, self._clock = limits, places, clock
         self._open: OrderedDict[str, Session] = OrderedDict()  # the one unused for longest comes first
 
     def __len__(self) -> int:
@@ -109,18 +110,17 @@ class Sessions:
     @property
     def full(self) -> bool:
         """No more can be opened."""
-        return len(self) >= self._limits.sessions
+        return len(self) >= self._places.most
 
-    def open(self, owner: str, selection: Selection, seed: int | None, most: int) -> Session:
-        """A new session. Raises Fault where there are too many, or `most` of this owner's."""
-        if self.full or self._owned[owner] >= most:
-            held = (
-                f"{self._limits.sessions} sessions are open" if self.full else f"{most} sessions of this token are open"
-            )
+    def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
+        """A new session. Raises Fault where there are too many, or too many of this owner's."""
+        self._expire()
+        if not self._places.take(owner):
+            whose = "" if self.full else " of this token"
+            held = f"{self._places.most if self.full else self._places.held(owner)} sessions{whose} are open"
             raise Fault("too_many_sessions", f"{held}. Close one, or try again later")
         made = new_session(owner, selection, seed, self._clock())
         self._open[made.id] = made
-        self._owned[owner] += 1
         return made
 
     def get(self, session_id: str, owner: str) -> Session:
@@ -139,7 +139,7 @@ class Sessions:
 
     def _forget(self, session: Session) -> None:
         del self._open[session.id]
-        self._owned[session.owner] -= 1
+        self._places.free(session.owner)
 
     def _expire(self) -> None:
         oldest = self._clock() - self._limits.idle_s

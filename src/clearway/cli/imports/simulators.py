@@ -59,6 +59,8 @@ class ImportMjcf:
     """MJCF file (.xml); meshes, textures and included files lie where it says. Its x and y are the floor's x and z."""
     out: Path
     """Folder for the scene file."""
+    trust: bool = False
+    """The files that it names may lie anywhere; by default in its folder alone."""
     step: float = 0.5
     """Length of a move and side of a cell, metres."""
     spawn: tuple[float, float] | None = None
@@ -113,6 +115,7 @@ class ImportMjcf:
                 workers=workers,
                 ray=ray,
                 progress=True,
+                trust=self.trust,
             )
             encode_and_write([scene], self.out, self.encoding)
 
