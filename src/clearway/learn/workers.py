@@ -26,7 +26,7 @@ from clearway.children import end_with_parent
 from clearway.choices import TrackerName
 from clearway.errors import ClearwayError, RunError
 from clearway.learn.peers import LostPeer, Peers
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder, record_of, without_pictures
 from clearway.learn.tracking import check_tracker
 from clearway.learn.train import (
     SECONDS_BETWEEN_CHECKPOINTS,
@@ -110,14 +110,10 @@ def train_by_workers(
     request.check_workers(workers)
     folder = RunFolder(out)
     opened_copy(copy_to, folder, resume)
-    with folder.held():
-        record = record_of(request)
-        record = replace(record, hardware={**record.hardware, "workers": workers})
-        told_of_other_bits(folder, request, folder.begin(record, resume))
-        if on_begin is not None:
-            on_begin(out)
+    record = record_of(request)
+    record = replace(record, hardware={**record.hardware, "workers": workers})
     task = Task(
-        replace(request, scenes=[replace(s, observations=None, top_view=None, further=()) for s in request.scenes]),
+        replace(request, scenes=without_pictures(request.scenes)),
         out,
         os.getpid(),
         show_progress,
@@ -127,12 +123,16 @@ def train_by_workers(
         checkpoint_s,
         copy_to,
     )
-    outcomes = _launched(task, workers)
-    failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
-    if failed:
-        raise RunError(str(failed[0]))
-    if INTERRUPTED in outcomes:
-        raise KeyboardInterrupt
+    with folder.held(), folder.begun(record, resume) as other_bits:
+        told_of_other_bits(folder, request, other_bits)
+        if on_begin is not None:
+            on_begin(out)
+        outcomes = _launched(task, workers)
+        failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
+        if failed:
+            raise RunError(str(failed[0]))
+        if INTERRUPTED in outcomes:
+            raise KeyboardInterrupt
     return folder
 
 
