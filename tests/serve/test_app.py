@@ -58,6 +58,46 @@ def test_an_episode_is_a_navigator_s(client) -> None:
     assert fault(stepped(client, session, 1)) == "404 no_such_session"
 
 
+def test_numbered_requests_are_answered_once_and_repeated_ones_again(client) -> None:
+    session = opened(client, seed=5)
+
+    def targeted(level: int, episode: int):
+        return client.put(f"{session}/target?episode={episode}", content=grey(level), headers=PNG)
+
+    def numbered(level: int, step: int):
+        return client.post(f"{session}/steps?step={step}", content=grey(level), headers=PNG)
+
+    assert fault(targeted(1, 2)) == "409 out_of_order"
+    assert [targeted(1, 1).status_code for _ in range(2)] == [204, 204]
+    assert fault(targeted(2, 1)) == "409 out_of_order"  # the same number, another picture
+    first = numbered(10, 1).json()
+    assert numbered(10, 1).json() == first and first["step"] == 1
+    assert fault(targeted(1, 1)) == "409 out_of_order"  # it has been walked since
+    for wrong in (numbered(11, 1), numbered(10, 3)):
+        assert fault(wrong) == "409 out_of_order" and "Send number 2" in wrong.json()["error"]["message"]
+    assert fault(numbered(10, 0)) == "422 invalid_request"
+    second = numbered(10, 2).json()  # the same picture, another number: another step
+    assert second["step"] == 2 and numbered(10, 2).json() == second
+    assert stepped(client, session, 20).json()["value"] == 1000 + 50  # whoever does not count goes on as ever
+    assert targeted(3, 2).status_code == 204
+    assert fault(numbered(3, 0)) == "422 invalid_request" and numbered(3, 1).json()["step"] == 1
+
+
+def test_a_stream_goes_on_where_another_broke(client) -> None:
+    session = opened(client, seed=5)
+    client.put(f"{session}/target", content=grey(1), headers=PNG)
+    lost = stepped(client, session, 10).json()
+    with client.websocket_connect(f"{session}/stream?step=1") as socket:
+        answers = []
+        for content in (grey(10), grey(10)):
+            socket.send_bytes(content)
+            answers.append(json.loads(socket.receive_text()))
+    assert answers[0] == lost and answers[1]["step"] == 2
+    with client.websocket_connect(f"{session}/stream?step=7") as socket:
+        socket.send_bytes(grey(10))
+        assert json.loads(socket.receive_text())["error"]["code"] == "out_of_order"
+
+
 def test_sessions_do_not_mix(client) -> None:
     sessions = [opened(client, selection="argmax") for _ in range(5)]
     for number, session in enumerate(sessions):

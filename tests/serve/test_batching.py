@@ -12,7 +12,8 @@ from clearway.scenes.sensors import RGB
 from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
-from clearway.serve.service import Answer, Service
+from clearway.serve.service import Service
+from clearway.serve.sessions import Answer
 from clearway.serve.tokens import Tokens
 from helpers.agents import equal
 from helpers.serving import OWNER, TOKENS, grey
@@ -201,7 +202,7 @@ def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
             free.set()
             await asyncio.gather(computed, waits)
         await service.set_target(session, grey(2))
-        return session.state
+        return session.progress.state
 
     refused, plainly = asyncio.run(begin(True)), asyncio.run(begin(False))
     assert refused is not None and plainly is not None and equal(refused, plainly)

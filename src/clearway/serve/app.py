@@ -14,12 +14,13 @@ from clearway.deploy.navigator import Selection
 from clearway.errors import ClearwayError
 from clearway.serve.decoding import CONTENT_TYPES
 from clearway.serve.faults import INTERNAL, POLICY, STATUS, Code, Fault, FaultBody
-from clearway.serve.service import Answer, Service
+from clearway.serve.service import Service
+from clearway.serve.sessions import Answer
 from clearway.serve.tokens import ANSWERED, OWNER
 from clearway.version import __version__
 
 try:
-    from fastapi import FastAPI, Path, Request, Security, WebSocket, WebSocketDisconnect
+    from fastapi import FastAPI, Path, Query, Request, Security, WebSocket, WebSocketDisconnect
     from fastapi.exceptions import RequestValidationError
     from fastapi.responses import Response
     from fastapi.security import HTTPBearer
@@ -33,10 +34,13 @@ DESCRIPTION = """A trained agent: pictures in, actions out.
 
 Open a session, send the picture of its target, then the picture after every step. `GET /sessions/{session_id}/stream`
 is a WebSocket for the steps of a session: every binary message is a picture file, every answer the JSON of a step, or
-of a refusal, after which the session goes on as it was.
+of a refusal, after which the session goes on as it was. Where a stream broke, open the next one with `?step=` and the
+number of the step that was not answered: its picture, sent again, is not walked twice.
 """
 ID = r"^[A-Za-z0-9_-]{1,64}$"
 MOST_SEED = (1 << 53) - 1  # JSON's exact whole numbers
+Number = Annotated[int | None, Query(ge=1, le=MOST_SEED)]
+"""Of a request among those of its kind; None where the client does not count them."""
 
 
 def _whole(value: object) -> object:
@@ -152,10 +156,15 @@ def make_app(service: Service) -> FastAPI:
         responses=_faults(*PICTURE),
         openapi_extra=PICTURE_BODY,
     )
-    async def set_target(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> None:
-        """Begin an episode: the body is the picture of the place to walk to."""
+    async def set_target(
+        session_id: Annotated[str, Path(pattern=ID)], request: Request, episode: Number = None
+    ) -> None:
+        """Begin an episode: the body is the picture of the place to walk to.
+
+        Send the episode's number, from 1 in a session, and you may send the request again where its answer was lost.
+        """
         session = service.sessions.get(session_id, _owner(request))
-        await service.set_target(session, await _picture(request))
+        await service.set_target(session, await _picture(request), episode)
 
     @app.post(
         "/sessions/{session_id}/steps",
@@ -163,14 +172,17 @@ def make_app(service: Service) -> FastAPI:
         responses=_faults(*PICTURE, "no_target"),
         openapi_extra=PICTURE_BODY,
     )
-    async def step(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> StepAnswer:
-        """Decide: the body is what the camera sees now."""
+    async def step(session_id: Annotated[str, Path(pattern=ID)], request: Request, step: Number = None) -> StepAnswer:
+        """Decide: the body is what the camera sees now.
+
+        Send the step's number, from 1 in an episode, and you may send the request again where its answer was lost.
+        """
         session = service.sessions.get(session_id, _owner(request))
-        return _answer(service, await service.step(session, await _picture(request)))
+        return _answer(service, await service.step(session, await _picture(request), step))
 
     @app.websocket("/sessions/{session_id}/stream")
-    async def stream(socket: WebSocket, session_id: str) -> None:
-        await _stream(service, socket, session_id)
+    async def stream(socket: WebSocket, session_id: str, step: Number = None) -> None:
+        await _stream(service, socket, session_id, step)
 
     return app
 
@@ -186,6 +198,7 @@ OPENING: tuple[Code, ...] = (
 CLOSING: tuple[Code, ...] = ("unauthorised", "too_many_attempts", "no_such_session", "invalid_request")
 PICTURE: tuple[Code, ...] = (
     *CLOSING,
+    "out_of_order",
     "unsupported_picture",
     "unreadable_picture",
     "body_too_large",
@@ -251,7 +264,7 @@ async def _picture(request: Request) -> bytes:
     return await request.body()
 
 
-async def _stream(service: Service, socket: WebSocket, session_id: str) -> None:
+async def _stream(service: Service, socket: WebSocket, session_id: str, step: int | None) -> None:
     """Answer the pictures of a session, one after the other, until either side ends it."""
     owner = _owner(socket)
     try:
@@ -262,12 +275,13 @@ async def _stream(service: Service, socket: WebSocket, session_id: str) -> None:
         return await socket.send_denial_response(_fault_response(fault))
     try:
         await socket.accept()
-        await _answer_messages(service, socket, session_id)
+        await _answer_messages(service, socket, session_id, step)
     finally:
         service.streams.free(owner)
 
 
-async def _answer_messages(service: Service, socket: WebSocket, session_id: str) -> None:
+async def _answer_messages(service: Service, socket: WebSocket, session_id: str, step: int | None) -> None:
+    """The first picture is that of the step with this number, where it has one; those that follow have none."""
     try:
         while True:
             async with asyncio.timeout(service.limits.idle_s):
@@ -276,7 +290,8 @@ async def _answer_messages(service: Service, socket: WebSocket, session_id: str)
                 return
             begun, status = time.perf_counter(), int(HTTPStatus.OK)
             try:
-                answer = await _answer_message(service, _owner(socket), session_id, message.get("bytes"))
+                answer = await _answer_message(service, _owner(socket), session_id, message.get("bytes"), step)
+                step = None
             except Fault as fault:
                 service.metrics.faults.labels(fault.code).inc()
                 answer, status = fault.body().decode(), fault.status
@@ -293,14 +308,16 @@ async def _answer_messages(service: Service, socket: WebSocket, session_id: str)
         await socket.close(INTERNAL, "the service failed. Its log says why")
 
 
-async def _answer_message(service: Service, owner: str, session_id: str, content: bytes | None) -> str:
+async def _answer_message(
+    service: Service, owner: str, session_id: str, content: bytes | None, step: int | None
+) -> str:
     """The answer to a message. Raises Fault."""
     session = service.sessions.get(session_id, owner)
     if content is None:
         raise Fault("invalid_request", "send pictures as binary messages")
     try:
         async with asyncio.timeout(service.limits.deadline_s):
-            return _answer(service, await service.step(session, content)).model_dump_json()
+            return _answer(service, await service.step(session, content, step)).model_dump_json()
     except TimeoutError as late:
         told = f"not answered within {service.limits.deadline_s:g} s. Try again"
         raise Fault("deadline_passed", told) from late

@@ -6,14 +6,14 @@ import asyncio
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from clearway.agents.agent import State
 from clearway.deploy.agent import DeployedAgent
-from clearway.deploy.navigator import Selection, episode_seeds
+from clearway.deploy.navigator import Decision, Selection
 from clearway.scenes.sensors import RGB
 from clearway.serve.decoders import Standing
 from clearway.serve.faults import Fault
@@ -21,6 +21,35 @@ from clearway.serve.limits import Limits
 from clearway.serve.shares import Places
 
 ID_BYTES = 16
+SEED_BITS = 64  # of a session that was given none
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A decision, whether the agent holds that it has arrived (None: it cannot tell), and the step's number, from 1."""
+
+    decision: Decision
+    arrived: bool | None
+    step: int
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a session has come; a request that is answered puts another in its place.
+
+    Attributes:
+        episode: targets so far.
+        steps: answered since the target was set.
+        state: what the agent remembers, of one row; None until there is a target.
+        seen: SHA-256 of the file that led here, a target's or a step's.
+        answer: to the last step; None where there was none since the target.
+    """
+
+    episode: int = 0
+    steps: int = 0
+    state: State | None = None
+    seen: bytes = b""
+    answer: Answer | None = None
 
 
 @dataclass(eq=False)
@@ -31,11 +60,9 @@ class Session:
         id: what clients call it by; nobody can guess another's.
         owner: name of the token that opened it; to others it is not there.
         selection: how its actions are chosen.
-        seed: of its next episode, (1,) int64.
-        seeds: of the episodes after that, one after the other.
-        state: what the agent remembers, of one row; None until there is a target.
-        steps: answered since the target was set.
+        seed: of the seeds of its episodes.
         used_s: when it was last asked for, on the clock of its `Sessions`.
+        progress: how far it has come.
         standing: how its pictures have been.
         turn: held while a request of the session is answered, so that they are answered one after the other.
     """
@@ -43,11 +70,9 @@ class Session:
     id: str
     owner: str
     selection: Selection
-    seed: np.ndarray
-    seeds: Iterator[np.ndarray]
+    seed: int
     used_s: float
-    state: State | None = None
-    steps: int = 0
+    progress: Progress = Progress()
     standing: Standing = field(default_factory=Standing)
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
@@ -57,6 +82,12 @@ def state_bytes(agent: DeployedAgent) -> int:
     height, width = agent.card.picture_size or (1, 1)
     state = agent.reset({RGB: np.zeros((1, height, width, 3), np.uint8)}, np.zeros(1, np.int64))
     return sum(values.nbytes for values in state.values())
+
+
+def new_session(owner: str, selection: Selection, seed: int | None, now_s: float) -> Session:
+    """A session without a target."""
+    seed = secrets.randbits(SEED_BITS) if seed is None else seed
+    return Session(secrets.token_urlsafe(ID_BYTES), owner, selection, seed, now_s)
 
 
 class Sessions:
@@ -88,8 +119,7 @@ class Sessions:
             whose = "" if self.full else " of this token"
             held = f"{self._places.most if self.full else self._places.held(owner)} sessions{whose} are open"
             raise Fault("too_many_sessions", f"{held}. Close one, or try again later")
-        seeds = episode_seeds(seed)
-        made = Session(secrets.token_urlsafe(ID_BYTES), owner, selection, next(seeds), seeds, self._clock())
+        made = new_session(owner, selection, seed, self._clock())
         self._open[made.id] = made
         return made
 
