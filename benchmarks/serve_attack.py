@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import io
+import json
 import multiprocessing
 import os
 import re
@@ -36,6 +37,7 @@ from clearway.children import end_with_parent
 ANSWER_S = 60
 TOKENS = {name: secrets.token_urlsafe(24) for name in ("robots", "stranger", "other-stranger")}
 SIDE = 1440
+ROBOTS = {"authorization": f"Bearer {TOKENS['robots']}", "content-type": "image/jpeg"}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -47,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--robots", type=int, default=4, help="clients, each with a session")
     parser.add_argument("--every-s", type=float, default=0.5, help="between the steps of a robot")
     parser.add_argument("--attack-per-s", type=float, default=10.0, help="hostile pictures a second")
+    parser.add_argument("--record", type=Path, help="a file for all seconds and counts, as JSON")
     options = parser.parse_args(arguments)
     hostile = hostile_pictures()
     found: dict[bool, list[float]] = {False: [], True: []}
@@ -55,14 +58,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for attacked in (False, True):
                 with attacking(url, hostile, options.attack_per_s if attacked else 0):
                     found[attacked] += asyncio.run(walked(url, options.robots, options.every_s, options.seconds))
-        headers = {"authorization": f"Bearer {TOKENS['robots']}"}
-        figures = httpx.get(f"{url}/metrics", headers=headers, timeout=ANSWER_S).text
+        figures = counted(url)
     print("| | acts | p50 ms | p99 ms | longest ms |\n| --- | --- | --- | --- | --- |")
     for attacked, name in ((False, "without"), (True, f"{options.attack_per_s:g} hostile pictures a second")):
         p50, p99, most = (1000 * float(np.quantile(found[attacked], share)) for share in (0.5, 0.99, 1))
         print(f"| {name} | {len(found[attacked])} | {p50:.0f} | {p99:.0f} | {most:.0f} |")
     print(f"99th percentile: {np.quantile(found[True], 0.99) / np.quantile(found[False], 0.99):.2f} times")
-    print("\n".join(re.findall(r"^clearway_(?:replaced_decoders|faults_total\S*) .*$", figures, re.MULTILINE)))
+    print("\n".join(f"{name} {count:g}" for name, count in figures.items()))
+    if options.record is not None:
+        seconds = {name: [round(each, 4) for each in found[name == "attacked"]] for name in ("without", "attacked")}
+        told = {"seconds": seconds, "attack_per_s": options.attack_per_s, "robots": options.robots, "counted": figures}
+        options.record.write_text(json.dumps(told) + "\n", encoding="utf-8")
+
+
+def counted(url: str) -> dict[str, float]:
+    """What a service says it has counted of answers, refusals and decoders."""
+    text = httpx.get(f"{url}/metrics", headers=ROBOTS, timeout=ANSWER_S).text
+    found = re.findall(r"^clearway_((?:replaced_decoders|faults_total|requests_total)\S*) (.*)$", text, re.MULTILINE)
+    return {name: float(count) for name, count in found}
 
 
 def hostile_pictures() -> list[bytes]:
@@ -149,25 +162,30 @@ async def opened(http: httpx.AsyncClient, token: str, target: bytes | None) -> s
     return path
 
 
-async def walked(url: str, robots: int, every_s: float, seconds: float) -> list[float]:
-    """Seconds that each act took of robots that step now and then."""
+def robot_pictures() -> list[bytes]:
+    """What robots see, as JPEG files of 400 x 300 pixels."""
     pictures = np.random.default_rng(0).integers(40, 216, (8, 6, 8, 3), np.uint8).repeat(50, axis=1).repeat(50, axis=2)
     files = []
     for picture in pictures:
         Image.fromarray(picture).save(file := io.BytesIO(), "JPEG", quality=85)
         files.append(file.getvalue())
-    headers = {"authorization": f"Bearer {TOKENS['robots']}", "content-type": "image/jpeg"}
+    return files
+
+
+async def walked(url: str, robots: int, every_s: float, seconds: float) -> list[float]:
+    """Seconds that each act took of robots that step now and then."""
+    files = robot_pictures()
     until, refused = time.monotonic() + seconds, Counter[int]()
 
     async def walk(number: int, http: httpx.AsyncClient) -> list[float]:
         path, found = await opened(http, TOKENS["robots"], files[number % 8]), []
         await asyncio.sleep(number * every_s / robots)
         while (begun := time.monotonic()) < until:
-            answer = await http.post(f"{path}/steps", content=files[len(found) % 8], headers=headers)
+            answer = await http.post(f"{path}/steps", content=files[len(found) % 8], headers=ROBOTS)
             refused[answer.status_code] += answer.status_code != 200
             found.append(time.monotonic() - begun)
             await asyncio.sleep(max(every_s - found[-1], 0))
-        await http.delete(path, headers=headers)
+        await http.delete(path, headers=ROBOTS)
         return found
 
     async with httpx.AsyncClient(base_url=url, timeout=ANSWER_S) as http:

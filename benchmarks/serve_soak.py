@@ -3,21 +3,36 @@
     python benchmarks/serve_soak.py generalist                   # half an hour; or a file, or a run folder
     python benchmarks/serve_soak.py generalist --minutes 6 --warm-up 2
 
-Robots open sessions, step for half a minute, and leave; others send hostile pictures all the while, as in
-`serve_attack.py`. Every five seconds the resident memory of the service and of all its processes is added up.
+Robots open sessions, step for half a minute, and leave, by requests and by WebSockets in turn; others send hostile
+pictures all the while, as in `serve_attack.py`. Every five seconds the resident memory of the service and of all its
+processes is added up. `--record FILE` keeps what was seen, as JSON.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
-from serve_attack import attacking, hostile_pictures, served_to_robots, walked
+import httpx
+from serve_attack import (
+    ANSWER_S,
+    ROBOTS,
+    TOKENS,
+    attacking,
+    counted,
+    hostile_pictures,
+    opened,
+    robot_pictures,
+    served_to_robots,
+    walked,
+)
+from websockets.asyncio.client import connect
 
 LOOKS_EVERY_S = 5.0
 VISIT_S = 30.0
@@ -32,29 +47,66 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--robots", type=int, default=4)
     parser.add_argument("--every-s", type=float, default=0.5, help="between the steps of a robot")
     parser.add_argument("--attack-per-s", type=float, default=2.0, help="hostile pictures a second")
+    parser.add_argument("--record", type=Path, help="a file for what was seen, as JSON")
     options = parser.parse_args(arguments)
-    acts, seen, over = 0, list[tuple[float, float]](), threading.Event()
+    acts, seen, over = [0, 0], list[tuple[float, float]](), threading.Event()
     with served_to_robots(options.agent) as (url, pid):
         watcher = threading.Thread(target=watched, args=(pid, seen, over))
         watcher.start()
         try:
             with attacking(url, hostile_pictures(), options.attack_per_s):
-                until = time.monotonic() + 60 * options.minutes
+                until, visit = time.monotonic() + 60 * options.minutes, 0
                 while time.monotonic() < until:
-                    acts += len(asyncio.run(walked(url, options.robots, options.every_s, VISIT_S)))
+                    walk = streamed if visit % 2 else walked
+                    acts[visit % 2] += len(asyncio.run(walk(url, options.robots, options.every_s, VISIT_S)))
+                    visit += 1
+            figures = counted(url)
         finally:
             over.set()
             watcher.join()
+    report(acts, seen, figures, options.warm_up, options.record)
+
+
+def report(
+    acts: list[int], seen: list[tuple[float, float]], figures: dict[str, float], warm_up: float, record: Path | None
+) -> None:
+    """Print what was seen; keep it, where a file is named."""
     minutes: dict[int, list[float]] = {}
     for second, mib in seen:
         minutes.setdefault(int(second // 60), []).append(mib)
+    rows = [[minute, round(median(values)), round(max(values))] for minute, values in minutes.items()]
     print("| minute | MiB, median | most |\n|---|---|---|")
-    for minute, values in minutes.items():
-        print(f"| {minute} | {median(values):.0f} | {max(values):.0f} |")
-    counted = [mib for second, mib in seen if second >= 60 * options.warm_up]
-    half = len(counted) // 2
-    first, last = median(counted[:half]), median(counted[half:])
-    print(f"{acts} acts; after {options.warm_up:g} minutes: first half {first:.0f} MiB, second half {last:.0f} MiB")
+    print("\n".join(f"| {minute} | {middle} | {most} |" for minute, middle, most in rows))
+    after = [mib for second, mib in seen if second >= 60 * warm_up]
+    first, last = median(after[: len(after) // 2]), median(after[len(after) // 2 :])
+    print(f"{acts[0]} acts by requests, {acts[1]} by WebSockets")
+    print(f"after {warm_up:g} minutes: first half {first:.0f} MiB, second half {last:.0f} MiB")
+    if record is not None:
+        said = {"acts": dict(zip(("requests", "streams"), acts, strict=True)), "counted": figures}
+        halves = {"warm_up_minutes": warm_up, "first_half_mib": round(first, 1), "second_half_mib": round(last, 1)}
+        record.write_text(json.dumps({**said, **halves, "minute_median_most_mib": rows}) + "\n", encoding="utf-8")
+
+
+async def streamed(url: str, robots: int, every_s: float, seconds: float) -> list[float]:
+    """Seconds that each act took of robots that step by WebSockets."""
+    files, until = robot_pictures(), time.monotonic() + seconds
+    bearing = {"authorization": ROBOTS["authorization"]}
+
+    async def walk(number: int, http: httpx.AsyncClient) -> list[float]:
+        path, found = await opened(http, TOKENS["robots"], files[number % 8]), list[float]()
+        async with connect(f"{url.replace('http', 'ws', 1)}{path}/stream", additional_headers=bearing) as stream:
+            while (begun := time.monotonic()) < until:
+                await stream.send(files[len(found) % 8])
+                answer = json.loads(await stream.recv())
+                assert "error" not in answer, f"a robot was refused: {answer}"
+                found.append(time.monotonic() - begun)
+                await asyncio.sleep(max(every_s - found[-1], 0))
+        await http.delete(path, headers=ROBOTS)
+        return found
+
+    async with httpx.AsyncClient(base_url=url, timeout=ANSWER_S) as http:
+        times = await asyncio.gather(*(walk(number, http) for number in range(robots)))
+    return [each for robot in times for each in robot]
 
 
 def watched(pid: int, seen: list[tuple[float, float]], over: threading.Event) -> None:

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import clearway
-from clearway.deploy.navigator import open_agent
+from clearway.deploy.navigator import episode_seed, episode_seeds, open_agent
 from clearway.errors import DeployError
 from clearway.learn.load import run_world
 from clearway.reward import COLLISION_AWARE
@@ -203,3 +203,9 @@ navigator.act(numpy.zeros((6, 8, 3), numpy.uint8))
     elsewhere = {"learn", "envs", "perception", "model", "evaluation", "live"}
     assert not [name for name in ours if name.split(".")[1] in elsewhere]
     assert imported_by("import clearway") & {"numpy", "clearway.deploy"} == set()
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**64 - 1])
+def test_an_episode_s_seed_is_known_without_those_before_it(seed) -> None:
+    seeds = episode_seeds(seed)
+    assert [next(seeds).tolist() for _ in range(20)] == [episode_seed(seed, number).tolist() for number in range(20)]

@@ -76,7 +76,7 @@ def test_a_hostile_graph_with_a_valid_seal_never_reaches_onnxruntime(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     content, says = HOSTILE[name]
-    monkeypatch.setattr(onnx_file, "_session", lambda *given: pytest.fail("a session was made"))
+    monkeypatch.setattr(onnx_file, "BoundedSession", lambda *given: pytest.fail("a session was made"))
     path = tmp_path / "agent.onnx"
     path.write_bytes(content)
     with pytest.raises(

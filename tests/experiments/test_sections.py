@@ -225,11 +225,50 @@ def test_no_two_figures_share_a_name(setting: Setting, sections: dict[str, Secti
 
 def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
     claims = [claim for section in sections.values() for claim in section.claims]
-    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step; ablations
-    assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2 + 4 + 5 * 2 + 6 * 2
-    assert len({claim.text for section in ("table2", "table3") for claim in sections[section].claims}) == 2 * 2 * 5
+    # tables 1 to 3; table 1 unclipped; figures 4 to 6; settled; memory; zones or step; ablations; what else it says
+    assert len(claims) == 3 * 2 * 4 + 2 + 3 * 4 + 3 * 2 + 4 + 5 * 2 + 6 * 2 + 6 * 2
+    assert len({claim.text for section in ("table2", "table3") for claim in sections[section].claims}) == 2 * 2 * 6
     learners = ("paper: ", "paper, unclipped: ", "default: ", "q-learning: ", "bc: ")
     assert all(claim.text.startswith(learners) for claim in claims)
+
+
+def test_the_paper_s_further_claims_are_judged(setting: Setting, sections: dict[str, Section]) -> None:
+    """Each against the episodes themselves, of the default learner."""
+
+    def runs(name: ExperimentName, reward: str, halfway: bool = False) -> list[EpisodeTable]:
+        own = [
+            (job.run, trial)
+            for job in planned(setting, [name])
+            for trial in job.trials
+            if job.run.reward.name == reward and job.run.learner.hindsight and trial.halfway == halfway
+        ]
+        return [episodes_of(setting.out, *each) for each in own]
+
+    def numbers(name: ExperimentName, words: str) -> list[float]:
+        (claim,) = [each for each in sections[name].claims if each.text.startswith("default: ") and words in each.text]
+        return [claim.numbers[each].value for each in ("first", "second")]
+
+    def mean(figures: list[list[float]]) -> float:
+        return float(np.mean([(sum(own[:3]) / 3 + sum(own[3:]) / 2) / 2 for own in figures]))
+
+    def by_target(tables: list[EpisodeTable], metric: str) -> list[list[float]]:
+        return [[getattr(t, metric)[t.target == m].mean() for m in range(5)] for t in tables]
+
+    ours, theirs = (by_target(runs("fig3", name), "collisions") for name in ("collision-aware", "shortest"))
+    assert numbers("fig3", "worst case") == pytest.approx(
+        [np.mean([max(own) for own in each]) for each in (ours, theirs)]
+    )
+    assert numbers("table1", "a tenth") == pytest.approx([mean(ours), mean(theirs) / 10])
+    halves = [mean(by_target(runs("fig4", "collision-aware", halfway), "steps")) for halfway in (True, False)]
+    assert numbers("fig4", "close to the end") == pytest.approx(halves)
+    near, far = numbers("fig5", "falls with distance")
+    table = sections["fig5"].tables[0]
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows if row[1] == "default"]
+    for steps, found in ((1, near), (8, far)):
+        assert found == pytest.approx(np.mean([row["sc"] for row in rows if row["steps away"] == steps]))
+    hard, easy = numbers("table2", "harder")
+    assert easy > 1 and hard > 1
+    assert numbers("table3", "repair")[1] == pytest.approx(easy)
 
 
 def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
@@ -404,7 +443,7 @@ def test_what_the_paper_asks_stands_apart_from_further_questions(sections: dict[
     assert "paper, unclipped: fewer collisions than with the shortest-path reward" in further
     assert "paper: fewer collisions than with the shortest-path reward" not in further
     summary = report._summary(list(judged(sections).values()))
-    assert [len(table.rows) for table in summary] == [30, 40]
+    assert [len(table.rows) for table in summary] == [42, 40]
 
 
 def test_a_report_takes_with_it_what_one_that_was_cut_off_left(

@@ -43,7 +43,7 @@ def test_a_recorded_run_has_the_algorithm_s_own_settings(
     assert record.learner == small_learner(preset, frames=2400)
     then = without_later(asdict(record.learner))
     assert {name: content["learner"][name] for name in then} == then
-    assert set(asdict(record.learner)) - set(then) <= {"goals"}
+    assert set(asdict(record.learner)) - set(then) <= {"goals", "sent_gradients"}
     now = record_of(small_request(learner=record.learner, seed=seed))
     assert record.same_experiment(now)
 

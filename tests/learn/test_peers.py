@@ -133,3 +133,28 @@ def test_a_lost_worker_is_noticed() -> None:
         return "noticed"
 
     assert by_workers(2, leaves) == ["noticed", "left"]
+
+
+def test_gradients_in_bfloat16_are_half_the_bytes_and_nearly_the_same() -> None:
+    def summed(peers: Peers) -> tuple[Tensor, int]:
+        parts = torch.full((3, 2), 1 + peers.rank / 1000), torch.ones(2)
+        peers.add_up(*parts, sent_as=torch.bfloat16)
+        return parts[0], peers.sent_bytes
+
+    (one, sent_bytes), (other, _) = by_workers(2, summed)
+    assert sent_bytes == 2 * 8
+    assert one.dtype == torch.float32 and torch.equal(one, other) and (one == 2).all()
+
+    def learnt(sent_gradients: str, workers: int) -> Tensor:
+        request = four_scenes(small_learner(A2C(), envs=16, frames=2_560, sent_gradients=sent_gradients))
+        done = (
+            by_workers(workers, lambda peers: trained(request, peers, 2))
+            if workers > 1
+            else [trained(request, Peers(), 2)]
+        )
+        return done[0][1]["network.fusion_weight"]
+
+    exact, rounded, alone = learnt("float32", 2), learnt("bfloat16", 2), learnt("bfloat16", 1)
+    assert not torch.allclose(rounded, exact, rtol=0, atol=1e-6)
+    torch.testing.assert_close(rounded, exact, rtol=0, atol=1e-3)
+    torch.testing.assert_close(alone, exact)  # one worker sends nothing

@@ -38,6 +38,7 @@ def test_the_paper_s_settings() -> None:
         "lr_end": 0.0,
         "clip_norm": 40.0,
         "clip_each_tensor": True,
+        "sent_gradients": "float32",
         "width": 512,
         "history_length": 4,
         "heads": "scene",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -81,7 +82,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_whatever_is_cut_off_leaves_a_whole_copy(
     s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: Path, fails_at: int
 ) -> None:
-    cut_off(tmp_path / "lost", monkeypatch, updates=2)  # a copy is there
+    cut_off(tmp_path / "lost", monkeypatch, updates=2)
+    RunCopy(ADDRESS).update(tmp_path / "lost")
     training.train(REQUEST, tmp_path / "lost", resume=True)  # two checkpoints more, not copied yet
     done, upload, remove = 0, Store.upload, Store.remove
 
@@ -113,6 +115,27 @@ def test_a_training_goes_on_without_a_store_and_says_so(
     with warned, pytest.raises(ClearwayError, match="is full"):
         training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS)
     assert newest_checkpoint(RunFolder(tmp_path / "run").checkpoints).name.endswith(f"{FRAMES}")
+
+
+def test_training_does_not_wait_for_a_copy(s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    upload, update, came_far = Store.upload, Trainer.update, threading.Event()
+
+    def slow(store: Store, path: Path, address: str) -> None:
+        if not came_far.wait(20):
+            raise ClearwayError("training waits for the copy")
+        upload(store, path, address)
+
+    def counted(trainer: Trainer) -> dict[str, float]:
+        if trainer.updates == 4:  # by now the checkpoint that is being copied is no longer kept
+            came_far.set()
+        return update(trainer)
+
+    monkeypatch.setattr(Store, "upload", slow)
+    monkeypatch.setattr(Trainer, "update", counted)
+    training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS)
+    assert RunCopy(ADDRESS).restore(tmp_path / "again")
+    assert without_times(tmp_path / "again") == without_times(tmp_path / "run")
+    assert not list((tmp_path / "run").glob(".copied-*"))
 
 
 def test_what_cannot_be_copied_to_is_told_before_a_folder_is_made(s3: S3, tmp_path: Path) -> None:

@@ -132,6 +132,7 @@ def test_an_error_of_one_worker_ends_all_with_its_words(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="Training stopped; lower the learning rate"):
         train_by_workers(request, tmp_path / "run", 2, threads=1)
     assert time.monotonic() - began < PATIENCE_S
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow
@@ -145,6 +146,8 @@ def test_ctrl_c_leaves_a_run_that_one_worker_ends(tmp_path: Path) -> None:
     with subprocess.Popen([*command, "--workers", "2"], stderr=subprocess.PIPE, text=True, env=environment) as process:
         wait_until((out / "metrics.jsonl").exists, process)
         workers = workers_of(process.pid)
+        with pytest.raises(RunError, match="another process trains here"), RunFolder(out).held():
+            pass
         for pid in (*workers, process.pid):  # as a terminal does
             os.kill(pid, signal.SIGINT)
         _, errors = process.communicate(timeout=PATIENCE_S)

@@ -76,6 +76,25 @@ def test_the_least_recently_used_goes_first(web: str, monkeypatch: pytest.Monkey
     end_process()
 
 
+@pytest.mark.parametrize("jump_s", [-1e9, 1e9])
+def test_a_clock_that_jumps_takes_nothing_from_who_uses_it(
+    web: str, jump_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which files go first depends on it, and no more: they are fetched again."""
+    monkeypatch.setenv(LIMIT_VARIABLE, "2.5e-6")
+    for name in "ab":
+        fetched([f"{web}/{name}.h5"], SUFFIXES)
+        end_process()
+    for path in fetched_folder().rglob("*.h5"):
+        used_s = path.parent.stat().st_mtime + jump_s
+        os.utime(path.parent, (used_s, used_s))
+    in_use, also = fetched([f"{web}/a.h5", f"{web}/c.h5"], SUFFIXES)
+    assert (kept(), in_use.read_bytes(), also.read_bytes()) == ("ac", b"a" * 1000, b"c" * 1000)
+    end_process()
+    assert fetched([f"{web}/b.h5"], SUFFIXES)[0].read_bytes() == b"b" * 1000
+    end_process()
+
+
 def test_what_another_process_has_fetched_stays(web: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LIMIT_VARIABLE, "2.5e-6")
     fetched([f"{web}/a.h5", f"{web}/b.h5"], SUFFIXES)

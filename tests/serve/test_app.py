@@ -13,6 +13,7 @@ from clearway.errors import DeployError
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
+from clearway.serve.tokens import ANSWERED
 from clearway.serve.tokens import OWNER as OWNER_KEY
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, picture_bytes
 from helpers.sums import CARD, Sums, plain
@@ -55,6 +56,46 @@ def test_an_episode_is_a_navigator_s(client) -> None:
             assert np.array_equal(np.float32(found["probabilities"]), expected.probabilities)
     assert client.delete(session).status_code == 204
     assert fault(stepped(client, session, 1)) == "404 no_such_session"
+
+
+def test_numbered_requests_are_answered_once_and_repeated_ones_again(client) -> None:
+    session = opened(client, seed=5)
+
+    def targeted(level: int, episode: int):
+        return client.put(f"{session}/target?episode={episode}", content=grey(level), headers=PNG)
+
+    def numbered(level: int, step: int):
+        return client.post(f"{session}/steps?step={step}", content=grey(level), headers=PNG)
+
+    assert fault(targeted(1, 2)) == "409 out_of_order"
+    assert [targeted(1, 1).status_code for _ in range(2)] == [204, 204]
+    assert fault(targeted(2, 1)) == "409 out_of_order"  # the same number, another picture
+    first = numbered(10, 1).json()
+    assert numbered(10, 1).json() == first and first["step"] == 1
+    assert fault(targeted(1, 1)) == "409 out_of_order"  # it has been walked since
+    for wrong in (numbered(11, 1), numbered(10, 3)):
+        assert fault(wrong) == "409 out_of_order" and "Send number 2" in wrong.json()["error"]["message"]
+    assert fault(numbered(10, 0)) == "422 invalid_request"
+    second = numbered(10, 2).json()  # the same picture, another number: another step
+    assert second["step"] == 2 and numbered(10, 2).json() == second
+    assert stepped(client, session, 20).json()["value"] == 1000 + 50  # whoever does not count goes on as ever
+    assert targeted(3, 2).status_code == 204
+    assert fault(numbered(3, 0)) == "422 invalid_request" and numbered(3, 1).json()["step"] == 1
+
+
+def test_a_stream_goes_on_where_another_broke(client) -> None:
+    session = opened(client, seed=5)
+    client.put(f"{session}/target", content=grey(1), headers=PNG)
+    lost = stepped(client, session, 10).json()
+    with client.websocket_connect(f"{session}/stream?step=1") as socket:
+        answers = []
+        for content in (grey(10), grey(10)):
+            socket.send_bytes(content)
+            answers.append(json.loads(socket.receive_text()))
+    assert answers[0] == lost and answers[1]["step"] == 2
+    with client.websocket_connect(f"{session}/stream?step=7") as socket:
+        socket.send_bytes(grey(10))
+        assert json.loads(socket.receive_text())["error"]["code"] == "out_of_order"
 
 
 def test_sessions_do_not_mix(client) -> None:
@@ -279,6 +320,7 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
         "path": path,
         "headers": [],
         OWNER_KEY: OWNER,
+        ANSWERED: lambda begun, status: None,
         "query_string": b"",
         "extensions": extensions,
     }
@@ -287,14 +329,14 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
 
 def test_a_stream_that_nobody_uses_is_closed() -> None:
     service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1), TOKENS), []
-    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None, 1).id, sent))
+    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None).id, sent))
     assert [message["type"] for message in sent] == ["websocket.accept", "websocket.close"]
     assert (sent[1]["code"], sent[1]["reason"]) == (1008, "unused for too long")
 
 
 def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
     service = Service(Sums(), Limits(sessions=1), TOKENS)
-    session = service.sessions.open(OWNER, "sampled", None, 1)
+    session = service.sessions.open(OWNER, "sampled", None)
 
     async def two() -> tuple[list[dict], list[dict]]:
         first, second = [], []
@@ -310,7 +352,7 @@ def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
     assert [message["type"] for message in first] == ["websocket.accept"]
     assert refusal["status"] == 503
     assert json.loads(body["body"])["error"]["code"] == "overloaded"
-    assert not service.streams.locked()
+    assert service.streams.taken == 0
 
 
 def test_figures_for_prometheus(client) -> None:

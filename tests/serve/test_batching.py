@@ -12,7 +12,8 @@ from clearway.scenes.sensors import RGB
 from clearway.serve.batching import Batcher
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
-from clearway.serve.service import Answer, Service
+from clearway.serve.service import Service
+from clearway.serve.sessions import Answer
 from clearway.serve.tokens import Tokens
 from helpers.agents import equal
 from helpers.serving import OWNER, TOKENS, grey
@@ -94,7 +95,7 @@ def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() ->
 
     async def run() -> list[Answer]:
         service = Service(Sums(seconds=0.05), Limits(), TOKENS)
-        session = service.sessions.open(OWNER, "argmax", None, 1000)
+        session = service.sessions.open(OWNER, "argmax", None)
         with closing(service.decoders):
             await service.set_target(session, grey(0))
             return await asyncio.gather(*(service.step(session, grey(level)) for level in (1, 2)))
@@ -105,7 +106,7 @@ def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() ->
 def test_a_step_sent_while_the_target_is_computed_waits_for_it() -> None:
     async def run() -> tuple[None, Answer]:
         service = Service(Sums(seconds=0.05), Limits(), TOKENS)
-        session = service.sessions.open(OWNER, "argmax", None, 1000)
+        session = service.sessions.open(OWNER, "argmax", None)
         with closing(service.decoders):
             return await asyncio.gather(service.set_target(session, grey(2)), service.step(session, grey(1)))
 
@@ -187,7 +188,7 @@ def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
             return await begun(service, refused)
 
     async def begun(service: Service, refused: bool) -> State | None:
-        session = service.sessions.open(OWNER, "sampled", 7, 1000)
+        session = service.sessions.open(OWNER, "sampled", 7)
         if refused:
             computed = asyncio.create_task(service.batcher.act(OWNER, plain(1), BEGUN))
             while not service.batcher.waiting:
@@ -201,7 +202,7 @@ def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
             free.set()
             await asyncio.gather(computed, waits)
         await service.set_target(session, grey(2))
-        return session.state
+        return session.progress.state
 
     refused, plainly = asyncio.run(begin(True)), asyncio.run(begin(False))
     assert refused is not None and plainly is not None and equal(refused, plainly)
@@ -249,15 +250,14 @@ def test_the_pictures_of_one_owner_do_not_keep_another_s_waiting() -> None:
 
 def test_an_owner_of_several_holds_a_part_of_the_places_and_of_the_sessions() -> None:
     tokens = Tokens([("crowd", 20 * "c"), ("guest", 20 * "g")])
-    service = Service(Sums(0.05), Limits(waiting=4, sessions=4, batch=1), tokens)
+    service = Service(Sums(0.05), Limits(waiting=4, sessions=6, batch=1), tokens)
 
     async def ask() -> list[object]:
         with closing(service.decoders):
-            sessions = [service.open(owner, "argmax", None) for owner in ("crowd", "crowd", "guest")]
-            with pytest.raises(Fault, match="2 sessions of this token"):
+            sessions = [service.open(owner, "argmax", None) for owner in ("crowd", "crowd", "crowd", "guest")]
+            with pytest.raises(Fault, match="3 sessions of this token"):
                 service.open("crowd", "argmax", None)
-            third = service.sessions.open("crowd", "argmax", None, 3)
-            begins = [service.set_target(session, grey(1)) for session in (*sessions[:2], third, sessions[2])]
+            begins = [service.set_target(session, grey(1)) for session in sessions]
             return await asyncio.gather(*begins, return_exceptions=True)
 
     first, second, refused, guest = asyncio.run(ask())

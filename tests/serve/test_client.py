@@ -2,18 +2,20 @@
 
 import socket
 import threading
+from collections import Counter
 
 import httpx
 import numpy as np
 import pytest
 from PIL import Image
 
+import clearway
 from clearway.errors import ClearwayError, DeployError
 from clearway.serve import connections
 from clearway.serve.client import KEEP_ALIVE_S, Client, ClientSession, ServiceError, picture_file
 from helpers.imported import imported_by
 from helpers.serving import TOKEN, grey, picture_bytes
-from helpers.sums import plain
+from helpers.sums import Sums, plain
 
 
 def with_service(client, made: Client) -> Client:
@@ -91,8 +93,9 @@ def test_connections_are_given_up_before_the_service_does() -> None:
         assert client._http._transport._pool._keepalive_expiry == KEEP_ALIVE_S < connections.KEEP_ALIVE_S
 
 
-def test_a_service_that_says_no_more_is_told_in_one_sentence() -> None:
+def test_a_service_that_says_no_more_is_told_in_one_sentence(monkeypatch) -> None:
     """What httpx says ends in a full stop itself."""
+    monkeypatch.setattr("clearway.serve.client.AGAIN_S", 0.0)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
 
@@ -106,6 +109,53 @@ def test_a_service_that_says_no_more_is_told_in_one_sentence() -> None:
             client.agent()
         hanging_up.join()
     assert caught.value.message.endswith(". Check the address") and ".." not in caught.value.message
+
+
+class Flaky(httpx.BaseTransport):
+    """A way to a service on which answers are lost: `lost` of each, before it is asked for or after."""
+
+    def __init__(self, way: httpx.Client, lost: int, asked_before: bool) -> None:
+        self.way, self.lost, self.asked_before, self.seen = way, lost, asked_before, Counter[str]()
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        line = f"{request.method} {request.url.raw_path.decode()}"
+        self.seen[line] += 1
+        lose = self.seen[line] % (self.lost + 1) != 0
+        if lose and not self.asked_before:
+            raise httpx.WriteError("cut off")
+        path, headers = request.url.raw_path.decode(), dict(request.headers)
+        answer = self.way.request(request.method, path, content=request.read(), headers=headers)
+        if lose:
+            raise httpx.ReadError("cut off")
+        return httpx.Response(answer.status_code, content=answer.content)
+
+
+@pytest.mark.parametrize("asked_before", [False, True], ids=["request lost", "answer lost"])
+def test_lost_answers_are_asked_for_again_and_no_step_is_walked_twice(client, monkeypatch, asked_before) -> None:
+    monkeypatch.setattr("clearway.serve.client.FIRST_PAUSE_S", 0.001)
+    way, navigator = Flaky(client, 2, asked_before), clearway.Navigator(Sums(), seed=3)
+    http = httpx.Client(base_url="http://testserver", transport=way, headers=client.headers)
+    with with_service(http, Client("http://testserver", TOKEN)).session(seed=3) as session:
+        for target in (2, 3):
+            for walker in (session, navigator):
+                walker.set_target(plain(target))
+            for level in (7, 7, 9):
+                assert session.act(plain(level))[::2] == navigator.act(plain(level))[::2]
+    assert all(times % 3 == 0 for times in way.seen.values())  # each came three times, the session's end too
+
+
+def test_a_session_goes_on_uncounted_once_an_answer_is_lost_for_good(client, service, monkeypatch) -> None:
+    monkeypatch.setattr("clearway.serve.client.AGAIN_S", 0.0)
+    session = with_service(client, Client("http://testserver", TOKEN)).session(selection="argmax")
+    for lost in (session.set_target, session.act):
+        session._client._http = httpx.Client(
+            base_url="http://testserver", transport=Flaky(client, 1, True), headers=client.headers
+        )
+        with pytest.raises(ServiceError, match="unreachable"):
+            lost(plain(1))
+        session._client._http = client
+        lost(plain(2))
+    assert session.act(plain(3)).value == 2000 + 1 + 1 + 2 + 3  # what was lost had been walked
 
 
 def test_how_pictures_are_sent(tmp_path) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import ssl
-import subprocess
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -19,36 +18,12 @@ from clearway.serve.attempts import Attempts
 from clearway.serve.limits import Limits
 from clearway.serve.run import check_tls
 from clearway.serve.service import Service
-from clearway.serve.tokens import Tokens
+from helpers.certificates import certified
 from helpers.running import PATIENT_S, running
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, until_closed
 from helpers.sums import Sums, plain
 
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
-
-
-def certified(folder: Path) -> tuple[Path, Path]:
-    """A certificate for 127.0.0.1 that is its own authority, and its key."""
-    if shutil.which("openssl") is None:
-        pytest.skip("openssl, which makes the certificate, is not installed")
-    certificate, key = folder / "cert.pem", folder / "key.pem"
-    words = [
-        "openssl",
-        "req",
-        "-x509",
-        "-newkey",
-        "ec",
-        "-pkeyopt",
-        "ec_paramgen_curve:prime256v1",
-        "-nodes",
-        "-days",
-        "1",
-        "-subj",
-        "/CN=127.0.0.1",
-    ]
-    more = ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(certificate)]
-    subprocess.run([*words, *more], check=True, capture_output=True)
-    return certificate, key
 
 
 def test_over_tls_an_episode_is_walked_and_plain_http_is_not_answered(tmp_path) -> None:
@@ -100,6 +75,27 @@ def test_strangers_keep_no_connection_and_not_many() -> None:
         finally:
             for connection in held:
                 connection.close()
+
+
+def test_one_name_leaves_connections_for_another(tmp_path) -> None:
+    """Once its token was right, a client could keep as many as there were."""
+    path, guest = tmp_path / "tokens", {"authorization": f"Bearer {20 * 'g'}"}
+    path.write_text(f"{OWNER} {TOKEN}\nguest {20 * 'g'}\n")
+    path.chmod(0o600)
+    with ExitStack() as held, running(tokens=str(path), connections=8) as service:
+        session = httpx.post(f"{service.url}/sessions", json={}, headers=AUTHORISED, timeout=PATIENT_S).json()
+        stream = f"ws://127.0.0.1:{service.port}/sessions/{session['session_id']}/stream"
+        held.enter_context(connect(stream, additional_headers=AUTHORISED, close_timeout=0.1))
+        greedy = [held.enter_context(httpx.Client(headers=AUTHORISED, timeout=PATIENT_S)) for _ in range(4)]
+        answers = [client.get(f"{service.url}/agent") for client in greedy]
+        assert [answer.status_code for answer in answers] == [200, 200, 200, 503]
+        assert "connections of this token" in answers[-1].text
+        assert httpx.get(f"{service.url}/agent", headers=guest, timeout=PATIENT_S).status_code == 200
+        greedy[0].close()
+        until = time.monotonic() + PATIENT_S
+        while greedy[3].get(f"{service.url}/agent").status_code != 200 and time.monotonic() < until:
+            time.sleep(0.05)
+        assert greedy[3].get(f"{service.url}/agent").status_code == 200
 
 
 def test_health_and_metrics_on_a_port_of_their_own() -> None:
@@ -182,16 +178,6 @@ def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_pat
         signal.signal(signal.SIGHUP, before)
 
 
-def test_large_bodies_together_are_bounded() -> None:
-    service = Service(Sums(), Limits(bodies_bytes=100), Tokens([("crowd", 20 * "c"), ("guest", 20 * "g")]))
-    service.hold_bytes("crowd", 50)
-    with pytest.raises(Exception, match="too many large requests"):
-        service.hold_bytes("crowd", 1)
-    service.hold_bytes("guest", 50)
-    service.free_bytes("crowd", 50)
-    service.hold_bytes("crowd", 50)
-
-
 def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
     service = Service(Sums(), Limits(bodies_bytes=1000), TOKENS)
     client = called(service)
@@ -200,7 +186,7 @@ def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
     for _ in range(3):
         assert client.put(path, content=bytes(2000), headers=kind).json()["error"]["code"] == "overloaded"
         assert client.put(path, content=grey(1), headers=kind).status_code == 204
-    assert service._bodies.total() == 0
+    assert service.bodies.taken == 0
 
 
 def test_it_ends_in_time_whatever_is_under_way_and_tells_who_waits() -> None:

@@ -37,7 +37,7 @@ SERVICE = Service(Sums(), LIMITS, TOKENS)
 SERVICE.decoders = Here(LIMITS)
 APP = protected(make_app(SERVICE), SERVICE)
 SCHEMA = schemathesis.openapi.from_asgi("/openapi.json", APP, headers=HEADERS)
-KNOWN = SERVICE.sessions.open(OWNER, "sampled", 0, 5000)
+KNOWN = SERVICE.sessions.open(OWNER, "sampled", 0)
 SUPPRESSED = list(HealthCheck)
 
 

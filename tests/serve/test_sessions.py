@@ -6,6 +6,7 @@ from clearway.errors import DeployError
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.sessions import Sessions
+from clearway.serve.shares import Places
 from helpers.serving import OWNER
 
 
@@ -16,10 +17,14 @@ class Clock:
         return self.now
 
 
+def places(most: int) -> Places:
+    return Places(most, lambda: {OWNER})
+
+
 def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
     clock = Clock()
-    sessions = Sessions(Limits(idle_s=60), clock)
-    first, second = sessions.open(OWNER, "argmax", None, 1000), sessions.open(OWNER, "sampled", 3, 1000)
+    sessions = Sessions(Limits(idle_s=60), places(1000), clock)
+    first, second = sessions.open(OWNER, "argmax", None), sessions.open(OWNER, "sampled", 3)
     clock.now += 59
     assert sessions.get(first.id, OWNER) is first  # its time begins anew
     clock.now += 1
@@ -35,15 +40,15 @@ def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
 
 def test_no_more_sessions_than_allowed_and_room_again_when_one_goes() -> None:
     clock = Clock()
-    sessions = Sessions(Limits(sessions=2, idle_s=60), clock)
-    first = sessions.open(OWNER, "sampled", None, 1000)
+    sessions = Sessions(Limits(idle_s=60), places(2), clock)
+    first = sessions.open(OWNER, "sampled", None)
     clock.now += 30
-    sessions.open(OWNER, "sampled", None, 1000)
+    sessions.open(OWNER, "sampled", None)
     with pytest.raises(Fault, match="2 sessions are open") as caught:
-        sessions.open(OWNER, "sampled", None, 1000)
+        sessions.open(OWNER, "sampled", None)
     assert (caught.value.code, caught.value.status) == ("too_many_sessions", 429)
     sessions.close(first.id, OWNER)
-    sessions.open(OWNER, "sampled", None, 1000)
+    sessions.open(OWNER, "sampled", None)
     assert sessions.full
     clock.now += 60
     assert not sessions.full
@@ -52,13 +57,13 @@ def test_no_more_sessions_than_allowed_and_room_again_when_one_goes() -> None:
 
 
 def test_names_of_sessions_cannot_be_guessed() -> None:
-    sessions = Sessions(Limits())
-    own = sessions.open(OWNER, "sampled", None, 1000)
+    sessions = Sessions(Limits(), places(1000))
+    own = sessions.open(OWNER, "sampled", None)
     for ask in (sessions.get, sessions.close):
         with pytest.raises(Fault, match="no such session"):
             ask(own.id, "another")
     assert sessions.get(own.id, OWNER) is own
-    names = {sessions.open(OWNER, "sampled", None, 1000).id for _ in range(200)}
+    names = {sessions.open(OWNER, "sampled", None).id for _ in range(200)}
     assert len(names) == 200
     assert {len(name) for name in names} == {22}  # 128 bits
 

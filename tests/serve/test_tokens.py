@@ -5,7 +5,7 @@ import os
 import pytest
 
 from clearway.errors import ClearwayError
-from clearway.serve.tokens import Tokens, read_tokens
+from clearway.serve.tokens import read_tokens
 
 RED, BLUE, NEW = 16 * "r", 16 * "b", 16 * "n"
 
@@ -20,9 +20,6 @@ def written(tmp_path, text: str, mode: int = 0o600):
 def test_a_file_of_tokens(tmp_path) -> None:
     tokens = read_tokens(written(tmp_path, f"# whose\n\nred {RED}\n  blue\t{BLUE}\nred {NEW}\n"))
     assert [tokens.owner_of(given) for given in (RED, BLUE, NEW, "", RED[:-1])] == ["red", "blue", "red", None, None]
-    assert tokens.share(1000) == 500  # of two owners
-    many = Tokens([(str(number), str(number) * 16) for number in range(9)])
-    assert (many.share(1000), many.share(1), Tokens([("one", RED)]).share(7)) == (250, 1, 7)
 
 
 @pytest.mark.parametrize(

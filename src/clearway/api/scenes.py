@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
@@ -18,6 +19,7 @@ from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 from clearway.scenes.sensors import RGB, check_names
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.spread.many import of_each
 
 SceneSource: TypeAlias = Scene | str | os.PathLike[str]
 Scenes: TypeAlias = SceneSource | Iterable[SceneSource]
@@ -77,7 +79,9 @@ def scenes_and_files(sources: Scenes, *, features_in_file: bool = False) -> list
             found.append((source, None))
         else:
             files = scene_files([as_path("scenes", source)])
-            found += [(read_scene(file, features_in_file=features_in_file), file) for file in files]
+            read = partial(read_scene, features_in_file=features_in_file)
+            loaded = of_each(read, files) if features_in_file else map(read, files)  # else they are large messages
+            found += zip(loaded, files, strict=True)
     if not found:
         raise ArgumentError("scenes: none given. Give at least one scene or scene file")
     return found

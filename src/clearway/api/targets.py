@@ -35,7 +35,7 @@ def chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict
     names = [scene.name for scene in scenes]
     chosen: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
     for name, states in targets.items():
-        if name not in names:
+        if name not in chosen:
             raise ArgumentError(
                 f"targets: no scene {name!r:.80} is given.{did_you_mean(name, names)} Name one of {', '.join(names)}"
             )

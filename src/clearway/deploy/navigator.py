@@ -241,6 +241,12 @@ def episode_seeds(seed: int | None) -> Iterator[np.ndarray]:
     return (rng.integers(1 << 62, size=1) for _ in count())
 
 
+def episode_seed(seed: int, number: int) -> np.ndarray:
+    """The seed (1,) int64 of one of `episode_seeds`, by its number from 0, without drawing those before it."""
+    jumped = np.random.PCG64(seed).advance(number)  # one word each: a power of two of them is never drawn again
+    return np.random.Generator(jumped).integers(1 << 62, size=1)
+
+
 def checked_seed(seed: object) -> int | None:
     """The seed of draws, or None where there is none. Raises DeployError where it is no whole number from 0."""
     if seed is None:

@@ -61,5 +61,5 @@ class OnnxEyes:
 
     def _told(self, output: str, **given: np.ndarray) -> np.ndarray:
         """One of the graph's outputs, by its inputs."""
-        none = {"picture": NOTHING, "seen": self._none, "first": self._none, "second": self._none}
-        return self._session.run([output], {**none, **given})[0]
+        nothing: dict[str, np.ndarray] = dict.fromkeys(("seen", "first", "second"), self._none)
+        return self._session.run([output], nothing | {"picture": NOTHING} | given)[0]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.deploy.agent import sight_of
 from clearway.deploy.card import ARRIVAL, EXPORT_AGAIN, SIAMESE, Card, card_from_json
 from clearway.deploy.onnx_graph_check import problem_of
+from clearway.deploy.onnx_session import BoundedSession
 from clearway.errors import DeployError
 from clearway.regular_files import read_bytes
 
@@ -54,12 +54,12 @@ class OnnxFile:
     """An exported agent's file, open.
 
     Attributes:
-        session: of onnxruntime.
+        session: runs it.
         card: what the agent is.
         source: the path, for errors.
     """
 
-    session: Any
+    session: BoundedSession
     card: Card
     source: str
 
@@ -78,9 +78,8 @@ def read_onnx(path: Path, threads: int | None = None) -> OnnxFile:
     content = _content(path)
     check_seal(content, str(path))
     _check_graph(content, str(path))
-    session = _session(content, path, threads)
-    metadata = session.get_modelmeta().custom_metadata_map
-    return OnnxFile(session, card_from_json(metadata.get(CARD_KEY, ""), str(path)), str(path))
+    session = BoundedSession(content, str(path), threads)
+    return OnnxFile(session, card_from_json(session.metadata.get(CARD_KEY, ""), str(path)), str(path))
 
 
 class OnnxAgent:
@@ -168,20 +167,3 @@ def _check_graph(content: bytes, source: str) -> None:
         raise DeployError(f"{source}: not an agent's ONNX file ({fault}). {EXPORT_AGAIN}") from fault
     if problem is not None:
         raise DeployError(f"{source}: asks for {problem}, which no exported agent does. {EXPORT_AGAIN}")
-
-
-def _session(content: bytes, path: Path, threads: int | None) -> Any:
-    try:
-        import onnxruntime
-    except ImportError as fault:
-        raise DeployError(f"{path}: needs onnxruntime. Install it: pip install 'clearway[onnx]'") from fault
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads or 0
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idle threads leave the processor
-    try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as fault:  # onnxruntime's own errors share no other base
-        reason = " ".join(str(fault).split())[:300]
-        raise DeployError(
-            f"{path}: onnxruntime {onnxruntime.__version__} cannot run it ({reason}). Upgrade it"
-        ) from fault

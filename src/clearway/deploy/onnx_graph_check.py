@@ -1,7 +1,8 @@
 """What an ONNX file may ask of onnxruntime, looked at in its bytes before that sees them.
 
 A seal tells that a file is as it was exported, not by whom. So no file may name other files, operators of other
-libraries, functions of its own, or loops, whose time no size of the file bounds.
+libraries, functions of its own, or loops, whose time no size of the file bounds. What it asks for otherwise is bounded
+while it runs: see `onnx_session`.
 
 Messages and field numbers: onnx.proto3 of ONNX 1.18, https://github.com/onnx/onnx/blob/main/onnx/onnx.proto3
 """

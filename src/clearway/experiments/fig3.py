@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from clearway.evaluation.episodes import EpisodeTable
+from clearway.experiments.convergence import ONE_TARGET
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job
-from clearway.experiments.section import ReportFigure, Section, Series
+from clearway.experiments.section import Claim, ReportFigure, Section, Series
 from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less, with_failures
+from clearway.reward import COLLISION_AWARE, SHORTEST
 
 FIGURES = {"steps": "steps so far", "collisions": "collisions so far"}
 
@@ -48,8 +53,21 @@ def section(setting: Setting) -> Section:
             "and for collisions by themselves. The paper prints its figures as a picture alone."
         ),
         figures=tuple(figure for figure in figures if figure.series),
+        claims=tuple(_claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
+
+
+def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
+    """The collision-aware agent has fewer collisions in the worst case too."""
+    world = setting.world()
+    found = {(group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups}
+    for learner in setting.learners:
+        pair = [found[learner, reward.name] for reward in (COLLISION_AWARE, SHORTEST)]
+        ours, theirs = (own.of("collisions").max(axis=1, keepdims=True) for own in pair)
+        text = f"{learner}: fewer collisions in the worst case (the target with the most, in each run)"
+        claim = judged_less(text, "collisions on a run's worst target", ours, theirs, ONE_TARGET)
+        yield with_failures(claim, *(own.of("success") for own in pair))
 
 
 def _best_and_worst(setting: Setting, group: Group, metric: str, targets: np.ndarray) -> list[Series]:

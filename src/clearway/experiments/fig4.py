@@ -13,7 +13,7 @@ from clearway.experiments.job import run_folder
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less, with_failures
+from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
 METRICS = {"steps": 1.0, "collisions": 0.1}
@@ -78,7 +78,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
-    """The collision-aware agent is ahead halfway."""
+    """The collision-aware agent is ahead halfway, and has then nearly come to its end."""
     world = setting.world()
     found = []
     for learner in setting.learners:
@@ -93,6 +93,14 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
             scene = world.target_scene.numpy()
             claim = judged_less(text, f"{metric} halfway", ours.of(metric), baseline.of(metric), scene)
             found.append(with_failures(claim, ours.of("success"), baseline.of("success")))
+        (end,) = (
+            group.scores(setting.out, world.target_count)
+            for group in groups
+            if (group.learner, group.agent, group.trial.halfway) == (learner, COLLISION_AWARE.name, False)
+        )
+        text = f"{learner}: halfway is close to the end (no more steps)"
+        claim = judged_no_more(text, "steps", ours.of("steps"), end.of("steps"), world.target_scene.numpy())
+        found.append(with_failures(claim, ours.of("success"), end.of("success")))
     return found
 
 

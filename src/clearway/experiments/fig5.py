@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -89,7 +89,7 @@ def section(setting: Setting) -> Section:
                 "fig5", title, "steps to the nearest trained target", "success score", lines(points), band=BAND
             ),
         ),
-        claims=tuple(_claims(setting, averages)),
+        claims=(*_claims(setting, averages), *_falls(setting, kinds)),
         missing=tuple(missing),
     )
 
@@ -111,6 +111,18 @@ def _claims(setting: Setting, averages: Mapping[Kind, Tried]) -> list[Claim]:
             scores = ours.scores.of(metric), baseline.scores.of(metric)
             found.append(judged_more(text, what, *scores, ours.target_scene))
     return found
+
+
+def _falls(setting: Setting, kinds: Mapping[Kind, list[Tried]]) -> Iterator[Claim]:
+    """Success falls with the distance, under both rewards together."""
+    for learner in setting.learners:
+        ends = []
+        for place in (0, -1):
+            own = [kinds[learner, reward.name][place] for reward in PAIR]
+            ends.append(np.concatenate([each.scores.in_scenes("sc", each.target_scene) for each in own]))
+        text = f"{learner}: success falls with distance (higher sc {DISTANCES[0]} step away than {DISTANCES[-1]})"
+        near, far = ends
+        yield judged_more(text, "sc", near, far, np.arange(len(setting.scenes)))
 
 
 def _groups(setting: Setting, steps: int) -> list[Group]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from clearway.agents.by_pose import RandomWalk
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
-from clearway.evaluation.metrics import METRIC_NAMES, by_target
+from clearway.evaluation.metrics import METRIC_NAMES, by_scene, by_target
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
 from clearway.experiments.setting import Setting
@@ -72,6 +72,14 @@ class Scores:
     def of(self, metric: str) -> np.ndarray:
         """(R, M)."""
         return self.values[:, :, METRIC_NAMES.index(metric)]
+
+    def in_scenes(self, metric: str, target_scene: np.ndarray) -> np.ndarray:
+        """(R, C) means over each scene's targets; target_scene: (M,) int."""
+        return by_scene(self.of(metric)[..., None], target_scene)[..., 0]
+
+    def detours(self, target_scene: np.ndarray) -> np.ndarray:
+        """(R, C) steps in each scene over the shortest paths'; target_scene: (M,) int."""
+        return self.in_scenes("steps", target_scene) / self.in_scenes("shortest_path_steps", target_scene)
 
 
 def scores(tables: Mapping[int, EpisodeTable], target_count: int) -> Scores:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.hard_targets import hard_targets
 from clearway.experiments.kept import keep, kept
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.paper_numbers import TABLE_2, TABLE_3, PaperRow
 from clearway.experiments.plan import Job, TargetSets
-from clearway.experiments.section import Section
+from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
 from clearway.experiments.table1 import REWARDS, claims
+from clearway.experiments.verdicts import judged_more, judged_no_more
+from clearway.world.world import World
 
 FILE = "hard_targets.json"
 RULE = (
@@ -58,12 +62,37 @@ class HardTable:
                 "and how far apart."
             ),
             tables=(*tables, settled),
-            claims=(*claims(setting, groups, where), *sooner),
+            claims=(*claims(setting, groups, where), *sooner, *self._beside_easy(setting, groups)),
             missing=all_missing(groups, setting.out),
         )
 
+    def _beside_easy(self, setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
+        """Hard targets are harder than the main experiment's after its frames, and no more so after twice as many.
+
+        Of learners that the main experiment has trained; under both of the paper's rewards together.
+        """
+        scenes = np.arange(len(setting.scenes))
+        main, world, hard_world = compared(setting, PAIR), setting.world(), setting.world(chosen(setting))
+        for learner in setting.learners:
+            easy, hard = _detours(setting, main, learner, world), _detours(setting, groups, learner, hard_world)
+            if not len(easy):
+                continue
+            if self.frames_factor == 1:
+                text = f"{learner}: hard targets are harder (larger detours)"
+                yield judged_more(text, "x shortest paths", hard, easy, scenes)
+            else:
+                text = f"{learner}: {self.frames_factor} times the frames repair hard targets (no larger detours)"
+                yield judged_no_more(text, "x shortest paths", hard, easy, scenes)
+
     def _groups(self, setting: Setting) -> list[Group]:
         return compared(setting, REWARDS, targets=chosen(setting), frames_factor=self.frames_factor)
+
+
+def _detours(setting: Setting, groups: Sequence[Group], learner: str, world: World) -> np.ndarray:
+    """(R, C) steps over the shortest paths' in each scene: a learner's complete runs under the paper's two rewards."""
+    own = [group for group in groups if group.learner == learner and group.runs[0].reward in PAIR]
+    found = [group.scores(setting.out, world.target_count) for group in own]
+    return np.concatenate([each.detours(world.target_scene.numpy()) for each in found])
 
 
 TABLE2, TABLE3 = HardTable(2, 1, TABLE_2), HardTable(3, 2, TABLE_3)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
@@ -40,7 +40,7 @@ def section(setting: Setting) -> Section:
         ),
         tables=tables,
         maps=maps(setting, groups),
-        claims=tuple(claims(setting, groups)),
+        claims=(*claims(setting, groups), *_tenth(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
 
@@ -53,6 +53,18 @@ def all_groups(setting: Setting) -> list[Group]:
         if learner.clip_rewards
     }
     return compared(setting, REWARDS) + compared(replace(setting, learners=unclipped), PAIR)
+
+
+def _tenth(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
+    """Collisions fall by an order of magnitude."""
+    world = setting.world()
+    found = {(group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups}
+    for learner in setting.learners:
+        ours, theirs = (found[learner, reward.name] for reward in (COLLISION_AWARE, SHORTEST))
+        text = f"{learner}: less than a tenth of the collisions with the shortest-path reward"
+        pair = ours.of("collisions"), theirs.of("collisions") / 10
+        claim = judged_less(text, "collisions and a tenth of theirs", *pair, world.target_scene.numpy())
+        yield with_failures(claim, ours.of("success"), theirs.of("success"))
 
 
 def claims(setting: Setting, groups: Sequence[Group], where: str = "") -> list[Claim]:

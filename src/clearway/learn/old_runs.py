@@ -16,7 +16,7 @@ from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
 from clearway.reward import Reward
 
-LATER: Mapping[str, object] = MappingProxyType({"goals": "given"})
+LATER: Mapping[str, object] = MappingProxyType({"goals": "given", "sent_gradients": "float32"})
 """Settings that earlier versions did not have, and what was done then."""
 
 

@@ -90,6 +90,8 @@ class OnPolicy(OnFeatures, Learner):
     """Largest norm of the gradient."""
     clip_each_tensor: bool = False
     """Clip every parameter tensor by itself, as Zhu's code does, rather than all together."""
+    sent_gradients: Literal["float32", "bfloat16"] = "float32"
+    """What several workers send gradients to each other as; bfloat16: half the bytes, sums rounded to 8 bits."""
 
     # The network
     matmul_precision: MatmulPrecision = "medium"

@@ -45,13 +45,19 @@ class Peers:
         """This worker writes files and tells the user."""
         return self.rank == 0
 
-    def add_up(self, *tensors: Tensor) -> None:
-        """Replace tensors of one dtype, in place, by their sums over all workers, as one message."""
+    def add_up(self, *tensors: Tensor, sent_as: torch.dtype | None = None) -> None:
+        """Replace tensors of one dtype, in place, by their sums over all workers, as one message.
+
+        Args:
+            tensors: of the same shapes at every worker.
+            sent_as: dtype in which they are sent and added up; None: their own.
+        """
         if self.count == 1:
             return
         flat = tensors[0] if len(tensors) == 1 else torch.cat([tensor.flatten() for tensor in tensors])
+        flat = flat.to(sent_as or flat.dtype)
         self._exchange(flat, lambda: self._group.allreduce([flat]))
-        if len(tensors) > 1:
+        if flat is not tensors[0]:
             for tensor, summed in zip(tensors, flat.split([tensor.numel() for tensor in tensors]), strict=True):
                 tensor.copy_(summed.view_as(tensor))
 

@@ -7,7 +7,10 @@ or not at all, whatever is killed when. Metrics are put before it, since rows be
 
 from __future__ import annotations
 
+import os
+import shutil
 import tempfile
+import threading
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +18,7 @@ from pathlib import Path
 from clearway.errors import ClearwayError, RunError
 from clearway.files import folder_written_whole
 from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints
-from clearway.learn.run_folder import CHECKPOINTS, METRICS_FILE, RUN_FILE, SETTINGS_FILE, RunFolder
+from clearway.learn.run_folder import CHECKPOINTS, COPIED, METRICS_FILE, RUN_FILE, SETTINGS_FILE, RunFolder
 from clearway.remote.address import address_of
 from clearway.remote.store import WRITABLE, Store
 
@@ -80,17 +83,6 @@ class RunCopy:
             for part in reversed(FILES):
                 self.store.remove(self._place(CHECKPOINTS, old, part))
 
-    def tried_update(self, folder: Path) -> None:
-        """Likewise, in the midst of a training, which goes on without: the next checkpoint is copied again.
-
-        Warns:
-            UserWarning: the store cannot be written to.
-        """
-        try:
-            self.update(folder)
-        except ClearwayError as fault:
-            warnings.warn(f"not copied: {fault}. Training goes on", stacklevel=2)
-
     def restore(self, folder: Path) -> bool:
         """Fetch the run into a folder that is not there or empty, whole or not at all; False where there is no copy.
 
@@ -126,3 +118,62 @@ class RunCopy:
 
     def _place(self, *parts: str) -> str:
         return "/".join((self.address, *parts))
+
+
+class CopyingMeanwhile:
+    """Copies that are made by a thread while training goes on; a checkpoint that comes during one is left out.
+
+    Args:
+        copy: where to.
+    """
+
+    def __init__(self, copy: RunCopy) -> None:
+        self.copy = copy
+        self._thread: threading.Thread | None = None
+        self._fault: ClearwayError | OSError | None = None
+
+    def begin(self, folder: Path) -> None:
+        """Copy a run folder as it is now, unless a copy is under way.
+
+        Warns:
+            UserWarning: the copy before failed; training goes on, and the next checkpoint is copied again.
+        """
+        if self._thread is not None and self._thread.is_alive():
+            return
+        self.wait()
+        part = Path(tempfile.mkdtemp(prefix=COPIED, dir=folder))
+        _snapshot(folder, part)
+        self._thread = threading.Thread(target=self._update, args=(part,), daemon=True)
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Wait until no copy is under way. Warns as `begin`."""
+        if self._thread is not None:
+            self._thread.join()
+        fault, self._fault, self._thread = self._fault, None, None
+        if fault is not None:
+            warnings.warn(f"not copied: {fault}. Training goes on", stacklevel=3)
+
+    def _update(self, part: Path) -> None:
+        try:
+            self.copy.update(part)
+        except (ClearwayError, OSError) as fault:
+            self._fault = fault
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+
+
+def _snapshot(folder: Path, part: Path) -> None:
+    """Keep what is copied of a run as it is now, whatever training removes: checkpoints under a second name."""
+    if (folder / CHECKPOINTS).exists():
+        shutil.copytree(folder / CHECKPOINTS, part / CHECKPOINTS, copy_function=_linked)
+    for name in (METRICS_FILE, SETTINGS_FILE, RUN_FILE):
+        if (folder / name).exists():
+            shutil.copyfile(folder / name, part / name)
+
+
+def _linked(source: str, copy: str) -> None:
+    try:
+        os.link(source, copy)
+    except OSError:  # the file system knows no second names
+        shutil.copyfile(source, copy)

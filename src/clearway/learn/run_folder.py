@@ -13,9 +13,10 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shutil
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -35,7 +36,9 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.regular_files import read_bytes, read_text
 from clearway.remote.address import origin
 from clearway.reward import Reward, reward_from_json
+from clearway.scenes.features import FileFeatures
 from clearway.scenes.scene import Scene
+from clearway.spread.many import of_each
 from clearway.version import __version__
 
 if TYPE_CHECKING:
@@ -45,6 +48,8 @@ FORMAT_VERSION = 2
 SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 MAX_METRICS_BYTES = 1024**3
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
+LOCK_FILE = ".lock"
+COPIED = ".copied-"  # begins the name of what is being copied elsewhere
 SETTINGS_FILE = "run.yaml"  # what repeats the run
 
 
@@ -123,9 +128,16 @@ def scene_digest(scene: Scene) -> str:
     return digest.hexdigest()[:16]
 
 
+def without_pictures(scenes: Sequence[Scene]) -> list[Scene]:
+    """Scenes with what training sees of them alone, as messages for other processes."""
+    return [replace(scene, observations=None, top_view=None, further=()) for scene in scenes]
+
+
 def record_of(request: RunRequest) -> RunRecord:
     """The record of a run that is about to start."""
     paths = request.paths or {}
+    in_files = all(isinstance(scene.features, FileFeatures) for scene in request.scenes)
+    digests = of_each(scene_digest, without_pictures(request.scenes)) if in_files else map(scene_digest, request.scenes)
     return RunRecord(
         learner=request.learner,
         reward=request.paid,
@@ -135,11 +147,11 @@ def record_of(request: RunRequest) -> RunRecord:
             SceneRecord(
                 name=scene.name,
                 path=origin(paths[scene.name]) if scene.name in paths else None,
-                digest=scene_digest(scene),
+                digest=digest,
                 encoder=scene.encoder_name,
                 targets=tuple(int(target) for target in request.targets[scene.name]),
             )
-            for scene in request.scenes
+            for scene, digest in zip(request.scenes, digests, strict=True)
         ),
         versions=package_versions(),
         hardware=hardware(request.device) | {"feature_store": request.feature_store},
@@ -178,7 +190,7 @@ class RunFolder:
         """
         from filelock import FileLock, Timeout
 
-        lock = FileLock(self.path / ".lock", timeout=0)
+        lock = FileLock(self.path / LOCK_FILE, timeout=0)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             lock.acquire()
@@ -187,12 +199,39 @@ class RunFolder:
         except OSError as error:
             raise RunError(f"{self.path}: not a folder to write to ({error}). Choose another with --out") from error
         try:
-            for name in (RUN_FILE, METRICS_FILE):
-                for part in self.path.glob(f".{name}.*.part"):  # by a process that was killed
-                    part.unlink()
+            self.clear_parts()
             yield
         finally:
             lock.release()
+
+    def clear_parts(self) -> None:
+        """Remove what a process that was killed left unfinished."""
+        for name in (RUN_FILE, METRICS_FILE):
+            for part in self.path.glob(f".{name}.*.part"):
+                part.unlink()
+        for part in self.path.glob(f"{COPIED}*"):
+            shutil.rmtree(part)
+
+    @contextmanager
+    def begun(self, record: RunRecord, resume: bool) -> Iterator[list[str] | None]:
+        """As `begin`; where the run begins, and fails before its first checkpoint, it is removed again."""
+        fresh = not self.exists
+        other_bits = self.begin(record, resume)
+        try:
+            yield other_bits
+        except Exception:
+            if fresh and not any(self.checkpoints.glob("frames-*")):
+                self._forget()
+            raise
+
+    def _forget(self) -> None:
+        """Remove the run, and the folder where it holds nothing else."""
+        for name in (RUN_FILE, METRICS_FILE, SETTINGS_FILE):
+            (self.path / name).unlink(missing_ok=True)
+        for folder in (self.checkpoints, self.path / MILESTONES):
+            shutil.rmtree(folder, ignore_errors=True)
+        if not any(path.name != LOCK_FILE for path in self.path.iterdir()):
+            shutil.rmtree(self.path)
 
     def begin(self, record: RunRecord, resume: bool) -> list[str] | None:
         """Begin a run here, or find one to go on with.

@@ -21,7 +21,7 @@ from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.learn.pace import Pace
 from clearway.learn.peers import Peers
 from clearway.learn.progress import ProgressView
-from clearway.learn.run_copy import RunCopy
+from clearway.learn.run_copy import CopyingMeanwhile, RunCopy
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.tracking import tracker_of
@@ -95,11 +95,14 @@ class Running:
             self._copy()  # which may have failed before
             return
         log = self._log(seconds)
+        meanwhile = None if self.copy is None else CopyingMeanwhile(self.copy)
         try:
-            self._train(log, seconds)
+            self._train(log, seconds, meanwhile)
         finally:
             if log:
                 log.close()
+            if meanwhile is not None:
+                meanwhile.wait()
         self._copy()
         if not self._done():
             raise KeyboardInterrupt
@@ -128,7 +131,7 @@ class Running:
         tracker = tracker_of(self.track, folder.path, settings, folder.metrics(), seconds)
         return MetricsLog(folder.metrics_path, tracker)
 
-    def _train(self, log: MetricsLog | None, seconds: float) -> None:
+    def _train(self, log: MetricsLog | None, seconds: float, meanwhile: CopyingMeanwhile | None) -> None:
         trainer, pace = self.trainer, Pace(self.peers)
         seen, rows = trainer.frames, _rows_due(trainer)
         saved_at, saved_frames = time.monotonic(), trainer.frames or None  # a resumed trainer stands at its checkpoint
@@ -162,8 +165,8 @@ class Running:
             self.view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
             if saves:
                 self._save(seconds)
-                if self.copy is not None:
-                    self.copy.tried_update(self.folder.path)
+                if meanwhile is not None:
+                    meanwhile.begin(self.folder.path)
                 saved_at, saved_frames = time.monotonic(), trainer.frames
         trainer.tensors()
         tell()

@@ -125,7 +125,11 @@ class Share:
         return network
 
     def add_up_gradients(
-        self, network: SiameseActorCritic, heads_by_scene: bool, siamese_weight: bool
+        self,
+        network: SiameseActorCritic,
+        heads_by_scene: bool,
+        siamese_weight: bool,
+        sent_as: torch.dtype | None = None,
     ) -> tuple[int, Tensor | None]:
         """Add up over workers the gradients of the parameters that all of them have.
 
@@ -133,6 +137,7 @@ class Share:
             network: with gradients of this worker's rows, divided by how many rows all have.
             heads_by_scene: the heads are this worker's alone.
             siamese_weight: it has a gradient too.
+            sent_as: dtype in which they are sent and added up; None: their own.
 
         Returns:
             what `clip_gradients` takes: how many gradients are own, the squares of everybody's own added up.
@@ -143,10 +148,10 @@ class Share:
             if not (heads_by_scene and name in HEADS) and (siamese_weight or name != "siamese_weight")
         ]
         if not heads_by_scene:
-            self.peers.add_up(*shared)
+            self.peers.add_up(*shared, sent_as=sent_as)
             return 0, None
         squares = torch.stack([grad_of(getattr(network, name)).square().sum() for name in HEADS]).sum()
-        self.peers.add_up(*shared, squares)
+        self.peers.add_up(*shared, squares, sent_as=sent_as)
         return OWN_GRADIENTS * (self.last - self.first), squares
 
     def joined(self, tensors: dict[str, Tensor], heads_by_scene: bool, sightings: int) -> dict[str, Tensor]:

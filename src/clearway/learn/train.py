@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing, nullcontext
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -142,8 +142,7 @@ def train(
     check_tracker(track)
     trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
     copy = opened_copy(copy_to, folder, resume)
-    with folder.held():
-        other_bits = folder.begin(record_of(request), resume)
+    with folder.held(), folder.begun(record_of(request), resume) as other_bits:
         if on_begin is not None:
             on_begin(out)
         told_of_other_bits(folder, request, other_bits)
@@ -172,6 +171,8 @@ def train_part(
 ) -> None:
     """Train as one of several workers, from the newest checkpoint of a run that has been begun, if it has one.
 
+    Whoever started the workers holds the folder.
+
     Args:
         request, folder: what to train, where; a folder that all workers see.
         peers: the workers.
@@ -184,23 +185,24 @@ def train_part(
         LostPeer: another worker ended, or does not answer.
     """
     trainer = request.trainer(peers)
-    with folder.held() if peers.leads else nullcontext():
-        seconds = 0.0
-        if any(folder.checkpoints.glob("frames-*")):
-            seconds = _resumed(trainer, folder, peers)
-        elif peers.leads:
-            folder.forget_metrics_after(-1)
-        found = [frames for [frames] in peers.told(trainer.frames)]
-        if len(set(found)) > 1:
-            problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
-            raise RunError(f"{problem}. Give a folder that all machines share as --out")
-        with (
-            progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
-            interruption() as interrupted,
-        ):
-            copy = RunCopy(copy_to) if copy_to and peers.leads else None
-            run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s, copy)
-            run.go_on(seconds)
+    if peers.leads:
+        folder.clear_parts()
+    seconds = 0.0
+    if any(folder.checkpoints.glob("frames-*")):
+        seconds = _resumed(trainer, folder, peers)
+    elif peers.leads:
+        folder.forget_metrics_after(-1)
+    found = [frames for [frames] in peers.told(trainer.frames)]
+    if len(set(found)) > 1:
+        problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
+        raise RunError(f"{problem}. Give a folder that all machines share as --out")
+    with (
+        progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
+        interruption() as interrupted,
+    ):
+        copy = RunCopy(copy_to) if copy_to and peers.leads else None
+        run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s, copy)
+        run.go_on(seconds)
 
 
 def opened_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy | None:

@@ -336,7 +336,8 @@ class Trainer:
         """Add up over workers; what `clip_gradients` has to know of those that only one of them has."""
         if self.peers.count == 1:
             return 0, None
-        return self.share.add_up_gradients(self.network, self.learner.heads_by_scene, siamese_moves)
+        sent_as = torch.bfloat16 if self.learner.sent_gradients == "bfloat16" else None
+        return self.share.add_up_gradients(self.network, self.learner.heads_by_scene, siamese_moves, sent_as)
 
     def _row_figures(self, steps: list[StepFigures], hindsight_rows: int) -> Figures:
         """Figures of what was learnt from, by all workers."""

@@ -26,7 +26,7 @@ from clearway.children import end_with_parent
 from clearway.choices import TrackerName
 from clearway.errors import ClearwayError, RunError
 from clearway.learn.peers import LostPeer, Peers
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder, record_of, without_pictures
 from clearway.learn.tracking import check_tracker
 from clearway.learn.train import (
     SECONDS_BETWEEN_CHECKPOINTS,
@@ -91,6 +91,7 @@ def train_by_workers(
     threads: int | None = None,
     checkpoint_s: float = SECONDS_BETWEEN_CHECKPOINTS,
     copy_to: str | None = None,
+    ray: str | None = None,
 ) -> RunFolder:
     """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
 
@@ -99,9 +100,10 @@ def train_by_workers(
         out: the run folder.
         workers: how many.
         resume, show_progress, until_solved, track, on_begin: as of `train.train`.
-        threads: of torch in each worker; None: the machine's, divided among them.
+        threads: of torch in each worker; None: the machine's, divided among them, and 1 on Ray.
         checkpoint_s: seconds between checkpoints.
         copy_to: as of `train.train`.
+        ray: a Ray cluster that runs them, see `ray_cluster.connected`; None: this machine.
 
     Raises:
         RunError, KeyboardInterrupt: as of `train.train`; or workers were lost again and again.
@@ -110,30 +112,36 @@ def train_by_workers(
     request.check_workers(workers)
     folder = RunFolder(out)
     opened_copy(copy_to, folder, resume)
-    with folder.held():
-        record = record_of(request)
-        record = replace(record, hardware={**record.hardware, "workers": workers})
-        told_of_other_bits(folder, request, folder.begin(record, resume))
-        if on_begin is not None:
-            on_begin(out)
+    record = record_of(request)
+    record = replace(record, hardware={**record.hardware, "workers": workers})
     task = Task(
-        replace(request, scenes=[replace(s, observations=None, top_view=None, further=()) for s in request.scenes]),
+        replace(request, scenes=without_pictures(request.scenes)),
         out,
         os.getpid(),
         show_progress,
         until_solved,
         track,
-        threads or max(1, torch.get_num_threads() // workers),
+        threads or (1 if ray else max(1, torch.get_num_threads() // workers)),
         checkpoint_s,
         copy_to,
     )
-    outcomes = _launched(task, workers)
-    failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
-    if failed:
-        raise RunError(str(failed[0]))
-    if INTERRUPTED in outcomes:
-        raise KeyboardInterrupt
+    with folder.held(), folder.begun(record, resume) as other_bits:
+        told_of_other_bits(folder, request, other_bits)
+        if on_begin is not None:
+            on_begin(out)
+        outcomes = _launched(task, workers) if ray is None else _launched_on_ray(task, workers, ray)
+        failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
+        if failed:
+            raise RunError(str(failed[0]))
+        if INTERRUPTED in outcomes:
+            raise KeyboardInterrupt
     return folder
+
+
+def _launched_on_ray(task: Task, workers: int, address: str) -> list[str | None]:
+    from clearway.learn.ray_workers import launched_on_ray
+
+    return launched_on_ray(task, workers, address)
 
 
 def _launched(task: Task, workers: int) -> list[str | None]:

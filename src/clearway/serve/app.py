@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from http import HTTPStatus
 from typing import Annotated, Any
 
 from clearway.deploy.navigator import Selection
 from clearway.errors import ClearwayError
 from clearway.serve.decoding import CONTENT_TYPES
-from clearway.serve.faults import STATUS, Code, Fault, FaultBody
-from clearway.serve.service import Answer, Service
-from clearway.serve.tokens import OWNER
+from clearway.serve.faults import INTERNAL, POLICY, STATUS, Code, Fault, FaultBody
+from clearway.serve.service import Service
+from clearway.serve.sessions import Answer
+from clearway.serve.tokens import ANSWERED, OWNER
 from clearway.version import __version__
 
 try:
-    from fastapi import FastAPI, Path, Request, Security, WebSocket, WebSocketDisconnect
+    from fastapi import FastAPI, Path, Query, Request, Security, WebSocket, WebSocketDisconnect
     from fastapi.exceptions import RequestValidationError
     from fastapi.responses import Response
     from fastapi.security import HTTPBearer
@@ -31,11 +34,13 @@ DESCRIPTION = """A trained agent: pictures in, actions out.
 
 Open a session, send the picture of its target, then the picture after every step. `GET /sessions/{session_id}/stream`
 is a WebSocket for the steps of a session: every binary message is a picture file, every answer the JSON of a step, or
-of a refusal, after which the session goes on as it was.
+of a refusal, after which the session goes on as it was. Where a stream broke, open the next one with `?step=` and the
+number of the step that was not answered: its picture, sent again, is not walked twice.
 """
-POLICY, INTERNAL = 1008, 1011  # WebSocket close codes
 ID = r"^[A-Za-z0-9_-]{1,64}$"
 MOST_SEED = (1 << 53) - 1  # JSON's exact whole numbers
+Number = Annotated[int | None, Query(ge=1, le=MOST_SEED)]
+"""Of a request among those of its kind; None where the client does not count them."""
 
 
 def _whole(value: object) -> object:
@@ -151,10 +156,15 @@ def make_app(service: Service) -> FastAPI:
         responses=_faults(*PICTURE),
         openapi_extra=PICTURE_BODY,
     )
-    async def set_target(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> None:
-        """Begin an episode: the body is the picture of the place to walk to."""
+    async def set_target(
+        session_id: Annotated[str, Path(pattern=ID)], request: Request, episode: Number = None
+    ) -> None:
+        """Begin an episode: the body is the picture of the place to walk to.
+
+        Send the episode's number, from 1 in a session, and you may send the request again where its answer was lost.
+        """
         session = service.sessions.get(session_id, _owner(request))
-        await service.set_target(session, await _picture(request))
+        await service.set_target(session, await _picture(request), episode)
 
     @app.post(
         "/sessions/{session_id}/steps",
@@ -162,14 +172,17 @@ def make_app(service: Service) -> FastAPI:
         responses=_faults(*PICTURE, "no_target"),
         openapi_extra=PICTURE_BODY,
     )
-    async def step(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> StepAnswer:
-        """Decide: the body is what the camera sees now."""
+    async def step(session_id: Annotated[str, Path(pattern=ID)], request: Request, step: Number = None) -> StepAnswer:
+        """Decide: the body is what the camera sees now.
+
+        Send the step's number, from 1 in an episode, and you may send the request again where its answer was lost.
+        """
         session = service.sessions.get(session_id, _owner(request))
-        return _answer(service, await service.step(session, await _picture(request)))
+        return _answer(service, await service.step(session, await _picture(request), step))
 
     @app.websocket("/sessions/{session_id}/stream")
-    async def stream(socket: WebSocket, session_id: str) -> None:
-        await _stream(service, socket, session_id)
+    async def stream(socket: WebSocket, session_id: str, step: Number = None) -> None:
+        await _stream(service, socket, session_id, step)
 
     return app
 
@@ -185,6 +198,7 @@ OPENING: tuple[Code, ...] = (
 CLOSING: tuple[Code, ...] = ("unauthorised", "too_many_attempts", "no_such_session", "invalid_request")
 PICTURE: tuple[Code, ...] = (
     *CLOSING,
+    "out_of_order",
     "unsupported_picture",
     "unreadable_picture",
     "body_too_large",
@@ -250,41 +264,41 @@ async def _picture(request: Request) -> bytes:
     return await request.body()
 
 
-async def _stream(service: Service, socket: WebSocket, session_id: str) -> None:
+async def _stream(service: Service, socket: WebSocket, session_id: str, step: int | None) -> None:
     """Answer the pictures of a session, one after the other, until either side ends it."""
+    owner = _owner(socket)
     try:
-        service.sessions.get(session_id, _owner(socket))
-        if service.streams.locked():
-            raise Fault("overloaded", f"{service.limits.sessions} streams are open. Try again later")
+        service.sessions.get(session_id, owner)
+        if not service.streams.take(owner):
+            raise Fault("overloaded", "too many streams are open. Close one, or try again later")
     except Fault as fault:
         return await socket.send_denial_response(_fault_response(fault))
-    async with service.streams:
+    try:
         await socket.accept()
-        await _answer_messages(service, socket, session_id)
+        await _answer_messages(service, socket, session_id, step)
+    finally:
+        service.streams.free(owner)
 
 
-async def _answer_messages(service: Service, socket: WebSocket, session_id: str) -> None:
+async def _answer_messages(service: Service, socket: WebSocket, session_id: str, step: int | None) -> None:
+    """The first picture is that of the step with this number, where it has one; those that follow have none."""
     try:
         while True:
             async with asyncio.timeout(service.limits.idle_s):
                 message = await socket.receive()
             if message["type"] == "websocket.disconnect":
                 return
+            begun, status = time.perf_counter(), int(HTTPStatus.OK)
             try:
-                session = service.sessions.get(session_id, _owner(socket))
-                content = message.get("bytes")
-                if content is None:
-                    raise Fault("invalid_request", "send pictures as binary messages")
-                async with asyncio.timeout(service.limits.deadline_s):
-                    answer = await service.step(session, content)
-                await socket.send_text(_answer(service, answer).model_dump_json())
-            except TimeoutError:
-                fault = Fault("deadline_passed", f"not answered within {service.limits.deadline_s:g} s. Try again")
-                await _refuse_message(service, socket, fault)
+                answer = await _answer_message(service, _owner(socket), session_id, message.get("bytes"), step)
+                step = None
             except Fault as fault:
-                await _refuse_message(service, socket, fault)
-                if fault.code == "no_such_session":
-                    return await socket.close(POLICY, "the session has ended")
+                service.metrics.faults.labels(fault.code).inc()
+                answer, status = fault.body().decode(), fault.status
+            await socket.send_text(answer)
+            socket.scope[ANSWERED](begun, status)
+            if status == HTTPStatus.NOT_FOUND:
+                return await socket.close(POLICY, "the session has ended")
     except WebSocketDisconnect:
         return
     except TimeoutError:
@@ -294,9 +308,19 @@ async def _answer_messages(service: Service, socket: WebSocket, session_id: str)
         await socket.close(INTERNAL, "the service failed. Its log says why")
 
 
-async def _refuse_message(service: Service, socket: WebSocket, fault: Fault) -> None:
-    service.metrics.faults.labels(fault.code).inc()
-    await socket.send_text(fault.body().decode())
+async def _answer_message(
+    service: Service, owner: str, session_id: str, content: bytes | None, step: int | None
+) -> str:
+    """The answer to a message. Raises Fault."""
+    session = service.sessions.get(session_id, owner)
+    if content is None:
+        raise Fault("invalid_request", "send pictures as binary messages")
+    try:
+        async with asyncio.timeout(service.limits.deadline_s):
+            return _answer(service, await service.step(session, content, step)).model_dump_json()
+    except TimeoutError as late:
+        told = f"not answered within {service.limits.deadline_s:g} s. Try again"
+        raise Fault("deadline_passed", told) from late
 
 
 def _fault_response(fault: Fault) -> Response:

@@ -6,6 +6,10 @@ Use it as the agent itself (`clearway.Navigator`): one session is one navigator.
 from __future__ import annotations
 
 import io
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +22,9 @@ from clearway.regular_files import read_bytes
 from clearway.scenes.actions import Action
 
 TIMEOUT_S = 30.0
+AGAIN_S, FIRST_PAUSE_S = 10.0, 0.05  # for which a request is sent again whose connection broke; the pauses double
+UNSURE = ("unreachable", "deadline_passed", "internal")  # whether a request with such an end has changed the session
+GONE = 404  # status of what is not there: ended by a request whose answer was lost
 MAX_PICTURE_BYTES = 64 * 1024**2  # of a file; the service takes less
 KEEP_ALIVE_S = 3.0  # of an idle connection; the service's is longer, so that it never closes one that is used
 ANSWER = ("action_index", "probabilities", "value", "arrived")  # of a step
@@ -70,6 +77,7 @@ class Client:
         headers = {"authorization": f"Bearer {token}"}
         limits = httpx.Limits(keepalive_expiry=KEEP_ALIVE_S)
         self._http = httpx.Client(base_url=address, headers=headers, timeout=timeout_s, limits=limits, trust_env=False)
+        self._broken = (httpx.ReadError, httpx.WriteError, httpx.CloseError, httpx.RemoteProtocolError)
         self._unreachable = (httpx.HTTPError, UnicodeError)  # the latter: a host's name that cannot be looked up
 
     def agent(self) -> dict[str, Any]:
@@ -84,11 +92,11 @@ class Client:
     def ask(self, method: str, path: str, **content: Any) -> Any:
         """An answer of the service. Raises ServiceError where it refuses or cannot be reached."""
         try:
-            answer = self._http.request(method, path, **content)
+            answer, times = self._answered(method, path, content)
         except self._unreachable as fault:
             reason = str(fault).rstrip(".")
             raise ServiceError("unreachable", f"{self._http.base_url}: {reason}. Check the address") from fault
-        if answer.is_success:
+        if answer.is_success or (times > 1 and method == "DELETE" and answer.status_code == GONE):
             return answer
         try:
             kept = answer.json()["error"]
@@ -96,6 +104,19 @@ class Client:
         except (ValueError, KeyError, TypeError) as fault:
             raise self._stranger(answer) from fault
         raise ServiceError(code, message)
+
+    def _answered(self, method: str, path: str, content: dict[str, Any]) -> tuple[Any, int]:
+        """An answer, and how often it was asked for: again where the connection broke, as when a replica dies."""
+        give_up, pause_s = time.monotonic() + AGAIN_S, FIRST_PAUSE_S
+        for times in count(1):
+            try:
+                return self._http.request(method, path, **content), times
+            except self._broken:
+                if time.monotonic() + pause_s > give_up:
+                    raise
+                time.sleep(pause_s)
+                pause_s *= 2
+        raise AssertionError("it counts without an end")
 
     def ask_json(self, method: str, path: str, *names: str, **content: Any) -> dict[str, Any]:
         """The JSON object of an answer, which holds these names. Raises ServiceError as `ask`, and where it is none."""
@@ -126,12 +147,15 @@ class Client:
 class ClientSession:
     """An agent on its way, kept by the service; see `Client.session`. Used as a context, it is closed at the end.
 
+    Its requests are numbered: one whose answer was lost is sent again and answered, and no step is walked twice.
+
     Attributes:
         arrived: whether the agent held at its last act that it is at the target; None where it cannot tell.
     """
 
     def __init__(self, client: Client, session_id: str) -> None:
         self.arrived: bool | None = None
+        self._answered: dict[str, int | None] = {"episode": 0, "step": 0}  # None: not known to the client any more
         self._client, self.session_id, self._path = client, session_id, f"/sessions/{session_id}"
 
     def set_target(self, picture: object) -> None:
@@ -145,15 +169,31 @@ class ClientSession:
             ServiceError: the service refused it.
             DeployError: it is no picture, or a file that cannot be read.
         """
-        self._client.ask("PUT", f"{self._path}/target", **_body(picture))
-        self.arrived = None
+        with self._counted("episode") as number:
+            self._client.ask("PUT", f"{self._path}/target", params=number, **_body(picture))
+        self._answered["step"], self.arrived = 0, None
 
     def act(self, picture: object) -> Decision:
         """What to do, seeing a picture; kinds and errors as in `set_target`."""
-        answer = self._client.ask_json("POST", f"{self._path}/steps", *ANSWER, **_body(picture))
+        with self._counted("step") as number:
+            content = _body(picture)
+            answer = self._client.ask_json("POST", f"{self._path}/steps", *ANSWER, params=number, **content)
         told, value, self.arrived = (answer[name] for name in ANSWER[1:])
         probabilities = None if told is None else np.array(told, np.float32)
         return Decision(Action(answer["action_index"]), probabilities, None if value is None else float(value))
+
+    @contextmanager
+    def _counted(self, what: str) -> Iterator[dict[str, int]]:
+        """The parameter of a request that says its number. None is said once an answer has been lost for good."""
+        answered = self._answered[what]
+        try:
+            yield {} if answered is None else {what: answered + 1}
+        except ServiceError as fault:
+            if fault.code in UNSURE or fault.code.startswith("status"):
+                self._answered[what] = None
+            raise
+        if answered is not None:
+            self._answered[what] = answered + 1
 
     def close(self) -> None:
         """End the session. Raises ServiceError where it has ended already."""

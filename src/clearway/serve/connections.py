@@ -1,6 +1,7 @@
 """Connections that do not wait for ever: for a request's headers, or for a client to read what was sent to it.
 
-Before a right token has come, they are few for each address and stay open for a short time.
+Before a right token has come, they are few for each address and stay open for a short time. After it they take places
+of its owner's.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from clearway.serve.shares import Places
 from clearway.serve.tokens import KNOWN
 
 KEEP_ALIVE_S = 75  # of an idle connection; longer than clients and proxies commonly keep theirs
@@ -45,7 +46,7 @@ class Strangers:
             return
         found = self._open.setdefault(connection.address, {})
         found[connection] = None
-        oldest = next((other for other in found if not other.is_known), None)
+        oldest = next((other for other in found if other.owner is None), None)
         if len(found) > self._most and oldest is not None:
             reset(oldest.transport)
             self.remove(oldest)
@@ -58,25 +59,52 @@ class Strangers:
             self._open.pop(connection.address, None)
 
 
-class _Impatient(asyncio.Protocol):
-    """Cuts a connection off whose client does not read; uvicorn would wait for it."""
+class Impatient(asyncio.Protocol):
+    """Cuts a connection off whose client does not read; uvicorn would wait for it.
+
+    Every request's scope has `become_known` in its state, under `KNOWN`.
+    """
 
     loop: asyncio.AbstractEventLoop
     transport: asyncio.Transport
+    app_state: dict[str, Any]
     patience_s: float
+    places: Places
+    owner: str | None = None  # once a right token has come
     _unread: asyncio.TimerHandle | None = None
 
+    def connection_made(self, transport: Any) -> None:
+        """Be told as soon as the client leaves anything unread that the system does not hold."""
+        super().connection_made(transport)
+        transport.set_write_buffer_limits(1)  # asyncio's TLS takes 0 for always too much
+        self.app_state = {**self.app_state, KNOWN: self.become_known}
+
+    def become_known(self, owner: str) -> bool:
+        """Take a place for the connection once a right token has come; False where its owner has too many."""
+        if self.owner is None and self.places.take(owner):
+            self.owner = owner
+        return self.owner is not None
+
     def pause_writing(self) -> None:
+        """Begin to wait for the client to read."""
         super().pause_writing()
         self._unread = self.loop.call_later(self.patience_s, reset, self.transport)
 
     def resume_writing(self) -> None:
+        """The client has read."""
         self._stop_waiting()
         super().resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
+        """Wait for nothing, and hold no place any more."""
         self._stop_waiting()
+        self._give_place_back()
         super().connection_lost(exc)
+
+    def _give_place_back(self) -> None:
+        if self.owner is not None:
+            self.places.free(self.owner)
+            self.owner = None
 
     def _stop_waiting(self) -> None:
         if self._unread is not None:
@@ -84,13 +112,12 @@ class _Impatient(asyncio.Protocol):
             self._unread = None
 
 
-class ImpatientHttp(_Impatient, H11Protocol):
+class ImpatientHttp(Impatient, H11Protocol):
     """HTTP/1.1 whose clients send a request's headers, and read its answer, within `patience_s`."""
 
     strangers: Strangers
     health_port: int | None = None
     address = ""
-    is_known = False  # a right token has come on it
     _headers: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
@@ -99,7 +126,6 @@ class ImpatientHttp(_Impatient, H11Protocol):
         self.address = self.client[0] if self.client else ""
         if self.health_port is not None and self.server is not None and self.server[1] == self.health_port:
             self.limit_concurrency = None  # whoever watches the service is answered however busy it is
-        self.app_state = {**self.app_state, KNOWN: self._become_known}  # every request's scope has it, under "state"
         self.strangers.add(self)
         self._await_headers()
 
@@ -112,9 +138,12 @@ class ImpatientHttp(_Impatient, H11Protocol):
         elif self._headers is None and self.conn.trailing_data[0]:
             self._await_headers()
 
-    def _become_known(self) -> None:
-        self.is_known = True
-        self.strangers.remove(self)
+    def become_known(self, owner: str) -> bool:
+        """Be no stranger any more, where there is a place."""
+        known = super().become_known(owner)
+        if known:
+            self.strangers.remove(self)
+        return known
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing any more."""
@@ -126,13 +155,14 @@ class ImpatientHttp(_Impatient, H11Protocol):
         """Leave the connection to the WebSocket's class."""
         self._have_headers()
         self.strangers.remove(self)
+        self._give_place_back()
         super().handle_websocket_upgrade(event)
 
     def timeout_keep_alive_handler(self) -> None:
         """Uvicorn calls it `patience_s` after an answer: who has left it unread is cut off, owners may stay idle."""
         if self.transport.get_write_buffer_size():
             reset(self.transport)
-        elif not self.is_known:
+        elif self.owner is None:
             super().timeout_keep_alive_handler()
         else:
             end = super().timeout_keep_alive_handler
@@ -145,18 +175,3 @@ class ImpatientHttp(_Impatient, H11Protocol):
         if self._headers is not None:
             self._headers.cancel()
             self._headers = None
-
-
-class ImpatientSocket(_Impatient, WebSocketsSansIOProtocol):
-    """A WebSocket whose client reads its answers within `patience_s`."""
-
-
-def impatient(
-    patience_s: float, strangers: Strangers, health_port: int | None = None
-) -> tuple[type[asyncio.Protocol], type[asyncio.Protocol]]:
-    """The classes for HTTP and for WebSockets with that patience."""
-    own = {"patience_s": patience_s, "strangers": strangers, "health_port": health_port}
-    return (
-        type("ImpatientHttp", (ImpatientHttp,), own),
-        type("ImpatientSocket", (ImpatientSocket,), {"patience_s": patience_s}),
-    )

@@ -18,6 +18,7 @@ Code = Literal[
     "body_too_large",
     "picture_too_large",
     "no_target",
+    "out_of_order",
     "no_such_session",
     "too_many_sessions",
     "overloaded",
@@ -36,6 +37,7 @@ STATUS: dict[Code, HTTPStatus] = {
     "body_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     "picture_too_large": HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     "no_target": HTTPStatus.CONFLICT,
+    "out_of_order": HTTPStatus.CONFLICT,
     "no_such_session": HTTPStatus.NOT_FOUND,
     "too_many_sessions": HTTPStatus.TOO_MANY_REQUESTS,
     "overloaded": HTTPStatus.SERVICE_UNAVAILABLE,
@@ -43,6 +45,7 @@ STATUS: dict[Code, HTTPStatus] = {
     "deadline_passed": HTTPStatus.GATEWAY_TIMEOUT,
     "internal": HTTPStatus.INTERNAL_SERVER_ERROR,
 }
+POLICY, TOO_BIG, INTERNAL, AGAIN = 1008, 1009, 1011, 1013  # WebSocket close codes
 
 
 class FaultDetail(BaseModel):

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
 import time
-from collections.abc import MutableMapping
+from collections.abc import Callable, MutableMapping
 from typing import Any
 
 from clearway.serve.access_log import AccessLog
 from clearway.serve.faults import Fault
 from clearway.serve.metrics import Metrics
 from clearway.serve.service import Service
-from clearway.serve.tokens import KNOWN, OWNER
+from clearway.serve.tokens import ANSWERED, KNOWN, OWNER
 from clearway.web.guard import HEADERS, Application, Receive, Scope, Send
 
 OPEN_PATHS = ("/health", "/ready")  # say nothing but whether the service is up
 WATCHED = (*OPEN_PATHS, "/metrics")
 UNKNOWN = "unknown"
+SWITCHING = 101  # HTTP's status of a handshake that was accepted
+FORBIDDEN = 403  # of one that the application has not accepted
 
 
 def protected(
@@ -26,19 +29,38 @@ def protected(
     """The application for requests with `Authorization: Bearer TOKEN`, of bounded size and time; all are counted.
 
     It finds the name of the token in the scope, under `OWNER`. Where there is a `health_port`, what `WATCHED` names is
-    answered there, without a token, and nothing else; and nowhere else. `log` is told of every answer over HTTP.
+    answered there, without a token, and nothing else; and nowhere else. `log` is told of every answer over HTTP, and of
+    the handshake, the answers and the end of a WebSocket. What answers its messages finds in the scope, under
+    `ANSWERED`, a function to be called of each: of when the message came, and of a status.
     """
     limits, metrics = service.limits, service.metrics
 
+    def note(scope: Scope, begun: float, status: int) -> None:
+        if log is not None:
+            session = scope.get("path_params", {}).get("session_id")
+            seconds = time.perf_counter() - begun
+            log.note(_address(scope), scope.get(OWNER), session, _route(scope), status, seconds)
+
+    def answered(scope: Scope, begun: float, status: int) -> None:
+        metrics.answered(_route(scope), status, time.perf_counter() - begun)
+        note(scope, begun, status)
+
+    async def guard_socket(scope: Scope, receive: Receive, send: Send) -> None:
+        begun = time.perf_counter()
+        partial = functools.partial
+        socket = _Socket(receive, send, partial(answered, scope, begun), partial(note, scope, begun))
+        scope[ANSWERED] = partial(answered, scope)
+        try:
+            if scope["server"][1] == health_port:
+                raise Fault("not_found", "there is nothing here on this port")
+            scope[OWNER] = _owner(scope, service)
+        except Fault as fault:
+            return await _refuse_socket(socket.send, fault)
+        await app(scope, socket.receive, socket.send)
+
     async def guard(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
-            try:
-                if scope["server"][1] == health_port:
-                    raise Fault("not_found", "there is nothing here on this port")
-                scope[OWNER] = _owner(scope, service)
-            except Fault as fault:
-                return await _refuse_socket(send, fault)
-            return await app(scope, receive, send)
+            return await guard_socket(scope, receive, send)
         if scope["type"] != "http":
             return await app(scope, receive, send)
         begun, exchange = time.perf_counter(), _Exchange(scope, receive, send, service)
@@ -64,12 +86,7 @@ def protected(
             logging.getLogger("clearway.serve").exception("a request failed")
         finally:
             exchange.free()
-            route = getattr(scope.get("route"), "path", UNKNOWN)
-            seconds = time.perf_counter() - begun
-            metrics.answered(route, exchange.status, seconds)
-            if log is not None:
-                session = scope.get("path_params", {}).get("session_id")
-                log.note(_address(scope), scope.get(OWNER), session, route, exchange.status, seconds)
+            answered(scope, begun, exchange.status)
 
     return guard
 
@@ -106,13 +123,14 @@ class _Exchange:
             if self._read_bytes > self._most_bytes:
                 self.too_large = self._fault()
                 raise self.too_large
-            self._service.hold_bytes(self._scope.get(OWNER, ""), arrived)
+            if not self._service.bodies.take(self._scope.get(OWNER, ""), arrived):
+                raise Fault("overloaded", "too many large requests are under way. Try again")
             self._held_bytes += arrived
         return message
 
     def free(self) -> None:
         """Its body is held no more."""
-        self._service.free_bytes(self._scope.get(OWNER, ""), self._held_bytes)
+        self._service.bodies.free(self._scope.get(OWNER, ""), self._held_bytes)
 
     def _fault(self) -> Fault:
         return Fault("body_too_large", f"at most {self._most_bytes} bytes are taken")
@@ -141,12 +159,47 @@ class _Exchange:
         await self.send({"type": "http.response.body", "body": body})
 
 
+class _Socket:
+    """A WebSocket: tells of the status of its handshake, by HTTP, and of the code by which it is closed."""
+
+    def __init__(
+        self, receive: Receive, send: Send, answered: Callable[[int], object], closed: Callable[[int], object]
+    ) -> None:
+        self._receive, self._send, self._answered, self._closed = receive, send, answered, closed
+        self._accepted = False
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        """The next message."""
+        message = await self._receive()
+        if message["type"] == "websocket.disconnect":
+            self._closed(message["code"])
+        return message
+
+    async def send(self, message: MutableMapping[str, Any]) -> None:
+        """Pass a message on."""
+        kind = message["type"]
+        if kind == "websocket.accept":
+            self._accepted = True
+            self._answered(SWITCHING)
+        elif kind == "websocket.http.response.start":
+            self._answered(message["status"])
+        elif kind == "websocket.close" and not self._accepted:
+            self._answered(FORBIDDEN)
+        elif kind == "websocket.close":
+            self._closed(message["code"])
+        await self._send(message)
+
+
 def _unauthorised() -> Fault:
     return Fault("unauthorised", "send the header Authorization: Bearer TOKEN with the service's token")
 
 
 def _header(scope: Scope, wanted: bytes) -> str | None:
     return next((value.decode("latin-1") for name, value in scope["headers"] if name.lower() == wanted), None)
+
+
+def _route(scope: Scope) -> str:
+    return getattr(scope.get("route"), "path", UNKNOWN)
 
 
 def _address(scope: Scope) -> str:
@@ -165,8 +218,9 @@ def _owner(scope: Scope, service: Service) -> str:
     service.attempts.note(address, token, owner is not None)
     if owner is None:
         raise _unauthorised()
-    if known := scope.get("state", {}).get(KNOWN):
-        known()
+    known = scope.get("state", {}).get(KNOWN)
+    if known and not known(owner):
+        raise Fault("overloaded", "too many connections of this token are open. Close one, or try again later")
     return owner
 
 

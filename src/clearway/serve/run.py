@@ -17,8 +17,9 @@ from clearway.deploy.navigator import open_agent
 from clearway.errors import ClearwayError
 from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
-from clearway.serve.connections import Strangers, impatient
+from clearway.serve.connections import Strangers
 from clearway.serve.limits import Limits
+from clearway.serve.messages import impatient
 from clearway.serve.protection import protected
 from clearway.serve.service import Service
 from clearway.serve.tokens import Tokens, read_tokens
@@ -148,7 +149,9 @@ def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: 
     for listener in network.listeners():
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     health_port = port_of(network.health) if network.health else None
-    http, sockets = impatient(limits.patience_s, Strangers(limits.strangers, network.proxy), health_port)
+    strangers = Strangers(limits.strangers, network.proxy)
+    connections = allowed_connections(limits.connections)
+    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, health_port)
     tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     logging.getLogger("uvicorn.error").addFilter(Sparing())
@@ -164,7 +167,7 @@ def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: 
         ws=sockets,
         ws_max_size=limits.body_bytes,
         ws_per_message_deflate=False,
-        limit_concurrency=allowed_connections(limits.connections),
+        limit_concurrency=connections,
         timeout_keep_alive=limits.patience_s,
         timeout_graceful_shutdown=int(limits.deadline_s) + 1,
     )

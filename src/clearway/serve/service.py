@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections import Counter
+import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
 from clearway.agents.selection import most_probable
 from clearway.deploy.agent import DeployedAgent, aspect_problem
-from clearway.deploy.navigator import Decision, Selection, arrival_of, check_selection, decision_of
+from clearway.deploy.navigator import Selection, arrival_of, check_selection, decision_of, episode_seed
 from clearway.errors import DeployError
 from clearway.serve.attempts import Attempts
 from clearway.serve.batching import Batcher
@@ -20,17 +18,9 @@ from clearway.serve.decoders import Decoders
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import Metrics
-from clearway.serve.sessions import Session, Sessions
+from clearway.serve.sessions import Answer, Progress, Session, Sessions
+from clearway.serve.shares import Places
 from clearway.serve.tokens import Tokens
-
-
-@dataclass(frozen=True)
-class Answer:
-    """A decision, whether the agent holds that it has arrived (None: it cannot tell), and the step's number, from 1."""
-
-    decision: Decision
-    arrived: bool | None
-    step: int
 
 
 class Service:
@@ -49,19 +39,24 @@ class Service:
         if not agent.card.takes_pictures:
             problem = f"the agent for scene {agent.card.scene} was exported without its encoder"
             raise DeployError(f"{problem}, so that it takes no pictures. Export it with its encoder")
-        self.card, self.limits, self.tokens, self.sessions = agent.card, limits, tokens, Sessions(limits)
+        self.card, self.limits, self.tokens = agent.card, limits, tokens
+        self.sessions = Sessions(limits, self.places(limits.sessions))
         self.decoders = Decoders(limits)
         self.attempts = Attempts(limits.wrong_tokens)
-        self._bodies = Counter[str]()  # bytes of requests under way, by owner
-        self._pictures = Counter[str]()  # under way, by owner
+        self.bodies = self.places(limits.bodies_bytes)  # bytes of requests and messages under way
+        self.pictures = self.places(limits.waiting)  # under way
+        self.streams = self.places(limits.sessions)  # WebSockets that are open
         self.metrics = Metrics(lambda: len(self.sessions), lambda: self.waiting, lambda: self.decoders.replaced)
         self.batcher = Batcher(agent, limits, self.metrics.computed)
-        self.streams = asyncio.Semaphore(limits.sessions)  # WebSockets that may be open
+
+    def places(self, most: int) -> Places:
+        """Places that the owners of tokens share."""
+        return Places(most, lambda: self.tokens.owners)
 
     @property
     def waiting(self) -> int:
         """Pictures that wait, to be decoded or for the agent."""
-        return self._pictures.total()
+        return self.pictures.taken
 
     @property
     def ready(self) -> bool:
@@ -74,54 +69,78 @@ class Service:
             check_selection(selection, self.card)
         except DeployError as fault:
             raise Fault("invalid_request", str(fault)) from fault
-        return self.sessions.open(owner, selection, seed, self.tokens.share(self.limits.sessions))
+        return self.sessions.open(owner, selection, seed)
 
-    async def set_target(self, session: Session, content: bytes) -> None:
-        """Begin an episode with the picture file of a target; on a Fault the session stays as it was."""
+    async def set_target(self, session: Session, content: bytes, episode: int | None = None) -> None:
+        """Begin an episode with the picture file of a target; on a Fault the session stays as it was.
+
+        Args:
+            session: whose episode.
+            content: of the file.
+            episode: its number, from 1, where the client counts: what was begun already is not begun again.
+        """
+        file = _digest(content)
         async with session.turn:
+            before = session.progress
+            if _is_repeated("episode", episode, before.episode, not before.steps and file == before.seen):
+                return
             with self._place(session.owner):
                 picture = await self._decoded(session, content)
-                session.state = await self.batcher.reset(session.owner, picture, session.seed)
-            session.steps, session.seed = 0, next(session.seeds)
+                seed = episode_seed(session.seed, before.episode)
+                state = await self.batcher.reset(session.owner, picture, seed)
+            session.progress = Progress(before.episode + 1, 0, state, file)
 
-    async def step(self, session: Session, content: bytes) -> Answer:
-        """What to do, seeing a picture file; on a Fault, or cancelled, the session stays as it was."""
+    async def step(self, session: Session, content: bytes, number: int | None = None) -> Answer:
+        """What to do, seeing a picture file; on a Fault, or cancelled, the session stays as it was.
+
+        Args:
+            session: whose agent.
+            content: of the file.
+            number: of the step in its episode, from 1, where the client counts: the last one, sent again as its answer
+                was lost, is answered as before and not walked twice.
+        """
+        file = _digest(content)
         async with session.turn:
-            if session.state is None:
+            before = session.progress
+            if before.state is None:
                 raise Fault("no_target", "the session has no target yet. Send its picture first")
+            if _is_repeated("step", number, before.steps, file == before.seen) and before.answer is not None:
+                return before.answer
             with self._place(session.owner):
                 picture = await self._decoded(session, content)
-                decisions, session.state = await self.batcher.act(session.owner, picture, session.state)
-            session.steps += 1
+                decisions, state = await self.batcher.act(session.owner, picture, before.state)
             if session.selection == "argmax":
                 decisions = most_probable(decisions)
-            return Answer(decision_of(decisions), arrival_of(decisions), session.steps)
-
-    def hold_bytes(self, owner: str, count: int) -> None:
-        """Count bytes of a body that arrives. Raises Fault where the bodies under way are too large together."""
-        most = self.limits.bodies_bytes
-        if self._bodies.total() + count > most or self._bodies[owner] + count > self.tokens.share(most):
-            raise Fault("overloaded", "too many large requests are under way. Try again")
-        self._bodies[owner] += count
-
-    def free_bytes(self, owner: str, count: int) -> None:
-        """The request whose body was counted is over."""
-        self._bodies[owner] -= count
+            answer = Answer(decision_of(decisions), arrival_of(decisions), before.steps + 1)
+            session.progress = Progress(before.episode, answer.step, state, file, answer)
+            return answer
 
     @contextmanager
     def _place(self, owner: str) -> Iterator[None]:
         """A place among the pictures that wait. Raises Fault where none is free, or none for this owner."""
-        most = self.limits.waiting
-        if self.waiting >= most or self._pictures[owner] >= self.tokens.share(most):
+        if not self.pictures.take(owner):
             raise Fault("overloaded", "too many pictures wait for the agent. Try again")
-        self._pictures[owner] += 1
         try:
             yield
         finally:
-            self._pictures[owner] -= 1
+            self.pictures.free(owner)
 
     async def _decoded(self, session: Session, content: bytes) -> np.ndarray:
         picture = await self.decoders.decode(content, session.owner, session.standing)
         if problem := aspect_problem(picture, self.card):
             raise Fault("unsupported_picture", problem)
         return picture
+
+
+def _is_repeated(what: str, number: int | None, reached: int, is_same: bool) -> bool:
+    """Whether a request is the last one again, by its number and its file. Raises Fault where it is not the next."""
+    if number is None or number == reached + 1:
+        return False
+    if number == reached and is_same:
+        return True
+    problem = f"{what} {number} was sent, and the session has had {reached} of them"
+    raise Fault("out_of_order", f"{problem}. Send number {reached + 1}, or {reached} with the same file")
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.sha256(content).digest()

@@ -5,21 +5,51 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections import Counter, OrderedDict
-from collections.abc import Callable, Iterator
+from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from clearway.agents.agent import State
 from clearway.deploy.agent import DeployedAgent
-from clearway.deploy.navigator import Selection, episode_seeds
+from clearway.deploy.navigator import Decision, Selection
 from clearway.scenes.sensors import RGB
 from clearway.serve.decoders import Standing
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
+from clearway.serve.shares import Places
 
 ID_BYTES = 16
+SEED_BITS = 64  # of a session that was given none
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A decision, whether the agent holds that it has arrived (None: it cannot tell), and the step's number, from 1."""
+
+    decision: Decision
+    arrived: bool | None
+    step: int
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far a session has come; a request that is answered puts another in its place.
+
+    Attributes:
+        episode: targets so far.
+        steps: answered since the target was set.
+        state: what the agent remembers, of one row; None until there is a target.
+        seen: SHA-256 of the file that led here, a target's or a step's.
+        answer: to the last step; None where there was none since the target.
+    """
+
+    episode: int = 0
+    steps: int = 0
+    state: State | None = None
+    seen: bytes = b""
+    answer: Answer | None = None
 
 
 @dataclass(eq=False)
@@ -30,11 +60,9 @@ class Session:
         id: what clients call it by; nobody can guess another's.
         owner: name of the token that opened it; to others it is not there.
         selection: how its actions are chosen.
-        seed: of its next episode, (1,) int64.
-        seeds: of the episodes after that, one after the other.
-        state: what the agent remembers, of one row; None until there is a target.
-        steps: answered since the target was set.
+        seed: of the seeds of its episodes.
         used_s: when it was last asked for, on the clock of its `Sessions`.
+        progress: how far it has come.
         standing: how its pictures have been.
         turn: held while a request of the session is answered, so that they are answered one after the other.
     """
@@ -42,11 +70,9 @@ class Session:
     id: str
     owner: str
     selection: Selection
-    seed: np.ndarray
-    seeds: Iterator[np.ndarray]
+    seed: int
     used_s: float
-    state: State | None = None
-    steps: int = 0
+    progress: Progress = Progress()
     standing: Standing = field(default_factory=Standing)
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
@@ -58,17 +84,23 @@ def state_bytes(agent: DeployedAgent) -> int:
     return sum(values.nbytes for values in state.values())
 
 
+def new_session(owner: str, selection: Selection, seed: int | None, now_s: float) -> Session:
+    """A session without a target."""
+    seed = secrets.randbits(SEED_BITS) if seed is None else seed
+    return Session(secrets.token_urlsafe(ID_BYTES), owner, selection, seed, now_s)
+
+
 class Sessions:
     """All open sessions.
 
     Args:
-        limits: how many, and how long they live unused.
+        limits: how long they live unused.
+        places: for them.
         clock: seconds, monotonic.
     """
 
-    def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
-        self._limits, self._clock = limits, clock
-        self._owned = Counter[str]()  # open sessions of each owner
+    def __init__(self, limits: Limits, places: Places, clock: Callable[[], float] = time.monotonic) -> None:
+        self._limits, self._places, self._clock = limits, places, clock
         self._open: OrderedDict[str, Session] = OrderedDict()  # the one unused for longest comes first
 
     def __len__(self) -> int:
@@ -78,19 +110,17 @@ class Sessions:
     @property
     def full(self) -> bool:
         """No more can be opened."""
-        return len(self) >= self._limits.sessions
+        return len(self) >= self._places.most
 
-    def open(self, owner: str, selection: Selection, seed: int | None, most: int) -> Session:
-        """A new session. Raises Fault where there are too many, or `most` of this owner's."""
-        if self.full or self._owned[owner] >= most:
-            held = (
-                f"{self._limits.sessions} sessions are open" if self.full else f"{most} sessions of this token are open"
-            )
+    def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
+        """A new session. Raises Fault where there are too many, or too many of this owner's."""
+        self._expire()
+        if not self._places.take(owner):
+            whose = "" if self.full else " of this token"
+            held = f"{self._places.most if self.full else self._places.held(owner)} sessions{whose} are open"
             raise Fault("too_many_sessions", f"{held}. Close one, or try again later")
-        seeds = episode_seeds(seed)
-        made = Session(secrets.token_urlsafe(ID_BYTES), owner, selection, next(seeds), seeds, self._clock())
+        made = new_session(owner, selection, seed, self._clock())
         self._open[made.id] = made
-        self._owned[owner] += 1
         return made
 
     def get(self, session_id: str, owner: str) -> Session:
@@ -109,7 +139,7 @@ class Sessions:
 
     def _forget(self, session: Session) -> None:
         del self._open[session.id]
-        self._owned[session.owner] -= 1
+        self._places.free(session.owner)
 
     def _expire(self) -> None:
         oldest = self._clock() - self._limits.idle_s

@@ -1,14 +1,15 @@
-"""Fair shares: who has used the least lately comes next."""
+"""Fair shares: who has used the least lately comes next; and of what all share, a part is kept for each."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections import Counter, deque
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager
 
 HALF_LIFE_S = 10.0  # of what has been used
+MOST_SHARES = 4  # no owner takes more than this part of the places, where there are so many owners
 
 
 class Shares:
@@ -77,3 +78,52 @@ class FairTurns:
                 return line.popleft().set_result(None)
             del self._waiting[owner]
         self._free += 1
+
+
+class Places:
+    """Places that owners share: sessions, pictures that wait, bytes. Each finds a part free, whatever others hold.
+
+    Half of the places are kept for the owners, as many for each, but at least one where that is possible. The others
+    are for whoever comes first, to a quarter of all places for an owner; a half or a third of two or three owners.
+
+    Args:
+        most: places there are.
+        owners: gives the names for which places are kept.
+    """
+
+    def __init__(self, most: int, owners: Callable[[], Collection[str]]) -> None:
+        self.most, self._owners = most, owners
+        self._held = Counter[str]()
+
+    @property
+    def taken(self) -> int:
+        """By all owners."""
+        return self._held.total()
+
+    def held(self, owner: str) -> int:
+        """By one owner."""
+        return self._held[owner]
+
+    def take(self, owner: str, count: int = 1) -> bool:
+        """Whether there was room for an owner's; then it is taken."""
+        wanted = self._held[owner] + count
+        owners, kept = self._owners(), self._kept()
+        if self.taken + count > self.most:
+            return False
+        if wanted > (kept if owner in owners else 0):
+            others = sum(max(kept - self._held[name], 0) for name in owners if name != owner)  # kept, and not taken yet
+            if wanted > self.most // min(len(owners), MOST_SHARES) or self.taken + count + others > self.most:
+                return False
+        self._held[owner] = wanted
+        return True
+
+    def free(self, owner: str, count: int = 1) -> None:
+        """Give places back."""
+        self._held[owner] -= count
+        if not self._held[owner]:
+            del self._held[owner]
+
+    def _kept(self) -> int:
+        """Places that are kept for each owner."""
+        count = len(self._owners())
+        return max(self.most // (2 * count), 1 if count <= self.most else 0)

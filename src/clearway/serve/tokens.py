@@ -12,11 +12,11 @@ from clearway.regular_files import opened, read_at_most
 from clearway.web.guard import same_token
 
 OWNER = "clearway.owner"  # in the scope of a request: the name of its token
-KNOWN = "clearway.known"  # in the state of a request: to be called once its token was right
+ANSWERED = "clearway.answered"  # in the scope of a WebSocket: to be called of every answer
+KNOWN = "clearway.known"  # in the state of a request: told the owner once its token was right; False: too many
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
 MOST_BYTES = 1 << 20  # of a file of tokens
-MOST_SHARES = 4  # into which what all owners share is divided; where there are more owners, four can take it all
 
 
 class Tokens:
@@ -28,10 +28,11 @@ class Tokens:
 
     def __init__(self, named: Sequence[tuple[str, str]]) -> None:
         self._named = tuple(named)
+        self.owners = frozenset(name for name, _ in named)
 
     def replace(self, other: Tokens) -> None:
         """Take another's instead of the own."""
-        self._named = other._named
+        self._named, self.owners = other._named, other.owners
 
     def owner_of(self, given: str) -> str | None:
         """The name of a token's owner, None where there is no such token; how long it takes tells nothing of them."""
@@ -40,10 +41,6 @@ class Tokens:
             if same_token(given, token):
                 found = name
         return found
-
-    def share(self, whole: int) -> int:
-        """How much of a whole one owner may hold: all where there is one, an even part where there are a few."""
-        return max(whole // min(len({name for name, _ in self._named}), MOST_SHARES), 1)
 
 
 def checked_token(token: str, what: str) -> str:

@@ -269,7 +269,8 @@ def _check_distinct(names: Sequence[str]) -> None:
 
 
 def _check_names(names: Sequence[str], targets: Mapping[str, Sequence[int]]) -> None:
+    unknown = set(targets).difference(names)
     for name in targets:
-        if name not in names:
+        if name in unknown:
             problem = "targets are given for this scene, which is not among the scenes"
             raise SceneError(name, problem, f"Name targets of {', '.join(names)} alone, or add the scene")
