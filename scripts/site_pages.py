@@ -1,4 +1,4 @@
-"""What the site changes in its pages: those of the project's root join them, and no comment is cut at the edge of a block."""
+"""What the site changes: pages of the project's root join it, and no comment is cut at the edge of a block."""
 
 from __future__ import annotations
 
