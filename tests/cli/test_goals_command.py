@@ -47,7 +47,7 @@ def generated(clearway, tmp_path_factory):
 
 
 def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, generated):
-    words = ("evaluate", run / "run", generated, "--goals", 5, "--step-limit", 20, "--perturb", "all", "--takes", 1)
+    words = ("evaluate", run / "run", generated, "--goals", 5, "--step-limit", 60, "--perturb", "all", "--takes", 1)
     found = clearway(*words, "--json").json
     assert found["perturbed"]["takes"] == 1 and found["perturbed"]["perturbations"]["pixel_noise"] == 10
     plain = clearway(*words[:-4], "--json").json
