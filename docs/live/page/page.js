@@ -969,7 +969,7 @@ function takeMind(answer) {
 }
 
 const arrival = ({ name, steps }) => `${name}: target reached in ${counted(steps.length - 1, "step")}, ${counted(steps.at(-1).collisions, "collision")}`;
-const winner = () => (known.episode.drive && known.walkers.length > 1 ? verdict(known.walkers, known.first) : null);
+const winner = () => (known.walkers.length > 1 ? verdict(known.walkers, known.first) : null);
 const last = () => Math.max(...known.walkers.map((walker) => walker.steps.length - 1));
 const over = () => known.ended.every((ended, index) => ended || (!known.walkers[index].agent && known.walkers.length > 1));
 
