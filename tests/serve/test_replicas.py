@@ -96,7 +96,7 @@ def test_replicas_die_under_load_and_no_session_is_lost_nor_a_step_walked_twice(
 @pytest.mark.slow
 def test_many_replicas_die_under_load() -> None:
     with running(replicas=3, seconds=0.005) as service:
-        print(walk_while_replicas_die(service, sessions=20, kills=30, pause_s=1.0), "steps")
+        print(walk_while_replicas_die(service, sessions=20, kills=20, pause_s=2.0), "steps")
         service.process.send_signal(signal.SIGTERM)
         assert service.process.wait(PATIENT_S) == 0
 

@@ -107,7 +107,8 @@ class Serve:
             each = state_bytes(agent)
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6
-                say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
+                where = "memory" if self.replicas == 1 else "in the cache folder"
+                say(f"{where}: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
             log = to_stderr if self.log_requests else None
             network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy, log)
             if self.replicas > 1:

@@ -36,7 +36,7 @@ LOOKS_EVERY_S = 0.2
 STUCK_S = 30.0  # without a beat, after which a replica is ended
 START_S = 120.0  # for a replica's first beat
 SHORT_S = 10.0  # what ended sooner is started again after a pause
-PAUSES_S = (0.2, 30.0)  # the first, and the longest; they double
+PAUSES_S = (0.2, 5.0)  # the first, and the longest; they double
 
 
 @dataclass(frozen=True)

@@ -114,10 +114,11 @@ class SessionTable:
         self._database.execute("BEGIN IMMEDIATE")
         try:
             yield
+            self._database.execute("COMMIT")
         except BaseException:
-            self._database.execute("ROLLBACK")
+            if self._database.in_transaction:  # else SQLite has taken it back itself, as where there is no room
+                self._database.execute("ROLLBACK")
             raise
-        self._database.execute("COMMIT")
 
 
 HELD = "SELECT owner, count(*) FROM sessions GROUP BY owner"
