@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import io
+import json
 import multiprocessing
 import os
 import re
@@ -48,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--robots", type=int, default=4, help="clients, each with a session")
     parser.add_argument("--every-s", type=float, default=0.5, help="between the steps of a robot")
     parser.add_argument("--attack-per-s", type=float, default=10.0, help="hostile pictures a second")
+    parser.add_argument("--record", type=Path, help="a file for all seconds and counts, as JSON")
     options = parser.parse_args(arguments)
     hostile = hostile_pictures()
     found: dict[bool, list[float]] = {False: [], True: []}
@@ -63,6 +65,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"| {name} | {len(found[attacked])} | {p50:.0f} | {p99:.0f} | {most:.0f} |")
     print(f"99th percentile: {np.quantile(found[True], 0.99) / np.quantile(found[False], 0.99):.2f} times")
     print("\n".join(f"{name} {count:g}" for name, count in figures.items()))
+    if options.record is not None:
+        seconds = {name: [round(each, 4) for each in found[name == "attacked"]] for name in ("without", "attacked")}
+        told = {"seconds": seconds, "attack_per_s": options.attack_per_s, "robots": options.robots, "counted": figures}
+        options.record.write_text(json.dumps(told) + "\n", encoding="utf-8")
 
 
 def counted(url: str) -> dict[str, float]:

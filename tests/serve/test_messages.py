@@ -14,10 +14,11 @@ import uvicorn
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from clearway.serve.connections import MOST_FRAGMENTS, Strangers, impatient
+from clearway.serve.connections import Strangers
 from clearway.serve.limits import Limits
+from clearway.serve.messages import MOST_FRAGMENTS, impatient
 from clearway.serve.shares import Places
-from clearway.serve.tokens import OWNER as OWNER_KEY
+from clearway.serve.tokens import KNOWN
 from helpers.running import PATIENT_S, Running, running
 from helpers.serving import OWNER, TOKEN, grey
 
@@ -78,7 +79,7 @@ def test_nothing_is_read_before_the_token_was_right_and_all_is_given_back_at_the
 
         async def app(scope, receive, send) -> None:
             await known.wait()
-            scope[OWNER_KEY] = OWNER
+            scope["state"][KNOWN](OWNER)
             await receive()
             await send({"type": "websocket.accept"})
             await asyncio.Event().wait()
@@ -86,7 +87,7 @@ def test_nothing_is_read_before_the_token_was_right_and_all_is_given_back_at_the
         config = uvicorn.Config(app)
         config.load()
         places = Places(1000, lambda: {OWNER})
-        kind = impatient(Limits(), places, Strangers(1, None))[1]
+        kind = impatient(Limits(), places, places, Strangers(1, None))[1]
         connection = kind(config, uvicorn.server.ServerState(), {})
         transport = Mock(get_extra_info=lambda name, default=None: None, is_closing=lambda: False)
         connection.connection_made(transport)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import ssl
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -74,6 +75,27 @@ def test_strangers_keep_no_connection_and_not_many() -> None:
         finally:
             for connection in held:
                 connection.close()
+
+
+def test_one_name_leaves_connections_for_another(tmp_path) -> None:
+    """Once its token was right, a client could keep as many as there were."""
+    path, guest = tmp_path / "tokens", {"authorization": f"Bearer {20 * 'g'}"}
+    path.write_text(f"{OWNER} {TOKEN}\nguest {20 * 'g'}\n")
+    path.chmod(0o600)
+    with ExitStack() as held, running(tokens=str(path), connections=8) as service:
+        session = httpx.post(f"{service.url}/sessions", json={}, headers=AUTHORISED, timeout=PATIENT_S).json()
+        stream = f"ws://127.0.0.1:{service.port}/sessions/{session['session_id']}/stream"
+        held.enter_context(connect(stream, additional_headers=AUTHORISED, close_timeout=0.1))
+        greedy = [held.enter_context(httpx.Client(headers=AUTHORISED, timeout=PATIENT_S)) for _ in range(4)]
+        answers = [client.get(f"{service.url}/agent") for client in greedy]
+        assert [answer.status_code for answer in answers] == [200, 200, 200, 503]
+        assert "connections of this token" in answers[-1].text
+        assert httpx.get(f"{service.url}/agent", headers=guest, timeout=PATIENT_S).status_code == 200
+        greedy[0].close()
+        until = time.monotonic() + PATIENT_S
+        while greedy[3].get(f"{service.url}/agent").status_code != 200 and time.monotonic() < until:
+            time.sleep(0.05)
+        assert greedy[3].get(f"{service.url}/agent").status_code == 200
 
 
 def test_health_and_metrics_on_a_port_of_their_own() -> None:

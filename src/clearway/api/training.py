@@ -109,6 +109,7 @@ def train(
     feature_store: FeatureStore = "memory",
     threads: int | None = None,
     workers: int = 1,
+    ray: str | None = None,
     until_solved: bool = False,
     track: TrackerName | None = None,
     on_begin: Callable[[Path], None] | None = None,
@@ -144,6 +145,8 @@ def train(
         threads: of torch meanwhile, or processes of a3c; results repeat bit for bit at one number of them.
         workers: processes of this machine that train together, a scene each at least; by ppo, a2c and bc. A script that
             asks for several does it below `if __name__ == "__main__":`. See docs/scale.md.
+        ray: a Ray cluster whose nodes run the workers: "local", "auto" or an address. All see scene files and `out`
+            under the same paths.
         until_solved: stop before all frames are used, once the latest 20 training episodes or more of every target
             reached it.
         track: where figures are shown as they come, beside `metrics.jsonl`: "tensorboard", in the run folder, or
@@ -161,6 +164,8 @@ def train(
     if (resume or copy_to is not None) and out is None:
         asked = "resume=True" if resume else f"copy_to={copy_to!r:.80}"
         raise ArgumentError(f"{asked}: expected the run folder to go on with, or to copy. Give it as out")
+    if ray is not None and workers == 1:
+        raise ArgumentError(f"ray={ray!r:.80}: says where several workers run. Give workers, 2 or more")
     number = as_seed("seed", seed)
     learner, processes = chosen_learner(algorithm, frames, settings), as_whole("workers", workers, 1)
     pairs = scenes_and_files(scenes, features_in_file=store != "memory" or processes > 1)
@@ -200,7 +205,7 @@ def train(
     with ExitStack() as stack:
         stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
-        together = partial(train_by_workers, workers=processes, threads=threads)
+        together = partial(train_by_workers, workers=processes, threads=threads, ray=ray)
         train_run = train_alone if processes == 1 else together
         folder = train_run(
             request,

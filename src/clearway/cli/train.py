@@ -73,6 +73,9 @@ class Train:
     workers: int = 1
     """Processes of this machine that train one agent together, a scene each at least; ppo, a2c, bc. The result is that
     of one, up to rounding. One that dies is replaced. See docs/scale.md."""
+    ray: str | None = None
+    """A Ray cluster whose nodes run the --workers: local, auto (the running one) or an address. All nodes see the scene
+    files and --out under the same paths. See docs/scale.md."""
     perturb: tuple[str, ...] = ()
     """Learn from perturbed pictures too: all, geometry, names, light=0.2, as of evaluate --goals. Every pose is seen in
     one of --takes pictures or the scene's own, another at each step. In rooms that can be built again; by ppo, a2c,
@@ -117,6 +120,7 @@ class Train:
             feature_store=self.feature_store,
             threads=self.threads,
             workers=self.workers,
+            ray=self.ray,
             until_solved=self.until == "solved",
             track=self.track,
             on_begin=self._begun,

@@ -91,6 +91,7 @@ def train_by_workers(
     threads: int | None = None,
     checkpoint_s: float = SECONDS_BETWEEN_CHECKPOINTS,
     copy_to: str | None = None,
+    ray: str | None = None,
 ) -> RunFolder:
     """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
 
@@ -99,9 +100,10 @@ def train_by_workers(
         out: the run folder.
         workers: how many.
         resume, show_progress, until_solved, track, on_begin: as of `train.train`.
-        threads: of torch in each worker; None: the machine's, divided among them.
+        threads: of torch in each worker; None: the machine's, divided among them, and 1 on Ray.
         checkpoint_s: seconds between checkpoints.
         copy_to: as of `train.train`.
+        ray: a Ray cluster that runs them, see `ray_cluster.connected`; None: this machine.
 
     Raises:
         RunError, KeyboardInterrupt: as of `train.train`; or workers were lost again and again.
@@ -119,7 +121,7 @@ def train_by_workers(
         show_progress,
         until_solved,
         track,
-        threads or max(1, torch.get_num_threads() // workers),
+        threads or (1 if ray else max(1, torch.get_num_threads() // workers)),
         checkpoint_s,
         copy_to,
     )
@@ -127,13 +129,19 @@ def train_by_workers(
         told_of_other_bits(folder, request, other_bits)
         if on_begin is not None:
             on_begin(out)
-        outcomes = _launched(task, workers)
+        outcomes = _launched(task, workers) if ray is None else _launched_on_ray(task, workers, ray)
         failed = [told for told in outcomes if told not in (None, INTERRUPTED)]
         if failed:
             raise RunError(str(failed[0]))
         if INTERRUPTED in outcomes:
             raise KeyboardInterrupt
     return folder
+
+
+def _launched_on_ray(task: Task, workers: int, address: str) -> list[str | None]:
+    from clearway.learn.ray_workers import launched_on_ray
+
+    return launched_on_ray(task, workers, address)
 
 
 def _launched(task: Task, workers: int) -> list[str | None]:

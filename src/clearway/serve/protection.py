@@ -218,8 +218,9 @@ def _owner(scope: Scope, service: Service) -> str:
     service.attempts.note(address, token, owner is not None)
     if owner is None:
         raise _unauthorised()
-    if known := scope.get("state", {}).get(KNOWN):
-        known()
+    known = scope.get("state", {}).get(KNOWN)
+    if known and not known(owner):
+        raise Fault("overloaded", "too many connections of this token are open. Close one, or try again later")
     return owner
 
 

@@ -17,8 +17,9 @@ from clearway.deploy.navigator import open_agent
 from clearway.errors import ClearwayError
 from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
-from clearway.serve.connections import Strangers, impatient
+from clearway.serve.connections import Strangers
 from clearway.serve.limits import Limits
+from clearway.serve.messages import impatient
 from clearway.serve.protection import protected
 from clearway.serve.replica import Replica
 from clearway.serve.service import Service
@@ -160,7 +161,8 @@ def run_service(
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     health_port = port_of(network.health) if network.health else None
     strangers = Strangers(limits.strangers, network.proxy)
-    http, sockets = impatient(limits, service.bodies, strangers, health_port)
+    connections = allowed_connections(limits.connections)
+    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, health_port)
     tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     logging.getLogger("uvicorn.error").addFilter(Sparing())
@@ -176,7 +178,7 @@ def run_service(
         ws=sockets,
         ws_max_size=limits.body_bytes,
         ws_per_message_deflate=False,
-        limit_concurrency=allowed_connections(limits.connections),
+        limit_concurrency=connections,
         timeout_keep_alive=limits.patience_s,
         timeout_graceful_shutdown=int(limits.deadline_s) + 1,
     )

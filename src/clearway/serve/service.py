@@ -42,23 +42,23 @@ class Service:
         if not agent.card.takes_pictures:
             problem = f"the agent for scene {agent.card.scene} was exported without its encoder"
             raise DeployError(f"{problem}, so that it takes no pictures. Export it with its encoder")
-
-        def places(most: int) -> Places:
-            return Places(most, lambda: tokens.owners)
-
         self.card, self.limits, self.tokens = agent.card, limits, tokens
         self.replica = replica
         self.sessions: KeepsSessions = (
-            Sessions(limits, places(limits.sessions)) if replica is None else replica.sessions
+            Sessions(limits, self.places(limits.sessions)) if replica is None else replica.sessions
         )
         self.decoders = Decoders(limits)
         self.attempts = Attempts(limits.wrong_tokens)
-        self.bodies = places(limits.bodies_bytes)  # bytes of requests and messages under way
-        self.pictures = places(limits.waiting)  # under way
-        self.streams = places(limits.sessions)  # WebSockets that are open
+        self.bodies = self.places(limits.bodies_bytes)  # bytes of requests and messages under way
+        self.pictures = self.places(limits.waiting)  # under way
+        self.streams = self.places(limits.sessions)  # WebSockets that are open
         gauges = (lambda: len(self.sessions), lambda: self.waiting, lambda: self.decoders.replaced)
         self.metrics = Metrics(*gauges, None if replica is None else replica.figures)
         self.batcher = Batcher(agent, limits, self.metrics.computed)
+
+    def places(self, most: int) -> Places:
+        """Places that the owners of tokens share."""
+        return Places(most, lambda: self.tokens.owners)
 
     @property
     def waiting(self) -> int:

@@ -13,7 +13,7 @@ from clearway.web.guard import same_token
 
 OWNER = "clearway.owner"  # in the scope of a request: the name of its token
 ANSWERED = "clearway.answered"  # in the scope of a WebSocket: to be called of every answer
-KNOWN = "clearway.known"  # in the state of a request: to be called once its token was right
+KNOWN = "clearway.known"  # in the state of a request: told the owner once its token was right; False: too many
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
 MOST_BYTES = 1 << 20  # of a file of tokens

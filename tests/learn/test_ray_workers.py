@@ -1,0 +1,88 @@
+"""Several workers on a Ray cluster of this machine. Slow: starting a cluster takes some ten seconds."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import RunError
+from clearway.learn import ray_workers
+from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.workers import train_by_workers
+from helpers.small_runs import equal_bits, small_learner, small_request
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
+# Ray reads these when it is imported; all processes of a cluster must share the token
+os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
+ray = pytest.importorskip("ray")
+UPDATES = 60
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_cluster() -> Iterator[None]:
+    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    ray.init(
+        "local",
+        num_cpus=2,
+        include_dashboard=False,
+        log_to_driver=False,
+        runtime_env={"env_vars": {"PYTHONPATH": path}},
+    )
+    yield
+    ray.shutdown()
+
+
+def trained(out: Path, where: str | None = "local") -> None:
+    request = small_request(learner=small_learner(frames=80 * UPDATES))
+    train_by_workers(request, out, 2, threads=1, checkpoint_s=0.0, ray=where)
+
+
+def training_processes() -> list[int]:
+    found = []
+    for status in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if b"ray::_worker" in status.read_bytes():
+                found.append(int(status.parent.name))
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+    return found
+
+
+def test_a_worker_that_is_killed_on_ray_changes_no_bit(tmp_path: Path) -> None:
+    here, there = RunFolder(tmp_path / "here"), RunFolder(tmp_path / "there")
+    trained(here.path, None)
+    killed: list[int] = []
+
+    def kill() -> None:
+        deadline = time.monotonic() + 60
+        while not killed and time.monotonic() < deadline:
+            if len(list(there.checkpoints.glob("frames-*"))) > 1 and (found := training_processes()):
+                os.kill(found[-1], signal.SIGKILL)
+                killed.append(found[-1])
+            time.sleep(0.005)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    trained(there.path)
+    killer.join()
+    assert killed
+    ends = [newest_checkpoint(folder.checkpoints) for folder in (here, there)]
+    assert equal_bits(*map(read_network, ends)) and equal_bits(*map(read_training, ends))
+    assert [row["frames"] for row in here.metrics()] == [row["frames"] for row in there.metrics()]
+
+
+def test_what_ray_cannot_run_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ray_workers, "ROOM_S", 2.0)
+    with pytest.raises(RunError, match="no room for 2 workers of 2 CPU each within 2 s"):
+        train_by_workers(small_request(), tmp_path / "run", 2, threads=2, ray="local")
+    monkeypatch.setattr(ray_workers, "package_versions", lambda: dict.fromkeys(ray_workers.SAME, "0.1"))
+    with pytest.raises(
+        RunError, match=r"^the Ray node [0-9.]+ has python .* instead of 0\.1, .*Install the same there"
+    ):
+        train_by_workers(small_request(), tmp_path / "run", 2, threads=1, ray="local")
+    assert not (tmp_path / "run").exists()
