@@ -201,7 +201,7 @@ class Decoders:
     """
 
     def __init__(self, limits: Limits) -> None:
-        self._quick = Lane(limits, [0, *[NICENESS] * (os.cpu_count() or 1)], limits.decode_s)
+        self._quick = Lane(limits, [0, *[NICENESS] * limits.decoders], limits.decode_s)
         self._slow = Lane(limits, [SLOW_NICENESS], limits.slow_decode_s)
         self._limits, self._overruns, self._failed = limits, Shares(), False
         self.replaced = 0  # decoders that were ended
