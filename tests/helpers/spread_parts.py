@@ -138,3 +138,10 @@ def is_worker(pid: int) -> bool:
         return b"clearway.spread.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()  # empty for one that has ended
     except (FileNotFoundError, ProcessLookupError):
         return False
+
+
+def square_slowly(folder: Path, part: int) -> int:
+    """The square, after a second; leaves a file first."""
+    (folder / "begun").touch()
+    time.sleep(1)
+    return part * part

@@ -54,7 +54,8 @@ class PretrainRequest:
         views: with colour and depth, two takes of each pose.
         settings: how.
         seed: of the first parameters, of the order of the views, and of all other chances.
-    XX
+        keeping: eyes that are taught on, whose features stay as they are; None: all is learnt anew.
+
     Raises:
         ArgumentError: the views are of another kind, or too few.
     """

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import CancelledError, Future
-from contextlib import contextmanager
+from concurrent.futures import CancelledError, Future, InvalidStateError
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 from uuid import uuid4
@@ -18,6 +20,8 @@ from clearway.spread.workers import Part, Result, Tool, Work
 
 GRACE_S = 60.0  # for parts under way to end when they are told to: training saves a checkpoint first
 ATTEMPTS = 4  # where the work does not say
+LOOKS_EVERY_S = 2.0
+LOST_S = 60.0  # with no node that has room, until the work is given up; Ray would wait for ever
 
 
 @contextmanager
@@ -34,16 +38,19 @@ def on_ray(
         attempts = work.attempts if work.attempts > 1 else ATTEMPTS
         options = {"num_cpus": work.cores, "memory": work.memory_bytes or None, "max_retries": attempts - 1}
         remote = ray.remote(**options)(_done_on_node)
-        under_way: set[Any] = set()
+        under_way: dict[Any, Future[Result]] = {}
+        over = threading.Event()
+        threading.Thread(target=_give_up_without_room, args=(ray, work, under_way, over), daemon=True).start()
 
         def submit(part: Part) -> Future[Result]:
             reference = remote.remote(dict(work.environment), key, [message], to_message(part))
-            under_way.add(reference)
             told: Future[Result] = Future()
+            under_way[reference] = told
 
             def tell(answer: Future[Result]) -> None:
-                under_way.discard(reference)
-                _pass_on(ray, answer, told, partial(work.died, part))
+                under_way.pop(reference, None)
+                with suppress(InvalidStateError):  # it was given up before
+                    _pass_on(ray, answer, told, partial(work.died, part))
 
             reference.future().add_done_callback(tell)
             return told
@@ -51,6 +58,7 @@ def on_ray(
         try:
             yield submit
         finally:
+            over.set()
             left = list(under_way)
             for reference in left:
                 ray.cancel(reference, force=False)
@@ -82,6 +90,23 @@ def _pass_on(ray: Any, answer: Future[Result], told: Future[Result], died: Calla
         told.set_exception(error)
 
 
+def _give_up_without_room(
+    ray: Any, work: Work[Tool, Part, Result], under_way: Mapping[Any, Future[Result]], over: threading.Event
+) -> None:
+    """End what is under way once no node has had room for a part for a while, as when the last one was lost."""
+    had_room = time.monotonic()
+    while not over.wait(LOOKS_EVERY_S):
+        try:
+            _check_room(ray, work)
+            had_room = time.monotonic()
+        except (RunError, ray.exceptions.RayError) as fault:
+            if time.monotonic() - had_room < LOST_S:
+                continue
+            for told in list(under_way.values()):
+                with suppress(InvalidStateError):
+                    told.set_exception(RunError(f"after {LOST_S:g} s: {str(fault).strip().splitlines()[0]}"))
+
+
 def _check_room(ray: Any, work: Work) -> None:
     """Refuse what Ray would wait for without a word.
 
@@ -93,5 +118,5 @@ def _check_room(ray: Any, work: Work) -> None:
         found = "; ".join(f"{node.get('CPU', 0):g} and {node.get('memory', 0) / 1e9:.1f} GB" for node in nodes)
         raise RunError(
             f"no node of the Ray cluster has the {work.cores} processors and {work.memory_bytes / 1e9:g} GB of memory "
-            f"that a worker takes (there are {found}). Give fewer --threads, or add a larger node"
+            f"that a worker takes (there are {found or 'none'}). Give fewer --threads, or add a larger node"
         )
