@@ -329,14 +329,14 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
 
 def test_a_stream_that_nobody_uses_is_closed() -> None:
     service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1), TOKENS), []
-    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None).id, sent))
+    asyncio.run(listening(service, asyncio.run(service.sessions.open(OWNER, "sampled", None)).id, sent))
     assert [message["type"] for message in sent] == ["websocket.accept", "websocket.close"]
     assert (sent[1]["code"], sent[1]["reason"]) == (1008, "unused for too long")
 
 
 def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
     service = Service(Sums(), Limits(sessions=1), TOKENS)
-    session = service.sessions.open(OWNER, "sampled", None)
+    session = asyncio.run(service.sessions.open(OWNER, "sampled", None))
 
     async def two() -> tuple[list[dict], list[dict]]:
         first, second = [], []

@@ -199,7 +199,7 @@ class Decoders:
     """
 
     def __init__(self, limits: Limits) -> None:
-        self._quick = Lane(os.cpu_count() or 1, limits, 0, limits.decode_s)
+        self._quick = Lane(limits.decoders, limits, 0, limits.decode_s)
         self._slow = Lane(1, limits, SLOW_NICENESS, limits.slow_decode_s)
         self._limits, self._overruns, self._failed = limits, Shares(), False
         self.replaced = 0  # decoders that were ended

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import Counter, deque
-from collections.abc import AsyncIterator, Callable, Collection
+from collections.abc import AsyncIterator, Callable, Collection, Mapping
 from contextlib import asynccontextmanager
 
 HALF_LIFE_S = 10.0  # of what has been used
@@ -89,11 +89,12 @@ class Places:
     Args:
         most: places there are.
         owners: gives the names for which places are kept.
+        held: places that are taken, by owner.
     """
 
-    def __init__(self, most: int, owners: Callable[[], Collection[str]]) -> None:
+    def __init__(self, most: int, owners: Callable[[], Collection[str]], held: Mapping[str, int] | None = None) -> None:
         self.most, self._owners = most, owners
-        self._held = Counter[str]()
+        self._held = Counter[str](held)
 
     @property
     def taken(self) -> int:
