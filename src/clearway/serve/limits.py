@@ -54,7 +54,7 @@ class Limits:
     bodies_bytes: int = 256 << 20
     """Of all requests under way together; owners of tokens share it."""
     decoders: int = field(default_factory=lambda: os.cpu_count() or 1)
-    """Processes that decode pictures quickly."""
+    """Processes that decode pictures quickly, and one more for owners who have used them least."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -18,6 +18,7 @@ from clearway.errors import ClearwayError
 from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
 from clearway.serve.connections import Strangers
+from clearway.serve.handshakes import Door, Handshakes
 from clearway.serve.limits import Limits
 from clearway.serve.messages import impatient
 from clearway.serve.protection import protected
@@ -161,18 +162,21 @@ def run_service(
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     health_port = port_of(network.health) if network.health else None
     strangers = Strangers(limits.strangers, network.proxy)
+    handshakes = Handshakes(limits.strangers, limits.patience_s, network.proxy)
     connections = allowed_connections(limits.connections)
-    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, health_port)
+    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, handshakes, health_port)
     tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
+    listeners = [Door(listener, handshakes) if tls else listener for listener in network.listeners()]
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     logging.getLogger("uvicorn.error").addFilter(Sparing())
     serve(
         protected(make_app(service), service, health_port, AccessLog(network.log) if network.log else None),
-        *network.listeners(),
+        *listeners,
         **tls,
         proxy_headers=network.proxy is not None,
         forwarded_allow_ips=network.proxy,
         lifespan="on",
+        loop="asyncio",  # others ask no `Door`
         log_config=None,
         http=http,
         ws=sockets,
