@@ -42,13 +42,14 @@ def test_tokens_that_are_too_weak_or_cannot_be_sent(clearway, monkeypatch, token
     ("words", "part"),
     [
         (("--port", "70000"), "--port is 70000"),
+        (("--replicas", "65"), "--replicas is 65, expected 1 to 64"),
         (("--host", "192.0.2.1"), "192.0.2.1"),
         (("--host", "no such host"), "--host no such host --port 0: "),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
 def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
-    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Sums())
+    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene, threads: Sums())
     assert clearway("serve", "x.onnx", *words).refusal(part)
 
 
@@ -56,7 +57,7 @@ def test_addresses_that_cannot_be(clearway, monkeypatch, words, part):
 def served(monkeypatch) -> list[Tokens]:
     """Tokens of the services that would have run."""
     tokens: list[Tokens] = []
-    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Sums())
+    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene, threads: Sums())
     monkeypatch.setattr("clearway.serve.run.run_service", lambda agent, listener, given, limits: tokens.append(given))
     return tokens
 
@@ -98,7 +99,7 @@ def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, 
     class Telling(Sums):
         card = replace(Sums.card, settings={"arrival": {"threshold": 0.8, "numbers": 2}})
 
-    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene: Telling())
+    monkeypatch.setattr("clearway.serve.run.open_agent", lambda source, scene, threads: Telling())
     assert "arrived" not in clearway("serve", "x.onnx").err
 
 
@@ -116,7 +117,7 @@ import clearway.serve.run
 from clearway.cli.main import main
 from helpers.sums import Sums
 
-clearway.serve.run.open_agent = lambda source, scene: Sums()
+clearway.serve.run.open_agent = lambda source, scene, threads: Sums()
 main(["serve", "x.onnx"])
 """
 

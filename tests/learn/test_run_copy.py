@@ -110,10 +110,12 @@ def test_a_training_goes_on_without_a_store_and_says_so(
     def refused(*_: object) -> None:
         raise ClearwayError("s3://rooms: is full. Make room")
 
-    monkeypatch.setattr(Store, "upload", refused)
+    def full(_: Path) -> None:
+        monkeypatch.setattr(Store, "upload", refused)
+
     warned = pytest.warns(UserWarning, match="not copied: s3://rooms: is full. Make room. Training goes on")
     with warned, pytest.raises(ClearwayError, match="is full"):
-        training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS)
+        training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS, on_begin=full)
     assert newest_checkpoint(RunFolder(tmp_path / "run").checkpoints).name.endswith(f"{FRAMES}")
 
 
@@ -130,9 +132,9 @@ def test_training_does_not_wait_for_a_copy(s3: S3, tmp_path: Path, monkeypatch: 
             came_far.set()
         return update(trainer)
 
-    monkeypatch.setattr(Store, "upload", slow)
     monkeypatch.setattr(Trainer, "update", counted)
-    training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS)
+    begun = lambda _: monkeypatch.setattr(Store, "upload", slow)  # noqa: E731
+    training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS, on_begin=begun)
     assert RunCopy(ADDRESS).restore(tmp_path / "again")
     assert without_times(tmp_path / "again") == without_times(tmp_path / "run")
     assert not list((tmp_path / "run").glob(".copied-*"))
@@ -143,6 +145,8 @@ def test_what_cannot_be_copied_to_is_told_before_a_folder_is_made(s3: S3, tmp_pa
     for address in ("https://here/run", "runs/one", "s3:"):
         with pytest.raises(ClearwayError, match="expected an address of s3:// or gs://"):
             training.train(REQUEST, out, copy_to=address)
+    with pytest.raises(ClearwayError, match=r"s3://no-such-bucket/run.*: there is nothing there\. Check the address"):
+        training.train(REQUEST, out, copy_to="s3://no-such-bucket/run")
     s3("runs/one/run.json", b"{}")
     with pytest.raises(ClearwayError, match=r"holds a run already\. Give --resume"):
         training.train(REQUEST, out, copy_to=ADDRESS)

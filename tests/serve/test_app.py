@@ -12,6 +12,7 @@ import clearway
 from clearway.errors import DeployError
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
+from clearway.serve.protection import protected
 from clearway.serve.service import Service
 from clearway.serve.tokens import ANSWERED
 from clearway.serve.tokens import OWNER as OWNER_KEY
@@ -329,14 +330,14 @@ async def listening(service: Service, session_id: str, sent: list[dict]) -> None
 
 def test_a_stream_that_nobody_uses_is_closed() -> None:
     service, sent = Service(Sums(), Limits(idle_s=1, deadline_s=0.1), TOKENS), []
-    asyncio.run(listening(service, service.sessions.open(OWNER, "sampled", None).id, sent))
+    asyncio.run(listening(service, asyncio.run(service.sessions.open(OWNER, "sampled", None)).id, sent))
     assert [message["type"] for message in sent] == ["websocket.accept", "websocket.close"]
     assert (sent[1]["code"], sent[1]["reason"]) == (1008, "unused for too long")
 
 
 def test_a_stream_too_many_is_refused_and_may_come_again() -> None:
     service = Service(Sums(), Limits(sessions=1), TOKENS)
-    session = service.sessions.open(OWNER, "sampled", None)
+    session = asyncio.run(service.sessions.open(OWNER, "sampled", None))
 
     async def two() -> tuple[list[dict], list[dict]]:
         first, second = [], []
@@ -382,3 +383,20 @@ def test_an_agent_that_takes_features_is_not_served() -> None:
 
     with pytest.raises(DeployError, match="without its encoder"):
         Service(Features(), Limits(), TOKENS)
+
+
+def test_an_answer_that_has_begun_is_whole_though_the_deadline_passes() -> None:
+    """It once ended after its headers."""
+    service, sent = Service(Sums(), Limits(deadline_s=0.05), TOKENS), []
+
+    async def app(scope, receive, send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await asyncio.sleep(0.2)
+        await send({"type": "http.response.body", "body": b"all of it"})
+
+    async def send(message: dict) -> None:
+        sent.append(message)
+
+    scope = {"type": "http", "path": "/health", "headers": [], "server": ("127.0.0.1", 1), "client": ("127.0.0.1", 2)}
+    asyncio.run(protected(app, service)(scope, send, send))
+    assert sent[-1]["body"] == b"all of it"

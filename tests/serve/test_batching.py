@@ -95,7 +95,7 @@ def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() ->
 
     async def run() -> list[Answer]:
         service = Service(Sums(seconds=0.05), Limits(), TOKENS)
-        session = service.sessions.open(OWNER, "argmax", None)
+        session = await service.sessions.open(OWNER, "argmax", None)
         with closing(service.decoders):
             await service.set_target(session, grey(0))
             return await asyncio.gather(*(service.step(session, grey(level)) for level in (1, 2)))
@@ -106,7 +106,7 @@ def test_steps_sent_at_once_in_one_session_are_answered_one_after_the_other() ->
 def test_a_step_sent_while_the_target_is_computed_waits_for_it() -> None:
     async def run() -> tuple[None, Answer]:
         service = Service(Sums(seconds=0.05), Limits(), TOKENS)
-        session = service.sessions.open(OWNER, "argmax", None)
+        session = await service.sessions.open(OWNER, "argmax", None)
         with closing(service.decoders):
             return await asyncio.gather(service.set_target(session, grey(2)), service.step(session, grey(1)))
 
@@ -188,7 +188,7 @@ def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
             return await begun(service, refused)
 
     async def begun(service: Service, refused: bool) -> State | None:
-        session = service.sessions.open(OWNER, "sampled", 7)
+        session = await service.sessions.open(OWNER, "sampled", 7)
         if refused:
             computed = asyncio.create_task(service.batcher.act(OWNER, plain(1), BEGUN))
             while not service.batcher.waiting:
@@ -254,9 +254,9 @@ def test_an_owner_of_several_holds_a_part_of_the_places_and_of_the_sessions() ->
 
     async def ask() -> list[object]:
         with closing(service.decoders):
-            sessions = [service.open(owner, "argmax", None) for owner in ("crowd", "crowd", "crowd", "guest")]
+            sessions = [await service.open(owner, "argmax", None) for owner in ("crowd", "crowd", "crowd", "guest")]
             with pytest.raises(Fault, match="3 sessions of this token"):
-                service.open("crowd", "argmax", None)
+                await service.open("crowd", "argmax", None)
             begins = [service.set_target(session, grey(1)) for session in sessions]
             return await asyncio.gather(*begins, return_exceptions=True)
 

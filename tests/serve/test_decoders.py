@@ -151,7 +151,7 @@ def test_the_answer_to_a_picture_given_up_is_nobody_else_s() -> None:
 def test_a_service_whose_decoders_cannot_start_is_not_ready(monkeypatch) -> None:
     async def task() -> None:
         service = Service(Sums(), Limits(), TOKENS)
-        session = service.open(OWNER, "argmax", None)
+        session = await service.open(OWNER, "argmax", None)
         monkeypatch.setattr(sys, "executable", "/nowhere/python")
         with closing(service.decoders):
             with pytest.raises(Fault, match="no picture can be decoded"):

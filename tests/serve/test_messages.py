@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from clearway.serve.connections import Strangers
+from clearway.serve.handshakes import Handshakes
 from clearway.serve.limits import Limits
 from clearway.serve.messages import MOST_FRAGMENTS, impatient
 from clearway.serve.shares import Places
@@ -87,7 +88,7 @@ def test_nothing_is_read_before_the_token_was_right_and_all_is_given_back_at_the
         config = uvicorn.Config(app)
         config.load()
         places = Places(1000, lambda: {OWNER})
-        kind = impatient(Limits(), places, places, Strangers(1, None))[1]
+        kind = impatient(Limits(), places, places, Strangers(1, None), Handshakes(1, 1.0, None))[1]
         connection = kind(config, uvicorn.server.ServerState(), {})
         transport = Mock(get_extra_info=lambda name, default=None: None, is_closing=lambda: False)
         connection.connection_made(transport)

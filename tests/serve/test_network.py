@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import ssl
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 import httpx
@@ -42,6 +42,28 @@ def test_over_tls_an_episode_is_walked_and_plain_http_is_not_answered(tmp_path) 
             assert b"200" not in until_closed(connection)
         with pytest.raises(httpx.ConnectError):
             httpx.get(f"{url}/health", timeout=PATIENT_S)  # an authority that nobody knows
+
+
+def test_handshakes_that_do_not_end_are_few_and_short(tmp_path) -> None:
+    """Nobody was told of them: they stayed for a minute, as many as there were files."""
+    files = tuple(map(str, certified(tmp_path)))
+    for patience_s, gone in ((3.0, 30), (40.0, 20)):
+        with running(tls=files, strangers=10, patience_s=patience_s) as service:
+            held = [service.connected() for _ in range(30)]
+            try:
+                trusting = ssl.create_default_context(cafile=files[0])
+                url = f"https://127.0.0.1:{service.port}/health"
+                assert httpx.get(url, verify=trusting, timeout=PATIENT_S).status_code == 200
+                begun = time.monotonic()
+                for connection in held[:gone]:
+                    until_closed(connection)
+                assert time.monotonic() - begun < 20
+                held[-1].setblocking(False)
+                with pytest.raises(BlockingIOError) if gone < 30 else nullcontext():
+                    held[-1].recv(1)
+            finally:
+                for connection in held:
+                    connection.close()
 
 
 def test_certificates_that_are_none(tmp_path) -> None:

@@ -1,5 +1,7 @@
 """The service keeps what its OpenAPI document says, whatever is sent to it."""
 
+import asyncio
+
 import numpy as np
 import pytest
 import schemathesis
@@ -37,7 +39,7 @@ SERVICE = Service(Sums(), LIMITS, TOKENS)
 SERVICE.decoders = Here(LIMITS)
 APP = protected(make_app(SERVICE), SERVICE)
 SCHEMA = schemathesis.openapi.from_asgi("/openapi.json", APP, headers=HEADERS)
-KNOWN = SERVICE.sessions.open(OWNER, "sampled", 0)
+KNOWN = asyncio.run(SERVICE.sessions.open(OWNER, "sampled", 0))
 SUPPRESSED = list(HealthCheck)
 
 

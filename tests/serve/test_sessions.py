@@ -1,5 +1,7 @@
 """Sessions open, expire and are counted."""
 
+import asyncio
+
 import pytest
 
 from clearway.errors import DeployError
@@ -24,16 +26,16 @@ def places(most: int) -> Places:
 def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
     clock = Clock()
     sessions = Sessions(Limits(idle_s=60), places(1000), clock)
-    first, second = sessions.open(OWNER, "argmax", None), sessions.open(OWNER, "sampled", 3)
+    first, second = asyncio.run(sessions.open(OWNER, "argmax", None)), asyncio.run(sessions.open(OWNER, "sampled", 3))
     clock.now += 59
-    assert sessions.get(first.id, OWNER) is first  # its time begins anew
+    assert asyncio.run(sessions.get(first.id, OWNER)) is first  # its time begins anew
     clock.now += 1
     assert len(sessions) == 1
     with pytest.raises(Fault, match="expired") as caught:
-        sessions.get(second.id, OWNER)
+        asyncio.run(sessions.get(second.id, OWNER))
     assert (caught.value.code, caught.value.status) == ("no_such_session", 404)
     clock.now += 58
-    assert sessions.get(first.id, OWNER) is first
+    assert asyncio.run(sessions.get(first.id, OWNER)) is first
     clock.now += 60
     assert len(sessions) == 0
 
@@ -41,29 +43,29 @@ def test_a_session_expires_once_nobody_has_used_it_for_long_enough() -> None:
 def test_no_more_sessions_than_allowed_and_room_again_when_one_goes() -> None:
     clock = Clock()
     sessions = Sessions(Limits(idle_s=60), places(2), clock)
-    first = sessions.open(OWNER, "sampled", None)
+    first = asyncio.run(sessions.open(OWNER, "sampled", None))
     clock.now += 30
-    sessions.open(OWNER, "sampled", None)
+    asyncio.run(sessions.open(OWNER, "sampled", None))
     with pytest.raises(Fault, match="2 sessions are open") as caught:
-        sessions.open(OWNER, "sampled", None)
+        asyncio.run(sessions.open(OWNER, "sampled", None))
     assert (caught.value.code, caught.value.status) == ("too_many_sessions", 429)
-    sessions.close(first.id, OWNER)
-    sessions.open(OWNER, "sampled", None)
+    asyncio.run(sessions.close(first.id, OWNER))
+    asyncio.run(sessions.open(OWNER, "sampled", None))
     assert sessions.full
     clock.now += 60
     assert not sessions.full
     with pytest.raises(Fault):
-        sessions.close(first.id, OWNER)
+        asyncio.run(sessions.close(first.id, OWNER))
 
 
 def test_names_of_sessions_cannot_be_guessed() -> None:
     sessions = Sessions(Limits(), places(1000))
-    own = sessions.open(OWNER, "sampled", None)
+    own = asyncio.run(sessions.open(OWNER, "sampled", None))
     for ask in (sessions.get, sessions.close):
         with pytest.raises(Fault, match="no such session"):
-            ask(own.id, "another")
-    assert sessions.get(own.id, OWNER) is own
-    names = {sessions.open(OWNER, "sampled", None).id for _ in range(200)}
+            asyncio.run(ask(own.id, "another"))
+    assert asyncio.run(sessions.get(own.id, OWNER)) is own
+    names = {asyncio.run(sessions.open(OWNER, "sampled", None)).id for _ in range(200)}
     assert len(names) == 200
     assert {len(name) for name in names} == {22}  # 128 bits
 

@@ -73,3 +73,31 @@ def test_places_follow_the_names_and_are_kept_for_no_others() -> None:
     names = {"second"}
     places.free("first", 4)
     assert places.take("second", 4)
+
+
+def test_who_has_used_little_need_not_wait_for_those_who_have_used_much() -> None:
+    """Two attackers once kept every turn, each as long as it could."""
+    shares, order = Shares(), []
+    shares.add("modest", 0.1)
+    for greedy in ("first", "second"):
+        shares.add(greedy, 5.0)
+
+    async def ask() -> None:
+        turns, over = FairTurns(3, shares), asyncio.Event()
+
+        async def one(owner: str) -> None:
+            async with turns.turn(owner):
+                order.append(owner)
+                await over.wait()
+
+        greedy = [asyncio.create_task(one(owner)) for owner in ("first", "second", "first", "second")]
+        await asyncio.sleep(0)
+        modest = asyncio.create_task(one("modest"))
+        for _ in range(3):
+            await asyncio.sleep(0)
+        assert order == ["first", "second", "modest"]
+        over.set()
+        await asyncio.gather(*greedy, modest)
+
+    asyncio.run(ask())
+    assert len(order) == 5

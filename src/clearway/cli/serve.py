@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import os
 import socket
-import sys
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ UNENCRYPTED = (
     "WARNING: NOT ENCRYPTED. Tokens and pictures cross the network in the clear; whoever listens can use them. "
     "Give --tls-cert and --tls-key, or put a proxy with TLS before the service"
 )
+MOST_REPLICAS = 64
 NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 
 
@@ -59,10 +59,14 @@ class Serve:
     """Seconds after which a session expires that nobody uses."""
     deadline_s: float = 10.0
     """Seconds that a request may take."""
+    replicas: int = 1
+    """Processes that answer at the one address; sessions go on when one of them dies."""
 
     def run(self) -> None:
         """Load the agent, then answer until interrupted."""
+        from clearway.serve.access_log import to_stderr
         from clearway.serve.limits import Limits
+        from clearway.serve.replicas import run_replicas
         from clearway.serve.run import Network, check_tls, rotating, run_service, servable_agent
         from clearway.serve.sessions import state_bytes
         from clearway.serve.tokens import ALONE, Tokens, checked_token, read_tokens
@@ -70,6 +74,9 @@ class Serve:
         from clearway.web.local import address_of, is_loopback, listening, port_of
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
+        if not 1 <= self.replicas <= MOST_REPLICAS:
+            problem = f"--replicas is {self.replicas}, expected 1 to {MOST_REPLICAS}"
+            raise ClearwayError(f"{problem}. Give about as many as there are cores")
         check_tls(self.tls_cert, self.tls_key)
         own = os.environ.get(TOKEN_VARIABLE)
         if self.tokens is not None:
@@ -100,9 +107,14 @@ class Serve:
             each = state_bytes(agent)
             if limits.sessions * each > NOTABLE_BYTES:
                 whole = limits.sessions * each / 1e6
-                say(f"memory: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
-            log = functools.partial(print, file=sys.stderr, flush=True) if self.log_requests else None
+                where = "memory" if self.replicas == 1 else "in the cache folder"
+                say(f"{where}: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
+            log = to_stderr if self.log_requests else None
             network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy, log)
+            if self.replicas > 1:
+                threads = max((os.cpu_count() or 1) // self.replicas, 1)
+                opened = functools.partial(servable_agent, self.agent, self.scene, to_stderr, threads)
+                return run_replicas(opened, network, tokens, self.tokens, limits, self.replicas)
             with rotating(tokens, self.tokens):
                 run_service(agent, network, tokens, limits)
 

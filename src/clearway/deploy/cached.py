@@ -19,12 +19,13 @@ PACKAGES = Path(clearway.__file__).parent
 SHAPING = ("agents", "deploy", "model", "perception")  # packages whose code shapes the file
 
 
-def cached_agent(chosen: RunInScene, tell: Callable[[str], object]) -> OnnxAgent:
+def cached_agent(chosen: RunInScene, tell: Callable[[str], object], threads: int | None = None) -> OnnxAgent:
     """A run's agent on onnxruntime, exported to the user's cache folder the first time; a damaged file is made again.
 
     Args:
         chosen: the agent and its scene.
         tell: called with a line before an export, which takes its time.
+        threads: of the processor; None: one a core.
 
     Raises:
         DeployError, EncoderError: see `export_onnx`.
@@ -32,11 +33,11 @@ def cached_agent(chosen: RunInScene, tell: Callable[[str], object]) -> OnnxAgent
     path = files.cache_dir() / "agents" / f"{chosen.scene.name}-{_key(chosen)}.onnx"
     with files.locked(path):
         try:
-            return OnnxAgent(read_onnx(path))
+            return OnnxAgent(read_onnx(path, threads))
         except DeployError:
             tell(f"exporting the agent for scene {chosen.scene.name}, once ...")
             export_onnx(chosen, path)
-    return OnnxAgent(read_onnx(path))
+    return OnnxAgent(read_onnx(path, threads))
 
 
 def _key(chosen: RunInScene) -> str:

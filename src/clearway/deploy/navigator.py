@@ -38,12 +38,13 @@ class Decision(NamedTuple):
     value: float | None
 
 
-def open_agent(source: str | Path, scene: str | None = None) -> DeployedAgent:
+def open_agent(source: str | Path, scene: str | None = None, threads: int | None = None) -> DeployedAgent:
     """A trained agent from an ONNX file or a run folder, or "generalist", which comes with clearway.
 
     Args:
         source: the file, the folder, or the name.
         scene: which of a run's scenes the agent is in; None for the first. A file holds one scene.
+        threads: of the processor, for an agent in a file; None: one a core.
 
     Raises:
         ClearwayError: it cannot be read, was changed, is for another scene, or its encoder cannot be had.
@@ -59,17 +60,17 @@ def open_agent(source: str | Path, scene: str | None = None) -> DeployedAgent:
 
         return RunAgent(load_run_in_scene(path, scene))
     else:
-        agent = _of_file(path)
+        agent = _of_file(path, threads)
     if scene not in (None, agent.card.scene):
         remedy = "Leave the scene out" if agent.card.scene == ANY_ROOM else f"Export the run with --scene {scene}"
         raise DeployError(f"{path}: is for scene {agent.card.scene}, not {scene}. {remedy}")
     return agent
 
 
-def _of_file(path: Path) -> DeployedAgent:
+def _of_file(path: Path, threads: int | None) -> DeployedAgent:
     from clearway.deploy.onnx_file import OnnxAgent, read_onnx
 
-    file = read_onnx(path)
+    file = read_onnx(path, threads)
     if file.card.kind == GENERALIST:
         from clearway.deploy.generalist import exported_generalist
 

@@ -22,6 +22,7 @@ from clearway.learn.run_folder import CHECKPOINTS, COPIED, METRICS_FILE, RUN_FIL
 from clearway.remote.address import address_of
 from clearway.remote.store import WRITABLE, Store
 
+PROBE = "may-be-removed"  # a file's name
 FILES = (NETWORK_FILE, TRAINING_FILE, MANIFEST_FILE)
 
 
@@ -61,6 +62,12 @@ class RunCopy:
         if (there := self._checkpoints()) and (not here or there[-1] > here[-1]):
             problem = f"{self.address}: has come further than {folder.path}, to {there[-1]}"
             raise RunError(f"{problem}. Go on from it with an empty --out, or give another --copy-to")
+
+    def check_writable(self) -> None:
+        """Write a file and remove it, before hours of training. Raises ClearwayError where that cannot be done."""
+        with tempfile.NamedTemporaryFile() as probe:
+            self.store.upload(Path(probe.name), self._place(PROBE))
+        self.store.remove(self._place(PROBE))
 
     @property
     def holds_a_run(self) -> bool:

@@ -220,6 +220,7 @@ def opened_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy
         copy.restore(folder.path)
     elif copy.holds_a_run:
         raise RunError(f"{address}: holds a run already. Give --resume to go on with it, or another --copy-to")
+    copy.check_writable()
     return copy
 
 

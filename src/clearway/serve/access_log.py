@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 import logging
+import sys
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 
 MOST_A_SECOND = 20
 SHOWN_LETTERS = 8  # of a session's id: enough to tell sessions apart, too few to use one
+
+
+def to_stderr(line: str) -> None:
+    """Write a line where logs go."""
+    print(line, file=sys.stderr, flush=True)
 
 
 class Sampled:

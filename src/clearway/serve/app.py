@@ -141,13 +141,13 @@ def make_app(service: Service) -> FastAPI:
     @app.post("/sessions", status_code=201, dependencies=token, responses=_faults(*OPENING))
     async def open_session(opening: Opening, request: Request) -> Opened:
         """Open a session; it expires when it is not used."""
-        session = service.open(_owner(request), opening.selection, opening.seed)
+        session = await service.open(_owner(request), opening.selection, opening.seed)
         return Opened(session_id=session.id, expires_after_s=service.limits.idle_s)
 
     @app.delete("/sessions/{session_id}", status_code=204, dependencies=token, responses=_faults(*CLOSING))
     async def close_session(session_id: Annotated[str, Path(pattern=ID)], request: Request) -> None:
         """End a session."""
-        service.sessions.close(session_id, _owner(request))
+        await service.sessions.close(session_id, _owner(request))
 
     @app.put(
         "/sessions/{session_id}/target",
@@ -163,7 +163,7 @@ def make_app(service: Service) -> FastAPI:
 
         Send the episode's number, from 1 in a session, and you may send the request again where its answer was lost.
         """
-        session = service.sessions.get(session_id, _owner(request))
+        session = await service.sessions.get(session_id, _owner(request))
         await service.set_target(session, await _picture(request), episode)
 
     @app.post(
@@ -177,7 +177,7 @@ def make_app(service: Service) -> FastAPI:
 
         Send the step's number, from 1 in an episode, and you may send the request again where its answer was lost.
         """
-        session = service.sessions.get(session_id, _owner(request))
+        session = await service.sessions.get(session_id, _owner(request))
         return _answer(service, await service.step(session, await _picture(request), step))
 
     @app.websocket("/sessions/{session_id}/stream")
@@ -234,7 +234,9 @@ async def _decoding(service: Service) -> AsyncIterator[None]:
     """Decoders run meanwhile."""
     try:
         service.decoders.start()
+        beating = asyncio.create_task(service.beat())
         yield
+        beating.cancel()
     finally:
         service.decoders.close()
 
@@ -268,7 +270,7 @@ async def _stream(service: Service, socket: WebSocket, session_id: str, step: in
     """Answer the pictures of a session, one after the other, until either side ends it."""
     owner = _owner(socket)
     try:
-        service.sessions.get(session_id, owner)
+        await service.sessions.get(session_id, owner)
         if not service.streams.take(owner):
             raise Fault("overloaded", "too many streams are open. Close one, or try again later")
     except Fault as fault:
@@ -312,7 +314,7 @@ async def _answer_message(
     service: Service, owner: str, session_id: str, content: bytes | None, step: int | None
 ) -> str:
     """The answer to a message. Raises Fault."""
-    session = service.sessions.get(session_id, owner)
+    session = await service.sessions.get(session_id, owner)
     if content is None:
         raise Fault("invalid_request", "send pictures as binary messages")
     try:

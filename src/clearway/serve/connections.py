@@ -14,6 +14,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from clearway.serve.handshakes import Handshakes
 from clearway.serve.shares import Places
 from clearway.serve.tokens import KNOWN
 
@@ -116,6 +117,7 @@ class ImpatientHttp(Impatient, H11Protocol):
     """HTTP/1.1 whose clients send a request's headers, and read its answer, within `patience_s`."""
 
     strangers: Strangers
+    handshakes: Handshakes
     health_port: int | None = None
     address = ""
     _headers: asyncio.TimerHandle | None = None
@@ -124,6 +126,7 @@ class ImpatientHttp(Impatient, H11Protocol):
         """Begin to wait for headers."""
         super().connection_made(transport)
         self.address = self.client[0] if self.client else ""
+        self.handshakes.done(transport.get_extra_info("socket").fileno(), self.address)
         if self.health_port is not None and self.server is not None and self.server[1] == self.health_port:
             self.limit_concurrency = None  # whoever watches the service is answered however busy it is
         self.strangers.add(self)

@@ -15,6 +15,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import cast
@@ -32,7 +33,7 @@ COMMAND = (
     "import sys; sys.path[:] = {path!r}; from clearway.children import end_with_parent; end_with_parent({parent}); "
     "from clearway.serve.decoder import main; main()"
 )
-SLOW_NICENESS = 19
+NICENESS, SLOW_NICENESS = 5, 19  # yields to the agent; to all others
 SUSPECT_S = 60.0  # for which the pictures of a session are decoded slowly, one of which has overrun
 MOST_OVERRUNS_S = 1.0  # of decoding lately in vain for a token, beyond which its new sessions are decoded slowly
 
@@ -65,7 +66,7 @@ class Decoder:
     def __init__(self, limits: Limits, niceness: int) -> None:
         bounds = Bounds(limits.picture_pixels, MAX_PICTURE_SIDE, limits.picture_scans)
         job = {"bounds": asdict(bounds), "memory_bytes": limits.decoder_bytes, "nice": niceness}
-        self._job = json.dumps(job)
+        self._job, self.niceness = json.dumps(job), niceness
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
         self.begun_s: float | None = None  # when its present picture came to it
@@ -162,21 +163,22 @@ class Lane:
     """Decoders of one kind, whose turns are shared fairly.
 
     Args:
-        count: of processes.
         limits: see `Decoder`; how long a decoder may seem stalled.
-        niceness: see `Decoder`.
+        niceness: of each, see `Decoder`; who has used more than the mean gets the one that yields the most.
         seconds: of processor time a picture.
     """
 
-    def __init__(self, count: int, limits: Limits, niceness: int, seconds: float) -> None:
-        self.decoders = [Decoder(limits, niceness) for _ in range(count)]
+    def __init__(self, limits: Limits, niceness: Sequence[int], seconds: float) -> None:
+        self.decoders = [Decoder(limits, each) for each in niceness]
         self._idle, self._limits, self._seconds = list(self.decoders), limits, seconds
-        self._turns = FairTurns(count, Shares())
+        self._shares = Shares()
+        self._turns = FairTurns(len(self.decoders), self._shares)
 
     async def decode(self, content: bytes, owner: str) -> np.ndarray:
         """See `Decoder.decode`."""
         async with self._turns.turn(owner):
-            decoder = self._idle.pop()
+            choose = max if self._shares.is_above_mean(owner) else min
+            self._idle.remove(decoder := choose(self._idle, key=lambda each: each.niceness))
             try:
                 return await decoder.decode(content, self._seconds, self._limits.stall_s)
             finally:
@@ -199,8 +201,8 @@ class Decoders:
     """
 
     def __init__(self, limits: Limits) -> None:
-        self._quick = Lane(os.cpu_count() or 1, limits, 0, limits.decode_s)
-        self._slow = Lane(1, limits, SLOW_NICENESS, limits.slow_decode_s)
+        self._quick = Lane(limits, [0, *[NICENESS] * limits.decoders], limits.decode_s)
+        self._slow = Lane(limits, [SLOW_NICENESS], limits.slow_decode_s)
         self._limits, self._overruns, self._failed = limits, Shares(), False
         self.replaced = 0  # decoders that were ended
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, field, replace
 
 from clearway.errors import DeployError
 
@@ -52,6 +53,8 @@ class Limits:
     """Of an address in a minute; beyond, only tokens are looked at that have come from there before."""
     bodies_bytes: int = 256 << 20
     """Of all requests under way together; owners of tokens share it."""
+    decoders: int = field(default_factory=lambda: os.cpu_count() or 1)
+    """Processes that decode pictures quickly, and one more for owners who have used them least."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -62,3 +65,8 @@ class Limits:
         if self.idle_s <= 2 * self.deadline_s:
             problem = f"sessions expire after {self.idle_s:g} s and requests may take {self.deadline_s:g} s"
             raise DeployError(f"{problem}. Let sessions live more than twice as long as requests")
+
+    def divided(self, replicas: int) -> Limits:
+        """Of one of several replicas, which share all but their sessions evenly."""
+        shared = ("waiting", "connections", "strangers", "wrong_tokens", "bodies_bytes", "decoders")
+        return replace(self, **{name: max(getattr(self, name) // replicas, 1) for name in shared})

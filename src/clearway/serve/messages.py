@@ -13,6 +13,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from clearway.serve.connections import Impatient, ImpatientHttp, Strangers
 from clearway.serve.faults import AGAIN, POLICY, TOO_BIG
+from clearway.serve.handshakes import Handshakes
 from clearway.serve.limits import Limits
 from clearway.serve.shares import Places
 
@@ -139,11 +140,17 @@ class ImpatientSocket(Impatient, WebSocketsSansIOProtocol):
 
 
 def impatient(
-    limits: Limits, places: Places, bodies: Places, strangers: Strangers, health_port: int | None = None
+    limits: Limits,
+    places: Places,
+    bodies: Places,
+    strangers: Strangers,
+    handshakes: Handshakes,
+    health_port: int | None = None,
 ) -> tuple[type[asyncio.Protocol], type[asyncio.Protocol]]:
     """The classes for HTTP and for WebSockets with those limits, and places for connections and for bytes under way."""
     both = {"patience_s": limits.patience_s, "places": places}
+    before = {"strangers": strangers, "handshakes": handshakes, "health_port": health_port}
     return (
-        type("ImpatientHttp", (ImpatientHttp,), {**both, "strangers": strangers, "health_port": health_port}),
+        type("ImpatientHttp", (ImpatientHttp,), {**both, **before}),
         type("ImpatientSocket", (ImpatientSocket,), {**both, "message_s": limits.deadline_s, "bodies": bodies}),
     )

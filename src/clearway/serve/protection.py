@@ -70,8 +70,8 @@ def protected(
             if scope["path"] not in (OPEN_PATHS if health_port is None else WATCHED):
                 scope[OWNER] = _owner(scope, service)
             exchange.check_length()
-            async with asyncio.timeout(limits.deadline_s):
-                await app(scope, exchange.receive, exchange.send)
+            async with asyncio.timeout(limits.deadline_s) as exchange.deadline:
+                await app(scope, exchange.receive, exchange.send_in_time)
             if exchange.too_large:
                 raise exchange.too_large
         except Fault as fault:
@@ -98,7 +98,10 @@ class _Exchange:
         body_complete: all of the request's body has been read.
         status: of the answer; 0 before it begins.
         too_large: set once the body was; the application's own answer is then kept back.
+        deadline: until the answer begins.
     """
+
+    deadline: asyncio.Timeout
 
     def __init__(self, scope: Scope, receive: Receive, send: Send, service: Service) -> None:
         self._scope, self._receive, self._send, self._service = scope, receive, send, service
@@ -134,6 +137,12 @@ class _Exchange:
 
     def _fault(self) -> Fault:
         return Fault("body_too_large", f"at most {self._most_bytes} bytes are taken")
+
+    async def send_in_time(self, message: MutableMapping[str, Any]) -> None:
+        """As `send`, of the application: an answer that has begun is not cut off by the deadline."""
+        if message["type"] == "http.response.start" and not self.deadline.expired():
+            self.deadline.reschedule(None)
+        await self.send(message)
 
     async def send(self, message: MutableMapping[str, Any]) -> None:
         """Pass a part of the answer on; after it, a connection with an unread body is closed."""

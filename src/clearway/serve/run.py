@@ -18,9 +18,11 @@ from clearway.errors import ClearwayError
 from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
 from clearway.serve.connections import Strangers
+from clearway.serve.handshakes import Door, Handshakes
 from clearway.serve.limits import Limits
 from clearway.serve.messages import impatient
 from clearway.serve.protection import protected
+from clearway.serve.replica import Replica
 from clearway.serve.service import Service
 from clearway.serve.tokens import Tokens, read_tokens
 from clearway.web.local import port_of, serve
@@ -29,23 +31,26 @@ OTHER_FILES = 200  # beside connections that a service may open
 SEND_BUFFER_BYTES = 64 * 1024  # of the system for each connection: a client that does not read is noticed soon
 
 
-def servable_agent(source: Path, scene: str | None, tell: Callable[[str], object]) -> DeployedAgent:
+def servable_agent(
+    source: Path, scene: str | None, tell: Callable[[str], object], threads: int | None = None
+) -> DeployedAgent:
     """The agent of an exported file, the generalist, or that of a run folder, which is exported to the cache first.
 
     Args:
         source: the file, "generalist" or the folder.
         scene: see `open_agent`.
         tell: see `cached_agent`.
+        threads: of the processor, for an agent in a file; None: one a core.
 
     Raises:
         ClearwayError: see `open_agent` and `cached_agent`.
     """
     if not source.is_dir():
-        return open_agent(source, scene)
+        return open_agent(source, scene, threads)
     from clearway.deploy.cached import cached_agent
     from clearway.deploy.from_run import load_run_in_scene
 
-    return cached_agent(load_run_in_scene(source, scene), tell)
+    return cached_agent(load_run_in_scene(source, scene), tell, threads)
 
 
 def allowed_connections(wanted: int) -> int:
@@ -111,8 +116,11 @@ def check_tls(certificate: Path | None, key: Path | None) -> None:
 
 
 @contextmanager
-def rotating(tokens: Tokens, path: Path | None) -> Iterator[None]:
-    """Let SIGHUP read the file of tokens again meanwhile, also where the process was started to ignore it (nohup)."""
+def rotating(tokens: Tokens, path: Path | None, further: Callable[[], object] = lambda: None) -> Iterator[None]:
+    """Let SIGHUP read the file of tokens again meanwhile, also where the process was started to ignore it (nohup).
+
+    Once they were read, `further` is called.
+    """
     if path is None or not hasattr(signal, "SIGHUP"):
         yield
         return
@@ -125,6 +133,7 @@ def rotating(tokens: Tokens, path: Path | None) -> Iterator[None]:
             log.error("the tokens stay as they were: %s", fault)
         else:
             log.warning("tokens were read again from %s", path)
+            further()
 
     before = signal.signal(signal.SIGHUP, read_again)
     try:
@@ -133,7 +142,9 @@ def rotating(tokens: Tokens, path: Path | None) -> Iterator[None]:
         signal.signal(signal.SIGHUP, before)
 
 
-def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: Limits) -> None:
+def run_service(
+    agent: DeployedAgent, network: Network, tokens: Tokens, limits: Limits, replica: Replica | None = None
+) -> None:
     """Answer until told to end (SIGINT, SIGTERM); requests under way are answered, streams are closed.
 
     Args:
@@ -141,27 +152,31 @@ def run_service(agent: DeployedAgent, network: Network, tokens: Tokens, limits: 
         network: how it is reached.
         tokens: one of which every request must hold.
         limits: what is allowed.
+        replica: what it has of others; None: it is alone.
 
     Raises:
         DeployError: the agent takes no pictures.
     """
-    service = Service(agent, limits, tokens)
+    service = Service(agent, limits, tokens, replica)
     for listener in network.listeners():
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
     health_port = port_of(network.health) if network.health else None
     strangers = Strangers(limits.strangers, network.proxy)
+    handshakes = Handshakes(limits.strangers, limits.patience_s, network.proxy)
     connections = allowed_connections(limits.connections)
-    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, health_port)
+    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, handshakes, health_port)
     tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
+    listeners = [Door(listener, handshakes) if tls else listener for listener in network.listeners()]
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     logging.getLogger("uvicorn.error").addFilter(Sparing())
     serve(
         protected(make_app(service), service, health_port, AccessLog(network.log) if network.log else None),
-        *network.listeners(),
+        *listeners,
         **tls,
         proxy_headers=network.proxy is not None,
         forwarded_allow_ips=network.proxy,
         lifespan="on",
+        loop="asyncio",  # others ask no `Door`
         log_config=None,
         http=http,
         ws=sockets,

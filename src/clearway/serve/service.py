@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +19,8 @@ from clearway.serve.decoders import Decoders
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import Metrics
-from clearway.serve.sessions import Answer, Progress, Session, Sessions
+from clearway.serve.replica import BEAT_S, Replica
+from clearway.serve.sessions import Answer, KeepsSessions, Progress, Session, Sessions
 from clearway.serve.shares import Places
 from clearway.serve.tokens import Tokens
 
@@ -30,23 +32,28 @@ class Service:
         agent: is asked, which must take pictures.
         limits: what is allowed.
         tokens: whose owners share it.
+        replica: what it has of the others; None: it is alone.
 
     Raises:
         DeployError: the agent takes features.
     """
 
-    def __init__(self, agent: DeployedAgent, limits: Limits, tokens: Tokens) -> None:
+    def __init__(self, agent: DeployedAgent, limits: Limits, tokens: Tokens, replica: Replica | None = None) -> None:
         if not agent.card.takes_pictures:
             problem = f"the agent for scene {agent.card.scene} was exported without its encoder"
             raise DeployError(f"{problem}, so that it takes no pictures. Export it with its encoder")
         self.card, self.limits, self.tokens = agent.card, limits, tokens
-        self.sessions = Sessions(limits, self.places(limits.sessions))
+        self.replica = replica
+        self.sessions: KeepsSessions = (
+            Sessions(limits, self.places(limits.sessions)) if replica is None else replica.sessions
+        )
         self.decoders = Decoders(limits)
         self.attempts = Attempts(limits.wrong_tokens)
         self.bodies = self.places(limits.bodies_bytes)  # bytes of requests and messages under way
         self.pictures = self.places(limits.waiting)  # under way
         self.streams = self.places(limits.sessions)  # WebSockets that are open
-        self.metrics = Metrics(lambda: len(self.sessions), lambda: self.waiting, lambda: self.decoders.replaced)
+        gauges = (lambda: len(self.sessions), lambda: self.waiting, lambda: self.decoders.replaced)
+        self.metrics = Metrics(*gauges, None if replica is None else replica.figures)
         self.batcher = Batcher(agent, limits, self.metrics.computed)
 
     def places(self, most: int) -> Places:
@@ -60,16 +67,32 @@ class Service:
 
     @property
     def ready(self) -> bool:
-        """There is room for another session and another picture, and pictures are decoded."""
+        """There is room for another session and another picture, and pictures are decoded; in one replica at least."""
+        return self._ready or (self.replica is not None and self.replica.beats.any_ready())
+
+    async def beat(self) -> None:
+        """Tell the other replicas of this one, again and again."""
+        while self.replica is not None:
+            try:
+                await self.replica.sessions.recount()
+                ready = self._ready
+            except Fault:  # sessions cannot be kept now, which a line has said
+                ready = False
+            self.metrics.refresh()
+            self.replica.beats.beat(self.replica.number, ready)
+            await asyncio.sleep(BEAT_S)
+
+    @property
+    def _ready(self) -> bool:
         return not self.sessions.full and self.waiting < self.limits.waiting and not self.decoders.stalled
 
-    def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
+    async def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
         """A new session of an owner's. Raises Fault where there are too many, or the agent draws nothing."""
         try:
             check_selection(selection, self.card)
         except DeployError as fault:
             raise Fault("invalid_request", str(fault)) from fault
-        return self.sessions.open(owner, selection, seed)
+        return await self.sessions.open(owner, selection, seed)
 
     async def set_target(self, session: Session, content: bytes, episode: int | None = None) -> None:
         """Begin an episode with the picture file of a target; on a Fault the session stays as it was.
@@ -81,14 +104,17 @@ class Service:
         """
         file = _digest(content)
         async with session.turn:
-            before = session.progress
-            if _is_repeated("episode", episode, before.episode, not before.steps and file == before.seen):
-                return
-            with self._place(session.owner):
-                picture = await self._decoded(session, content)
-                seed = episode_seed(session.seed, before.episode)
-                state = await self.batcher.reset(session.owner, picture, seed)
-            session.progress = Progress(before.episode + 1, 0, state, file)
+            picture = None
+            while True:
+                before = await self.sessions.progress(session)
+                if _is_repeated("episode", episode, before.episode, not before.steps and file == before.seen):
+                    return
+                with self._place(session.owner):
+                    picture = await self._decoded(session, content) if picture is None else picture
+                    seed = episode_seed(session.seed, before.episode)
+                    state = await self.batcher.reset(session.owner, picture, seed)
+                if await self.sessions.keep(session, before, Progress(before.episode + 1, 0, state, file)):
+                    return
 
     async def step(self, session: Session, content: bytes, number: int | None = None) -> Answer:
         """What to do, seeing a picture file; on a Fault, or cancelled, the session stays as it was.
@@ -101,19 +127,23 @@ class Service:
         """
         file = _digest(content)
         async with session.turn:
-            before = session.progress
-            if before.state is None:
-                raise Fault("no_target", "the session has no target yet. Send its picture first")
-            if _is_repeated("step", number, before.steps, file == before.seen) and before.answer is not None:
-                return before.answer
-            with self._place(session.owner):
-                picture = await self._decoded(session, content)
-                decisions, state = await self.batcher.act(session.owner, picture, before.state)
-            if session.selection == "argmax":
-                decisions = most_probable(decisions)
-            answer = Answer(decision_of(decisions), arrival_of(decisions), before.steps + 1)
-            session.progress = Progress(before.episode, answer.step, state, file, answer)
-            return answer
+            picture = None
+            while True:
+                before = await self.sessions.progress(session)
+                if before.state is None:
+                    raise Fault("no_target", "the session has no target yet. Send its picture first")
+                if _is_repeated("step", number, before.steps, file == before.seen) and before.answer is not None:
+                    return before.answer
+                with self._place(session.owner):
+                    picture = await self._decoded(session, content) if picture is None else picture
+                    decisions, state = await self.batcher.act(session.owner, picture, before.state)
+                if session.selection == "argmax":
+                    decisions = most_probable(decisions)
+                answer = Answer(decision_of(decisions), arrival_of(decisions), before.steps + 1)
+                if await self.sessions.keep(
+                    session, before, Progress(before.episode, answer.step, state, file, answer)
+                ):
+                    return answer
 
     @contextmanager
     def _place(self, owner: str) -> Iterator[None]:

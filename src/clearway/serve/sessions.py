@@ -8,6 +8,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -43,6 +44,7 @@ class Progress:
         state: what the agent remembers, of one row; None until there is a target.
         seen: SHA-256 of the file that led here, a target's or a step's.
         answer: to the last step; None where there was none since the target.
+        version: of the record that it was read from, where sessions are shared.
     """
 
     episode: int = 0
@@ -50,6 +52,7 @@ class Progress:
     state: State | None = None
     seen: bytes = b""
     answer: Answer | None = None
+    version: int = 0
 
 
 @dataclass(eq=False)
@@ -77,17 +80,66 @@ class Session:
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
 
+def begun_state(agent: DeployedAgent) -> State:
+    """What an agent remembers at the begin of one episode."""
+    height, width = agent.card.picture_size or (1, 1)
+    return agent.reset({RGB: np.zeros((1, height, width, 3), np.uint8)}, np.zeros(1, np.int64))
+
+
 def state_bytes(agent: DeployedAgent) -> int:
     """What an agent's memory of one episode takes, which every session with a target keeps."""
-    height, width = agent.card.picture_size or (1, 1)
-    state = agent.reset({RGB: np.zeros((1, height, width, 3), np.uint8)}, np.zeros(1, np.int64))
-    return sum(values.nbytes for values in state.values())
+    return sum(values.nbytes for values in begun_state(agent).values())
 
 
 def new_session(owner: str, selection: Selection, seed: int | None, now_s: float) -> Session:
     """A session without a target."""
     seed = secrets.randbits(SEED_BITS) if seed is None else seed
     return Session(secrets.token_urlsafe(ID_BYTES), owner, selection, seed, now_s)
+
+
+def place_refused(places: Places, owner: str) -> str | None:
+    """Take a place for another session of an owner's; what stands against it, where there is none."""
+    if places.take(owner):
+        return None
+    if places.taken >= places.most:
+        return f"{places.most} sessions are open"
+    return f"{places.held(owner)} sessions of this token are open"
+
+
+def too_many(held: str) -> Fault:
+    """The refusal of another session."""
+    return Fault("too_many_sessions", f"{held}. Close one, or try again later")
+
+
+def no_such_session() -> Fault:
+    """The refusal of a session that is not there."""
+    return Fault("no_such_session", "no such session, or it has expired. Open a new one")
+
+
+class KeepsSessions(Protocol):
+    """Where sessions are: in this process, or shared by several."""
+
+    def __len__(self) -> int:
+        """Open sessions."""
+
+    @property
+    def full(self) -> bool:
+        """No more can be opened."""
+
+    async def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
+        """A new session. Raises Fault where there are too many, or too many of this owner's."""
+
+    async def get(self, session_id: str, owner: str) -> Session:
+        """An open session of this owner's, whose time begins anew. Raises Fault where there is none of that name."""
+
+    async def close(self, session_id: str, owner: str) -> None:
+        """End a session of this owner's. Raises Fault where there is none of that name."""
+
+    async def progress(self, session: Session) -> Progress:
+        """How far a session has come. Raises Fault where it is gone."""
+
+    async def keep(self, session: Session, before: Progress, after: Progress) -> bool:
+        """Put another in the place of a session's progress; False where that is not `before` any more."""
 
 
 class Sessions:
@@ -112,30 +164,37 @@ class Sessions:
         """No more can be opened."""
         return len(self) >= self._places.most
 
-    def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
+    async def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
         """A new session. Raises Fault where there are too many, or too many of this owner's."""
         self._expire()
-        if not self._places.take(owner):
-            whose = "" if self.full else " of this token"
-            held = f"{self._places.most if self.full else self._places.held(owner)} sessions{whose} are open"
-            raise Fault("too_many_sessions", f"{held}. Close one, or try again later")
+        if (held := place_refused(self._places, owner)) is not None:
+            raise too_many(held)
         made = new_session(owner, selection, seed, self._clock())
         self._open[made.id] = made
         return made
 
-    def get(self, session_id: str, owner: str) -> Session:
+    async def get(self, session_id: str, owner: str) -> Session:
         """An open session of this owner's, whose time begins anew. Raises Fault where there is none of that name."""
         self._expire()
         found = self._open.get(session_id)
         if found is None or found.owner != owner:
-            raise Fault("no_such_session", "no such session, or it has expired. Open a new one")
+            raise no_such_session()
         found.used_s = self._clock()
         self._open.move_to_end(session_id)
         return found
 
-    def close(self, session_id: str, owner: str) -> None:
+    async def close(self, session_id: str, owner: str) -> None:
         """End a session of this owner's. Raises Fault where there is none of that name."""
-        self._forget(self.get(session_id, owner))
+        self._forget(await self.get(session_id, owner))
+
+    async def progress(self, session: Session) -> Progress:
+        """How far a session has come."""
+        return session.progress
+
+    async def keep(self, session: Session, before: Progress, after: Progress) -> bool:
+        """Put another in the place of a session's progress."""
+        session.progress = after
+        return True
 
     def _forget(self, session: Session) -> None:
         del self._open[session.id]

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import Counter, deque
-from collections.abc import AsyncIterator, Callable, Collection
+from collections.abc import AsyncIterator, Callable, Collection, Mapping
 from contextlib import asynccontextmanager
 
 HALF_LIFE_S = 10.0  # of what has been used
+LEAST_S = 0.01  # of use lately, of whom there is reason to think
 MOST_SHARES = 4  # no owner takes more than this part of the places, where there are so many owners
 
 
@@ -28,6 +29,11 @@ class Shares:
         seconds, counted = self._used.get(owner, (0.0, 0.0))
         return seconds * 0.5 ** ((self._clock() - counted) / HALF_LIFE_S)
 
+    def is_above_mean(self, owner: str) -> bool:
+        """Whether an owner has used more lately than those did, on average, who have used something."""
+        others = [seconds for name in self._used if (seconds := self.used(name)) > LEAST_S]
+        return bool(others) and self.used(owner) > sum(others) / len(others)
+
     def add(self, owner: str, seconds: float) -> None:
         """Count seconds."""
         self._used[owner] = self.used(owner) + seconds, self._clock()
@@ -36,13 +42,15 @@ class Shares:
 class FairTurns:
     """So many turns at a time; those who wait get theirs in the order of what they have used, then of their coming.
 
+    The last one that is free is kept for who has not used more than the mean: they need not wait for those who have.
+
     Args:
         most: at a time.
         shares: counts the seconds of every turn.
     """
 
     def __init__(self, most: int, shares: Shares) -> None:
-        self._free, self._shares = most, shares
+        self._free, self._kept, self._shares = most, int(most > 1), shares
         self._waiting: dict[str, deque[asyncio.Future[None]]] = {}
 
     @asynccontextmanager
@@ -54,10 +62,10 @@ class FairTurns:
             yield
         finally:
             self._shares.add(owner, time.monotonic() - begun)
-            self._next()
+            self._end()
 
     async def _begin(self, owner: str) -> None:
-        if self._free:
+        if self._is_free_for(owner):
             self._free -= 1
             return
         mine: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -66,18 +74,24 @@ class FairTurns:
             await mine
         except asyncio.CancelledError:
             if mine.done() and not mine.cancelled():  # it had just become mine
-                self._next()
+                self._end()
             raise
 
-    def _next(self) -> None:
+    def _is_free_for(self, owner: str) -> bool:
+        return self._free > (self._kept if self._shares.is_above_mean(owner) else 0)
+
+    def _end(self) -> None:
+        """Give a turn to the next, if there is one."""
+        self._free += 1
         for owner in sorted(self._waiting, key=self._shares.used):
             line = self._waiting[owner]
             while line and line[0].done():  # given up
                 line.popleft()
-            if line:
+            if not line:
+                del self._waiting[owner]
+            elif self._is_free_for(owner):
+                self._free -= 1
                 return line.popleft().set_result(None)
-            del self._waiting[owner]
-        self._free += 1
 
 
 class Places:
@@ -89,11 +103,12 @@ class Places:
     Args:
         most: places there are.
         owners: gives the names for which places are kept.
+        held: places that are taken, by owner.
     """
 
-    def __init__(self, most: int, owners: Callable[[], Collection[str]]) -> None:
+    def __init__(self, most: int, owners: Callable[[], Collection[str]], held: Mapping[str, int] | None = None) -> None:
         self.most, self._owners = most, owners
-        self._held = Counter[str]()
+        self._held = Counter[str](held)
 
     @property
     def taken(self) -> int:

@@ -1,0 +1,123 @@
+"""Sessions that several replicas of a service share: any of them answers any request, whichever dies."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import sqlite3
+from collections import OrderedDict
+from collections.abc import Callable, Collection
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from clearway.deploy.navigator import Selection
+from clearway.serve.faults import Fault
+from clearway.serve.session_record import Shapes, UnsealedError, sealed, unsealed
+from clearway.serve.session_table import SessionTable
+from clearway.serve.sessions import Progress, Session, new_session, no_such_session, too_many
+
+Found = TypeVar("Found")
+
+
+class SharedSessions:
+    """Sessions in a table; see `KeepsSessions`. What an answer rests on is in the table before the answer is sent.
+
+    Args:
+        table: shared by all replicas.
+        most: sessions.
+        owners: gives the names that share them.
+        key: seals the records.
+        shapes: of the agent's state.
+    """
+
+    def __init__(
+        self, table: SessionTable, most: int, owners: Callable[[], Collection[str]], key: bytes, shapes: Shapes
+    ) -> None:
+        self._table, self._most, self._owners, self._key, self._shapes = table, most, owners, key, shapes
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="sessions")
+        self._known: OrderedDict[str, Session] = OrderedDict()  # that this replica has had to do with
+        self._count = 0  # lately
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def full(self) -> bool:
+        """No more can be opened."""
+        return self._count >= self._most
+
+    async def recount(self) -> None:
+        """Count the sessions of all replicas anew."""
+        self._count = await self._asked(self._table.count)
+
+    async def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
+        """See `KeepsSessions`."""
+        made = new_session(owner, selection, seed, 0.0)
+        record = sealed(made, made.progress, self._key)
+        held = await self._asked(self._table.open, made.id, owner, record, list(self._owners()))
+        if held is not None:
+            raise too_many(held)
+        return self._remembered(made)
+
+    async def get(self, session_id: str, owner: str) -> Session:
+        """See `KeepsSessions`."""
+        if not await self._asked(self._table.touch, session_id):
+            self._known.pop(session_id, None)
+            raise no_such_session()
+        found = self._known.get(session_id)
+        if found is None:
+            header, _ = await self._read(session_id)
+            found = Session(session_id, header["owner"], header["selection"], header["seed"], 0.0)
+        if found.owner != owner:
+            raise no_such_session()
+        return self._remembered(found)
+
+    async def close(self, session_id: str, owner: str) -> None:
+        """See `KeepsSessions`."""
+        await self.get(session_id, owner)
+        await self._forget(session_id)
+
+    async def progress(self, session: Session) -> Progress:
+        """See `KeepsSessions`."""
+        return (await self._read(session.id))[1]
+
+    async def keep(self, session: Session, before: Progress, after: Progress) -> bool:
+        """See `KeepsSessions`."""
+        return await self._asked(self._table.write, session.id, before.version, sealed(session, after, self._key))
+
+    async def _read(self, session_id: str) -> tuple[dict[str, Any], Progress]:
+        """Header and progress of a session. Raises Fault where it is gone, or was altered: then it goes."""
+        found = await self._asked(self._table.read, session_id)
+        if found is None:
+            raise no_such_session()
+        version, record = found
+        try:
+            header, progress = unsealed(record, self._key, self._shapes)
+            if header["id"] != session_id:
+                raise UnsealedError("it is another session's")
+        except UnsealedError as fault:
+            logging.getLogger("clearway.serve").error("the record of a session is refused: %s", fault)
+            await self._forget(session_id)
+            raise no_such_session() from fault
+        return header, replace(progress, version=version)
+
+    def _remembered(self, session: Session) -> Session:
+        """Its turn and how its pictures have been stay here, for as many as there may be."""
+        self._known[session.id] = session
+        self._known.move_to_end(session.id)
+        if len(self._known) > self._most:
+            self._known.popitem(last=False)
+        return session
+
+    async def _forget(self, session_id: str) -> None:
+        self._known.pop(session_id, None)
+        await self._asked(self._table.remove, session_id)
+
+    async def _asked(self, ask: Callable[..., Found], *arguments: object) -> Found:
+        """What the table answers, in a thread. Raises Fault where it cannot."""
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._thread, ask, *arguments)
+        except sqlite3.Error as fault:
+            logging.getLogger("clearway.serve").error("sessions cannot be kept: %s", fault)
+            raise Fault("overloaded", "no session can be kept now. Try again") from fault

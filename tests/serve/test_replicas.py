@@ -1,0 +1,127 @@
+"""Several replicas of the service at one address: they die, sessions go on."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+import clearway
+from helpers.running import PATIENT_S, Running, running
+from helpers.serving import TOKEN, grey
+from helpers.sums import Sums, plain
+
+AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch) -> Iterator[None]:
+    monkeypatch.setitem(__import__("helpers.running").running.ENVIRONMENT, "CLEARWAY_CACHE", str(tmp_path))
+    yield
+    assert not list(tmp_path.glob("replicas/*"))  # nothing is left of the sessions
+
+
+def until(holds, seconds: float = PATIENT_S) -> None:
+    deadline = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def walk(service: Running, number: int, ends: threading.Event, least: int, told: list[object]) -> None:
+    """Episodes of one session, each answer held against a navigator's own; adds how many steps, or what went wrong."""
+    try:
+        navigator, rng, steps = clearway.Navigator(Sums(), seed=number), np.random.default_rng(number), 0
+        with service.client() as client, client.session(seed=number) as session:
+            while steps < least or not ends.is_set():
+                if steps % 7 == 0:
+                    for walker in (session, navigator):
+                        walker.set_target(plain(number))
+                level = int(rng.integers(256))
+                expected, found = navigator.act(plain(level)), session.act(plain(level))
+                assert found[::2] == expected[::2]
+                steps += 1
+        told.append(steps)
+    except BaseException as fault:
+        told.append(fault)
+
+
+def walk_while_replicas_die(service: Running, sessions: int, kills: int, pause_s: float) -> int:
+    told: list[object] = []
+    ends, dice = threading.Event(), random.Random(5)
+    walkers = [threading.Thread(target=walk, args=(service, number, ends, 8, told)) for number in range(sessions)]
+    for walker in walkers:
+        walker.start()
+    for _ in range(kills):
+        time.sleep(pause_s * (0.5 + dice.random()))
+        until(lambda: service.process.poll() is not None or service.replicas())
+        os.kill(dice.choice(service.replicas()), signal.SIGKILL)
+    ends.set()
+    for walker in walkers:
+        walker.join()
+    assert len(told) == sessions and all(isinstance(steps, int) for steps in told), told
+    return sum(steps for steps in told if isinstance(steps, int))
+
+
+def test_replicas_die_under_load_and_no_session_is_lost_nor_a_step_walked_twice() -> None:
+    with running(replicas=2, seconds=0.002, health=True) as service:
+        steps = walk_while_replicas_die(service, sessions=6, kills=3, pause_s=0.5)
+        assert steps >= 6 * 8
+        until(lambda: len(service.replicas()) == 2)
+        own = f"http://127.0.0.1:{service.health_port}"
+        assert httpx.get(f"{own}/ready", timeout=PATIENT_S).status_code == 200
+        until(lambda: "clearway_sessions 0.0" in httpx.get(f"{own}/metrics", timeout=PATIENT_S).text)
+        lines = httpx.get(f"{own}/metrics", timeout=PATIENT_S).text.splitlines()
+        route = 'clearway_requests_total{route="/sessions/{session_id}/steps",status="200"} '
+        counted = [float(line.removeprefix(route)) for line in lines if line.startswith(route)]
+        assert counted and steps - 60 <= counted[0] <= steps + 60  # of all replicas, but for answers that died
+        replicas = service.replicas()
+        service.process.send_signal(signal.SIGTERM)
+        assert service.process.wait(PATIENT_S) == 0
+        for replica in replicas:
+            with pytest.raises(ProcessLookupError):
+                os.kill(replica, 0)
+
+
+@pytest.mark.slow
+def test_many_replicas_die_under_load() -> None:
+    with running(replicas=3, seconds=0.005) as service:
+        print(walk_while_replicas_die(service, sessions=20, kills=20, pause_s=2.0), "steps")
+        service.process.send_signal(signal.SIGTERM)
+        assert service.process.wait(PATIENT_S) == 0
+
+
+def test_a_stream_goes_on_in_another_replica_and_limits_hold_over_all(tmp_path: Path) -> None:
+    with running(replicas=2, sessions=2) as service, service.client() as client:
+        session = client.session(selection="argmax")
+        session.set_target(plain(1))
+        address = f"ws://127.0.0.1:{service.port}/sessions/{session.session_id}/stream"
+        with connect(address, additional_headers=AUTHORISED) as stream:
+            stream.send(grey(2))
+            lost = stream.recv(timeout=PATIENT_S)
+            for replica in service.replicas():
+                os.kill(replica, signal.SIGKILL)
+            with pytest.raises(ConnectionClosed):
+                stream.recv(timeout=PATIENT_S)
+        with connect(address + "?step=1", additional_headers=AUTHORISED, open_timeout=PATIENT_S) as stream:
+            stream.send(grey(2))
+            assert stream.recv(timeout=PATIENT_S) == lost
+            stream.send(grey(3))
+            assert '"step":2' in stream.recv(timeout=PATIENT_S)
+        codes = []
+        for _ in range(4):  # each on a connection of its own, to whichever replica takes it
+            answer = httpx.post(f"{service.url}/sessions", json={}, headers=AUTHORISED, timeout=PATIENT_S)
+            codes.append(answer.status_code)
+        assert codes == [201, 429, 429, 429]
+        service.process.send_signal(signal.SIGTERM)
+        assert service.process.wait(PATIENT_S) == 0
