@@ -22,16 +22,22 @@ from pathlib import Path
 import atheris
 
 with atheris.instrument_imports(include=["clearway"]):
+    from clearway.deploy.onnx_file import check_seal, sealed
+    from clearway.deploy.onnx_graph_check import problem_of
     from clearway.errors import ClearwayError
     from clearway.evaluation.episode_files import read_episodes
     from clearway.importers.archives import unpacked
     from clearway.importers.avd import read_avd
     from clearway.importers.images import read_images
+    from clearway.importers.mjcf_files import files_of_model
     from clearway.importers.savn import read_savn
     from clearway.learn.checkpoint import read_network
+    from clearway.learn.run_folder import RunFolder
+    from clearway.mapping.map_files import read_map
     from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
     from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
     from clearway.scenes.thor_v1 import read_scene, write_scene
+    from clearway.settings_file import read_settings
 
 import numpy as np
 
@@ -57,6 +63,14 @@ def read_archive(path: Path) -> None:
     with unpacked([path], (".h5",)) as files:
         for file in files[:3]:
             read_everything(file)
+
+
+def read_graph(path: Path) -> None:
+    """What stands before onnxruntime: the seal, and the check of what a graph asks for."""
+    content = path.read_bytes()
+    with contextlib.suppress(ValueError):  # no message of protobuf, which `read_onnx` tells in a line
+        problem_of(content)
+    check_seal(content, str(path))
 
 
 def scene_bytes() -> bytes:
@@ -113,6 +127,22 @@ def episodes_bytes() -> bytes:
     return json.dumps({"format_version": 1, "about": {}, "episodes": {key: [1] for key in columns}}).encode()
 
 
+def map_bytes() -> bytes:
+    """Tensors of the names that a map has."""
+    from safetensors.numpy import save
+
+    shapes = {"room": (5, 5), "shut": (4, 5, 5), "taken": (1, 3), "features": (1, 3)}
+    return save({name: np.zeros(shape, np.float32) for name, shape in shapes.items()})
+
+
+def graph_bytes() -> bytes:
+    """A graph of one node with two attributes, sealed."""
+    mark = b"clearway.sha256" + b"\x12\x40" + b"0" * 64
+    node = b"\x22\x03Add" + b"\x2a\x04\x32\x02\x0a\x00" + b"\x2a\x06\x2a\x04\x08\x01\x10\x01"
+    graph = bytes([10, len(node)]) + node
+    return sealed(bytes([0x3A, len(graph)]) + graph + bytes([0x72, len(mark) + 2, 10, 15]) + mark)
+
+
 READERS: tuple[tuple[str, Callable[[Path], object], Callable[[], bytes]], ...] = (
     ("scene.h5", read_everything, scene_bytes),
     ("plan.txt", read_plans, lambda: b"..#\n...\n"),
@@ -124,6 +154,17 @@ READERS: tuple[tuple[str, Callable[[Path], object], Callable[[], bytes]], ...] =
     ("poses.csv", lambda path: read_images(path, step_m=0.5), lambda: b"file,x,z,heading\nposes.csv,0,0,0\n"),
     ("network.safetensors", lambda path: read_network(path.parent), network_bytes),
     ("trial.json", read_episodes, episodes_bytes),
+    (
+        "world.xml",
+        files_of_model,
+        lambda: (
+            b'<mujoco><compiler meshdir="a"/><include file="world.xml"/><asset><mesh file="b.stl"/></asset></mujoco>'
+        ),
+    ),
+    ("agent.onnx", read_graph, graph_bytes),
+    ("metrics.jsonl", lambda path: RunFolder(path.parent).metrics(), lambda: b'{"frames": 80, "seconds": 1}\n' * 2),
+    ("room.map", lambda path: read_map(path, "eyes", 3), map_bytes),
+    ("run.yaml", read_settings, lambda: b"frames: 6e5\nset: {envs: 10}\n"),
 )
 
 
