@@ -108,3 +108,28 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
             assert not interval or [*map(float, interval)] == [*map(float, recorded)]
     verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
+
+
+def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
+    records["unpack"](DOCS / "records" / "zones-or-step-bathroom.tar.xz", tmp_path / "zones")
+    (section,) = gather(tmp_path / "zones").sections
+    assert not section.missing
+    table = section.tables[-1]
+    rows = {row["agent"]: row for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows)}
+    told = {
+        "shortest": "| shortest | 812",
+        "dearer": "| steps as dear as zones",
+        "shuffled": "| zones of shuffled",
+        "collision-aware": "| collision-aware | 460",
+    }
+    lines = (DOCS / "results.md").read_text(encoding="utf-8").splitlines()
+    for agent, begin in told.items():
+        (line,) = [line for line in lines if line.startswith(begin)]
+        _, frames, settled = line.strip("|").split("|")
+        mean, *interval = numbers(frames.replace(",", ""))
+        expect(mean, rows[agent]["frames"], agent)
+        assert interval == numbers(str(rows[agent]["95 %"]).replace(",", ""))
+        assert int(settled.split()[0]) == rows[agent]["settled"]
+    verdicts = [claim.verdict for claim in section.claims]
+    assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
