@@ -8,18 +8,18 @@ from clearway.experiments.board import RunState, clock, state_of, state_table
 from clearway.experiments.job import do
 from clearway.experiments.plan import Job
 from clearway.reward import COLLISION_AWARE
-from helpers.small_setting import small_setting
+from helpers.small_setting import FRAMES, small_setting
 
 
 def test_a_run_s_state_is_read_from_its_files(tmp_path: Path) -> None:
     setting = small_setting(tmp_path, seeds=1)
     (run,) = setting.runs(setting.learners["default"], COLLISION_AWARE)
     job = Job(run, (setting.trial(),))
-    assert state_of(tmp_path, job, under_way=False) == RunState(run.name, "waiting", 0, 800, None, 0, 5, None)
+    assert state_of(tmp_path, job, under_way=False) == RunState(run.name, "waiting", 0, FRAMES, None, 0, 5, None)
     assert state_of(tmp_path, job, under_way=True).state == "training"
     do(tmp_path, job, threads=1)
     done = state_of(tmp_path, job, under_way=False)
-    assert (done.state, done.frames, done.seconds_left) == ("done", 800, 0)
+    assert (done.state, done.frames, done.seconds_left) == ("done", FRAMES, 0)
     assert done.frames_per_s > 0
     (trial,) = (tmp_path / "runs" / run.name / "trials").iterdir()
     trial.unlink()

@@ -47,7 +47,7 @@ def test_an_interrupted_job_ends_with_the_same_episodes(tmp_path: Path, monkeypa
     job = made_job(tmp_path / "whole")
     do(tmp_path / "whole", job, threads=1)
     monkeypatch.setattr(train, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
-    update, left = Trainer.update, 7
+    update, left = Trainer.update, 3
 
     def stop_after_some(self: Trainer) -> Figures:
         nonlocal left
@@ -86,4 +86,4 @@ def test_milestones_are_kept_beside_the_checkpoints(tmp_path: Path) -> None:
     job = made_job(tmp_path)
     do(tmp_path, job, threads=1)
     folder = run_folder(tmp_path, job.run)
-    assert [path.name for path in folder.milestone(job.run.halfway).iterdir()] == ["frames-000000000400"]
+    assert [path.name for path in folder.milestone(job.run.halfway).iterdir()] == ["frames-000000000240"]
