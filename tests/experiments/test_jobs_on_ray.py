@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 # Ray reads these when it is imported; all processes of a cluster must share the token
 os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
 ray = pytest.importorskip("ray")
+services = pytest.importorskip("ray._private.services")
 
 
 @pytest.fixture(autouse=True)
@@ -103,7 +105,9 @@ def test_more_threads_than_any_node_has_are_refused(tmp_path: Path) -> None:
         run_jobs(setting.out, jobs_of(setting), ray="local", workers=None, threads=3, show=nothing)
 
 
-def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path) -> None:
+def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(services, "find_gcs_addresses", cache(set))  # another test's cluster, which runs beside this one
+    monkeypatch.setattr(services, "find_bootstrap_address", lambda *_: None)
     setting = small_setting(tmp_path, seeds=1)
     with pytest.raises(RunError, match=r"--ray auto: no cluster.*--ray local"):
         run_jobs(setting.out, jobs_of(setting), ray="auto", workers=None, threads=1, show=nothing)
