@@ -106,7 +106,9 @@ def test_more_threads_than_any_node_has_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_cluster_that_is_not_there_is_said_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(services, "find_gcs_addresses", cache(set))  # another test's cluster, which runs beside this one
+    monkeypatch.setattr(
+        services, "find_gcs_addresses", cache(set)
+    )  # another test's cluster, which runs beside this one
     monkeypatch.setattr(services, "find_bootstrap_address", lambda *_: None)
     setting = small_setting(tmp_path, seeds=1)
     with pytest.raises(RunError, match=r"--ray auto: no cluster.*--ray local"):
