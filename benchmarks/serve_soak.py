@@ -15,20 +15,19 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 from statistics import median
 
 import httpx
 from serve_attack import (
-    ANSWER_S,
     ROBOTS,
-    TOKENS,
+    Step,
     attacking,
+    by_requests,
     counted,
     hostile_pictures,
-    opened,
-    robot_pictures,
     served_to_robots,
     walked,
 )
@@ -57,8 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             with attacking(url, hostile_pictures(), options.attack_per_s):
                 until, visit = time.monotonic() + 60 * options.minutes, 0
                 while time.monotonic() < until:
-                    walk = streamed if visit % 2 else walked
-                    acts[visit % 2] += len(asyncio.run(walk(url, options.robots, options.every_s, VISIT_S)))
+                    stepping = by_stream if visit % 2 else by_requests
+                    acts[visit % 2] += len(asyncio.run(walked(url, options.robots, options.every_s, VISIT_S, stepping)))
                     visit += 1
             figures = counted(url)
         finally:
@@ -87,26 +86,18 @@ def report(
         record.write_text(json.dumps({**said, **halves, "minute_median_most_mib": rows}) + "\n", encoding="utf-8")
 
 
-async def streamed(url: str, robots: int, every_s: float, seconds: float) -> list[float]:
-    """Seconds that each act took of robots that step by WebSockets."""
-    files, until = robot_pictures(), time.monotonic() + seconds
+@asynccontextmanager
+async def by_stream(http: httpx.AsyncClient, url: str, path: str) -> AsyncIterator[Step]:
+    """Steps of a session by a WebSocket."""
     bearing = {"authorization": ROBOTS["authorization"]}
+    async with connect(f"{url.replace('http', 'ws', 1)}{path}/stream", additional_headers=bearing) as stream:
 
-    async def walk(number: int, http: httpx.AsyncClient) -> list[float]:
-        path, found = await opened(http, TOKENS["robots"], files[number % 8]), list[float]()
-        async with connect(f"{url.replace('http', 'ws', 1)}{path}/stream", additional_headers=bearing) as stream:
-            while (begun := time.monotonic()) < until:
-                await stream.send(files[len(found) % 8])
-                answer = json.loads(await stream.recv())
-                assert "error" not in answer, f"a robot was refused: {answer}"
-                found.append(time.monotonic() - begun)
-                await asyncio.sleep(max(every_s - found[-1], 0))
-        await http.delete(path, headers=ROBOTS)
-        return found
+        async def step(picture: bytes) -> None:
+            await stream.send(picture)
+            answer = json.loads(await stream.recv())
+            assert "error" not in answer, f"a robot was refused: {answer}"
 
-    async with httpx.AsyncClient(base_url=url, timeout=ANSWER_S) as http:
-        times = await asyncio.gather(*(walk(number, http) for number in range(robots)))
-    return [each for robot in times for each in robot]
+        yield step
 
 
 def watched(pid: int, seen: list[tuple[float, float]], over: threading.Event) -> None:

@@ -1,6 +1,5 @@
 """Jobs on Ray. Slow: starting a cluster takes some ten seconds."""
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
@@ -15,12 +14,10 @@ from clearway.experiments.plan import Job
 from clearway.experiments.setting import Setting
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.reward import COLLISION_AWARE
+from helpers.on_ray import MARKS, ray
 from helpers.small_setting import small_setting
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-# Ray reads these when it is imported; all processes of a cluster must share the token
-os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
-ray = pytest.importorskip("ray")
+pytestmark = MARKS
 services = pytest.importorskip("ray._private.services")
 
 

@@ -14,27 +14,17 @@ from clearway.learn import ray_workers
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
+from helpers.on_ray import MARKS, cluster_here
 from helpers.small_runs import equal_bits, small_learner, small_request
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-# Ray reads these when it is imported; all processes of a cluster must share the token
-os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
-ray = pytest.importorskip("ray")
+pytestmark = MARKS
 UPDATES = 60
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _one_cluster() -> Iterator[None]:
-    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    ray.init(
-        "local",
-        num_cpus=2,
-        include_dashboard=False,
-        log_to_driver=False,
-        runtime_env={"env_vars": {"PYTHONPATH": path}},
-    )
-    yield
-    ray.shutdown()
+    with cluster_here(2):
+        yield
 
 
 def trained(out: Path, where: str | None = "local") -> None:

@@ -133,7 +133,10 @@ def test_training_does_not_wait_for_a_copy(s3: S3, tmp_path: Path, monkeypatch: 
         return update(trainer)
 
     monkeypatch.setattr(Trainer, "update", counted)
-    begun = lambda _: monkeypatch.setattr(Store, "upload", slow)  # noqa: E731
+
+    def begun(folder: Path) -> None:
+        monkeypatch.setattr(Store, "upload", slow)
+
     training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS, on_begin=begun)
     assert RunCopy(ADDRESS).restore(tmp_path / "again")
     assert without_times(tmp_path / "again") == without_times(tmp_path / "run")

@@ -1,6 +1,5 @@
 """Encoding on Ray. Slow: starting a cluster takes some ten seconds."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +12,9 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import corridor_scene, grid_scene
+from helpers.on_ray import MARKS, ray
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-# Ray reads these when it is imported; all processes of a cluster must share the token
-os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
-ray = pytest.importorskip("ray")
+pytestmark = MARKS
 
 
 def test_a_ray_cluster_encodes_as_one_thread_does(

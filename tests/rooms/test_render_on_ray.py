@@ -1,6 +1,5 @@
 """Rendering on Ray. Slow: starting a cluster takes some ten seconds."""
 
-import os
 from dataclasses import replace
 
 import mujoco
@@ -11,12 +10,10 @@ from clearway.errors import RenderError
 from clearway.rooms import render as rendering
 from clearway.rooms.camera import View, first_person_view
 from clearway.rooms.render import render
+from helpers.on_ray import MARKS, ray
 from helpers.small_rooms import SmallRoom
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-# Ray reads these when it is imported; all processes of a cluster must share the token
-os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
-ray = pytest.importorskip("ray")
+pytestmark = MARKS
 
 
 @pytest.fixture(scope="module")

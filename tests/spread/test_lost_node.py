@@ -1,6 +1,5 @@
 """A node of a Ray cluster that is killed: its parts go on elsewhere, or one line ends them. Slow: clusters start."""
 
-import os
 import threading
 import time
 from collections.abc import Iterator
@@ -14,12 +13,10 @@ from clearway.errors import RunError
 from clearway.spread import on_ray
 from clearway.spread.workers import Work, workers_for
 from helpers import spread_parts as parts
+from helpers.on_ray import MARKS, WITH_HELPERS, ray
 from helpers.spread_parts import died, noted, wait_for
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-# Ray reads these when it is imported; all processes of a cluster must share the token
-os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
-ray = pytest.importorskip("ray")
+pytestmark = MARKS
 ENDS_WITHIN_S = 60.0  # with `LOST_S` of 4 s
 
 
@@ -28,8 +25,7 @@ def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A head on which nothing is done, to which nodes are added."""
     from ray.cluster_utils import Cluster
 
-    path = os.pathsep.join([str(Path(parts.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    monkeypatch.setenv("PYTHONPATH", path)
+    monkeypatch.setenv("PYTHONPATH", WITH_HELPERS)
     made = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
     yield made
     ray.shutdown()

@@ -1,6 +1,5 @@
 """Work on Ray. Slow: starting a cluster takes some ten seconds."""
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from functools import partial
@@ -11,26 +10,16 @@ import pytest
 from clearway.errors import RunError, SceneError
 from clearway.spread.workers import Work, workers_for
 from helpers import spread_parts as parts
+from helpers.on_ray import MARKS, cluster_here
 from helpers.spread_parts import died, no_tool, noted
 
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-# Ray reads these when it is imported; all processes of a cluster must share the token
-os.environ.update(RAY_USAGE_STATS_ENABLED="0", RAY_AUTH_MODE="token", RAY_AUTH_TOKEN="for-this-test-alone-0123456789")
-ray = pytest.importorskip("ray")
+pytestmark = MARKS
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _one_cluster() -> Iterator[None]:
-    path = os.pathsep.join([str(Path(parts.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    ray.init(
-        "local",
-        num_cpus=1,
-        include_dashboard=False,
-        log_to_driver=False,
-        runtime_env={"env_vars": {"PYTHONPATH": path}},
-    )
-    yield
-    ray.shutdown()
+    with cluster_here(1):
+        yield
 
 
 def test_results_come_in_order_from_workers_set_up_once(tmp_path: Path) -> None:
