@@ -89,7 +89,7 @@ def test_before_others_it_needs_a_token_of_one_s_own_and_warns_without_tls(clear
     assert "WARNING: NOT ENCRYPTED" in clearway("serve", "x.onnx", "--host", "0.0.0.0").err
     assert "WARNING" not in clearway("serve", "x.onnx").err
     assert clearway("serve", "x.onnx", "--tls-cert", "x.pem").refusal("go together")
-    assert "without a token: port" in clearway("serve", "x.onnx", "--health-port", "0").err
+    assert "without a token: http://127.0.0.1:" in clearway("serve", "x.onnx", "--health-port", "0").err
 
 
 def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, served):

@@ -71,7 +71,7 @@ class Serve:
         from clearway.serve.sessions import state_bytes
         from clearway.serve.tokens import ALONE, Tokens, checked_token, read_tokens
         from clearway.web.guard import new_token
-        from clearway.web.local import address_of, is_loopback, listening, port_of
+        from clearway.web.local import address_of, is_loopback, listening
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
         if not 1 <= self.replicas <= MOST_REPLICAS:
@@ -91,15 +91,15 @@ class Serve:
 
         agent = servable_agent(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener, self._health() as health:
-            local, tls = is_loopback(listener), self.tls_cert is not None
+            local, scheme = is_loopback(listener), "http" if self.tls_cert is None else "https"
             if not local and self.tokens is None and not own:
                 problem = f"--host {self.host} is reached by others, and no token of yours is set"
                 raise ClearwayError(f"{problem}. Set {TOKEN_VARIABLE}, or name a file by --tokens")
-            say(f"scene {agent.card.scene}: {address_of(listener, self.host, 'https' if tls else 'http')}")
-            if not local and not tls:
+            say(f"scene {agent.card.scene}: {address_of(listener, self.host, scheme)}")
+            if not local and scheme == "http":
                 say(UNENCRYPTED)
             if health is not None:
-                say(f"health and metrics, without a token: port {port_of(health)}")
+                say(f"health and metrics, without a token: {address_of(health, self.host, scheme)}")
             if self.tokens is None and not own:
                 say(f"token: {token}")
             if not agent.card.tells_arrival:
