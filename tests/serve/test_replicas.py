@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -18,6 +19,7 @@ from websockets.sync.client import connect
 
 import clearway
 from clearway.children import ChildProcess
+from clearway.errors import DeployError
 from clearway.serve import replicas
 from clearway.serve.limits import Limits
 from clearway.serve.replica import Beats
@@ -179,3 +181,28 @@ def test_tokens_that_change_while_a_replica_starts_reach_it(tmp_path: Path, monk
         code = place._process.exitcode
         place.kill()
     assert code == -signal.SIGHUP
+
+
+def test_a_service_ends_where_no_replica_can_begin(monkeypatch) -> None:
+    monkeypatch.setattr(replicas, "MOST_FAILED", 2)
+    monkeypatch.setattr(replicas, "PAUSES_S", (0.0, 0.0))
+    with listening(0) as listener:
+        network, tokens = Network(listener), Tokens([(ALONE, TOKEN)])
+        with pytest.raises(DeployError, match="no replica begins to answer, 2 tries"):
+            replicas.run_replicas(partial(open, "no-such-agent.onnx"), network, tokens, None, Limits(), 1)
+
+
+def test_a_replica_that_has_answered_is_started_again_for_ever(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(replicas, "MOST_FAILED", 0)
+    with listening(0) as listener:
+        common = common_of(tmp_path, Network(listener), Tokens([(ALONE, TOKEN)]))
+        place = replicas._Place(common, 0)
+        with pytest.raises(DeployError):
+            replicas._check_begun([place])
+        place.look()
+        common.beats.beat(0, True)
+        place.look()
+        place.kill()
+        place.look()
+        assert not place.is_alive and place.failed == 0
+        replicas._check_begun([place])

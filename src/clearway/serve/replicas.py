@@ -22,6 +22,7 @@ from types import FrameType
 from clearway import files
 from clearway.children import ChildProcess, signals_held
 from clearway.deploy.agent import DeployedAgent
+from clearway.errors import DeployError
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import count_no_more, count_together
 from clearway.serve.replica import Beats, Replica
@@ -38,6 +39,7 @@ END_S = 6.0  # beyond a request's deadline, after which a replica that has not e
 STUCK_S = 30.0  # without a beat, after which a replica is ended
 START_S = 120.0  # for a replica's first beat
 SHORT_S = 10.0  # what ended sooner is started again after a pause
+MOST_FAILED = 5  # replicas in each place, before any has begun to answer: then none will
 PAUSES_S = (0.2, 5.0)  # the first, and the longest; they double
 
 
@@ -97,6 +99,9 @@ def run_replicas(
         tokens_file: which SIGHUP reads again; None: none.
         limits: of the whole service.
         count: of replicas.
+
+    Raises:
+        DeployError: none begins to answer, however often it is tried.
     """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     beats = Beats(multiprocessing.get_context("spawn").RawArray("d", 2 * count))
@@ -109,19 +114,26 @@ def run_replicas(
                 while not ending:
                     for place in places:
                         place.look()
+                    _check_begun(places)
                     wait([place.sentinel for place in places if place.sentinel is not None], LOOKS_EVERY_S)
         finally:
             _end(places, limits.deadline_s + END_S, lambda: ending.count(signal.SIGINT) > 1)
 
 
 class _Place:
-    """Where one replica is, and after it the next."""
+    """Where one replica is, and after it the next.
+
+    Attributes:
+        has_answered: one of them has begun to answer.
+        failed: how many ended before that.
+    """
 
     def __init__(self, common: Common, number: int) -> None:
         self._common, self._number = common, number
         self._process: ChildProcess | None = None
         self._begun_s, self._next_s, self._pause_s = 0.0, 0.0, PAUSES_S[0]
-        self._told = 0  # signals, also where there was no replica to tell
+        self._told = self._told_before = 0  # signals, also where there was no replica to tell; before it started
+        self.has_answered, self.failed = False, 0
 
     @property
     def sentinel(self) -> int | None:
@@ -140,8 +152,9 @@ class _Place:
             if now >= self._next_s:
                 self._start(now)
             return
-        if self._process.is_alive():
-            last_s = self._common.beats.last_s(self._number)
+        alive, last_s = self._process.is_alive(), self._common.beats.last_s(self._number)
+        self.has_answered = self.has_answered or last_s > 0
+        if alive:
             if now > (last_s + STUCK_S if last_s else self._begun_s + START_S):
                 self._process.kill()
             return
@@ -152,6 +165,8 @@ class _Place:
 
     def _pause(self, now: float, reason: str | None) -> None:
         """Let another replica take the place of one that ended: soon, later where it ended early again and again."""
+        untold = self._told == self._told_before  # else SIGHUP may have ended it, and it is to have other tokens
+        self.failed += untold and not self.has_answered
         log = logging.getLogger("clearway.serve")
         log.warning("replica %d has ended (%s); another takes its place", self._number + 1, reason)
         lasted = now - self._begun_s >= SHORT_S
@@ -161,7 +176,7 @@ class _Place:
     def _start(self, now: float) -> None:
         name = f"replica-{self._number + 1}"
         process = ChildProcess(target=serve_replica, args=(self._common, self._number), name=name)
-        self._begun_s, told = now, self._told
+        self._begun_s, self._told_before = now, self._told
         try:
             with signals_held(signal.SIGINT):  # the terminal's: the parent tells its replicas by SIGTERM
                 process.start()
@@ -169,7 +184,7 @@ class _Place:
             self._pause(now, fault.strerror)
         else:
             self._process = process
-            if self._told != told:  # to read the tokens again, when it may have had the old ones already
+            if self._told != self._told_before:  # to read the tokens again, when it may have had the old ones already
                 self.tell(signal.SIGHUP)
 
     def tell(self, number: signal.Signals) -> None:
@@ -189,6 +204,13 @@ class _Place:
 def _tell(places: list[_Place], number: signal.Signals) -> None:
     for place in places:
         place.tell(number)
+
+
+def _check_begun(places: list[_Place]) -> None:
+    """Raise DeployError where no replica has ever answered, and every place has had enough of them."""
+    if not any(place.has_answered for place in places) and all(place.failed >= MOST_FAILED for place in places):
+        problem = f"no replica begins to answer, {MOST_FAILED} tries in each place"
+        raise DeployError(f"{problem}. Mend what the lines above say, or try without --replicas")
 
 
 def _end(places: list[_Place], within_s: float, at_once: Callable[[], bool]) -> None:
