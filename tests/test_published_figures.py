@@ -13,6 +13,7 @@ from clearway.experiments.reproduce import gather
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "seeing.md").read_text(encoding="utf-8")
+AGENTS = r"collision-aware|dearer|shuffled|shortest"
 COLUMNS = ("success", "success_4x", "spl", "collisions")
 SHARES = ("success", "success_4x", "spl")
 THIRD, FOURTH = "generalist-test-third.json", "generalist-test-fourth.json"
@@ -131,5 +132,17 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         expect(mean, rows[agent]["frames"], agent)
         assert interval == numbers(str(rows[agent]["95 %"]).replace(",", ""))
         assert int(settled.split()[0]) == rows[agent]["settled"]
+    evidence = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones, or a larger step?")[2]
+    claims = {" than ".join(re.findall(AGENTS, claim.text)): claim for claim in section.claims[1:]}
+    claims["collision-aware than shortest"] = section.claims[0]
+    for name, claim in claims.items():
+        (line,) = [line for line in evidence.splitlines() if line.startswith(f"| {name} |")]
+        _, difference, p, corrected, verdict = (cell.strip() for cell in line.strip("|").split("|"))
+        mean, low, high = (float(end.replace(",", "")) for end in re.findall(r"-?\d[\d,]*", difference))
+        found = claim.numbers["difference"]
+        for written, value in zip((mean, low, high), (found.value, *found.interval), strict=True):
+            assert abs(written - value) <= 500
+        assert f"p = {p}, for 5 claims {corrected} (Holm)" in claim.evidence
+        assert verdict == claim.verdict
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]

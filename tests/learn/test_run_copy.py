@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import ClearwayError
+from clearway.learn import run_copy
 from clearway.learn import train as training
 from clearway.learn.checkpoint import checkpoints, newest_checkpoint, read_network, read_training
 from clearway.learn.run_copy import RunCopy
@@ -113,10 +114,22 @@ def test_a_training_goes_on_without_a_store_and_says_so(
     def full(_: Path) -> None:
         monkeypatch.setattr(Store, "upload", refused)
 
-    warned = pytest.warns(UserWarning, match="not copied: s3://rooms: is full. Make room. Training goes on")
+    warned = pytest.warns(UserWarning, match="not copied: s3://rooms: is full. Make room. The run itself is whole")
     with warned, pytest.raises(ClearwayError, match="is full"):
         training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS, on_begin=full)
     assert newest_checkpoint(RunFolder(tmp_path / "run").checkpoints).name.endswith(f"{FRAMES}")
+
+
+def test_a_disk_that_is_full_does_not_end_training(s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run_copy, "_snapshot", full)
+        with pytest.warns(UserWarning, match="not copied.*No space left"):
+            training.train(REQUEST, tmp_path / "run", copy_to=ADDRESS)
+    assert newest_checkpoint(RunFolder(tmp_path / "run").checkpoints).name.endswith(f"{FRAMES}")
+    assert not list((tmp_path / "run").glob(".copied-*"))
 
 
 def test_training_does_not_wait_for_a_copy(s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

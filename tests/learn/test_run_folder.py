@@ -222,3 +222,19 @@ def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="out"):
         with RunFolder(tmp_path / "out").held():
             pass
+
+
+def test_a_run_that_fails_at_once_takes_away_what_it_wrote_alone(tmp_path: Path) -> None:
+    record = record_of(small_request())
+    for name, own in (("new", {}), ("own", {"run.yaml": "seed: 3", "notes.txt": "mine", "milestones/5/kept": "mine"})):
+        folder = RunFolder(tmp_path / name)
+        for path, text in own.items():
+            (folder.path / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder.path / path).write_text(text)
+        with pytest.raises(ZeroDivisionError), folder.held(), folder.begun(record, resume=False):
+            assert folder.exists
+            folder.metrics_path.write_text("")
+            raise ZeroDivisionError
+        left = {path.relative_to(folder.path).as_posix() for path in folder.path.rglob("*") if path.is_file()}
+        assert left - {".lock"} == set(own)
+    assert not (tmp_path / "new").exists()

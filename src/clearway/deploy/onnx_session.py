@@ -69,7 +69,7 @@ class BoundedSession:
             return self._session.run(list(outputs), dict(given), run)
         except Exception as fault:  # as above
             limits = f"{TIME_LIMIT_S:g} s and {MEMORY_LIMIT_BYTES >> 30} GiB"
-            problem = f"{self._source}: its graph cannot be run within {limits} ({_said(fault)})"
+            problem = f"{self._source}: its graph cannot be run ({_said(fault)}; its limits: {limits})"
             raise DeployError(f"{problem}. Export it again, or give fewer pictures at once") from fault
         finally:
             ended.cancel()

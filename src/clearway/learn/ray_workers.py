@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -107,10 +108,13 @@ class _Crew:
         return [found[reference] for reference in self.under_way]
 
     def _show(self, view: ProgressView) -> None:
-        """How far training has come, by its last row of metrics."""
-        if self.task.show_progress and (rows := RunFolder(self.task.out).metrics()):
-            targets = sum(len(states) for states in self.task.request.targets.values())
-            view.show(int(rows[-1]["frames"]), int(rows[-1]["solved_targets"]), targets)
+        """How far training has come, by its last row of metrics; nothing where they cannot be read now."""
+        if not self.task.show_progress:
+            return
+        with suppress(RunError):  # the next look may see more; the training itself goes on
+            if rows := RunFolder(self.task.out).metrics():
+                targets = sum(len(states) for states in self.task.request.targets.values())
+                view.show(int(rows[-1]["frames"]), int(rows[-1]["solved_targets"]), targets)
 
     def end(self) -> None:
         """End those that are left, and give their room back."""

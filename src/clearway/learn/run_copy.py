@@ -143,13 +143,22 @@ class CopyingMeanwhile:
         """Copy a run folder as it is now, unless a copy is under way.
 
         Warns:
-            UserWarning: the copy before failed; training goes on, and the next checkpoint is copied again.
+            UserWarning: this copy or the one before failed; training goes on, and the next checkpoint is copied again.
         """
         if self._thread is not None and self._thread.is_alive():
             return
         self.wait()
-        part = Path(tempfile.mkdtemp(prefix=COPIED, dir=folder))
-        _snapshot(folder, part)
+        try:
+            part = Path(tempfile.mkdtemp(prefix=COPIED, dir=folder))
+        except OSError as fault:
+            self._warn(fault)
+            return
+        try:
+            _snapshot(folder, part)
+        except OSError as fault:
+            shutil.rmtree(part, ignore_errors=True)
+            self._warn(fault)
+            return
         self._thread = threading.Thread(target=self._update, args=(part,), daemon=True)
         self._thread.start()
 
@@ -159,7 +168,10 @@ class CopyingMeanwhile:
             self._thread.join()
         fault, self._fault, self._thread = self._fault, None, None
         if fault is not None:
-            warnings.warn(f"not copied: {fault}. Training goes on", stacklevel=3)
+            self._warn(fault)
+
+    def _warn(self, fault: Exception) -> None:
+        warnings.warn(f"not copied: {fault}. The run itself is whole where it is trained", stacklevel=4)
 
     def _update(self, part: Path) -> None:
         try:

@@ -16,7 +16,7 @@ import math
 import shutil
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -214,24 +214,24 @@ class RunFolder:
 
     @contextmanager
     def begun(self, record: RunRecord, resume: bool) -> Iterator[list[str] | None]:
-        """As `begin`; where the run begins, and fails before its first checkpoint, it is removed again."""
-        fresh = not self.exists
+        """As `begin`; where the run begins, and fails before its first checkpoint, what it wrote is removed again."""
+        fresh, before = not self.exists, {path.name for path in self.path.iterdir()}
         other_bits = self.begin(record, resume)
         try:
             yield other_bits
         except Exception:
             if fresh and not any(self.checkpoints.glob("frames-*")):
-                self._forget()
+                self._forget(before)
             raise
 
-    def _forget(self) -> None:
-        """Remove the run, and the folder where it holds nothing else."""
-        for name in (RUN_FILE, METRICS_FILE, SETTINGS_FILE):
+    def _forget(self, before: Collection[str]) -> None:
+        """Remove the run but for what was there before it, and the folder where it holds nothing else."""
+        for name in {RUN_FILE, METRICS_FILE, SETTINGS_FILE}.difference(before):
             (self.path / name).unlink(missing_ok=True)
-        for folder in (self.checkpoints, self.path / MILESTONES):
-            shutil.rmtree(folder, ignore_errors=True)
+        for name in {CHECKPOINTS, MILESTONES}.difference(before):
+            shutil.rmtree(self.path / name, ignore_errors=True)
         if not any(path.name != LOCK_FILE for path in self.path.iterdir()):
-            shutil.rmtree(self.path)
+            shutil.rmtree(self.path, ignore_errors=True)
 
     def begin(self, record: RunRecord, resume: bool) -> list[str] | None:
         """Begin a run here, or find one to go on with.
