@@ -17,6 +17,13 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 import clearway
+from clearway.children import ChildProcess
+from clearway.serve import replicas
+from clearway.serve.limits import Limits
+from clearway.serve.replica import Beats
+from clearway.serve.run import Network, rotating
+from clearway.serve.tokens import ALONE, Tokens, read_tokens
+from clearway.web.local import listening
 from helpers.running import PATIENT_S, Running, running
 from helpers.serving import TOKEN, grey
 from helpers.sums import Sums, plain
@@ -125,3 +132,50 @@ def test_a_stream_goes_on_in_another_replica_and_limits_hold_over_all(tmp_path: 
         assert codes == [201, 429, 429, 429]
         service.process.send_signal(signal.SIGTERM)
         assert service.process.wait(PATIENT_S) == 0
+
+
+def common_of(folder: Path, network: Network, tokens: Tokens, opened=Sums) -> replicas.Common:
+    return replicas.Common(opened, network, tokens, None, Limits(), 1, folder, b"", Beats([0.0, 0.0]))
+
+
+@pytest.mark.parametrize("at_once", [False, True], ids=["in time", "told twice"])
+def test_a_replica_that_does_not_end_is_killed(tmp_path: Path, monkeypatch, at_once: bool) -> None:
+    monkeypatch.setattr(replicas, "serve_replica", _sleep)
+    with listening(0) as listener:
+        place = replicas._Place(common_of(tmp_path, Network(listener), Tokens([(ALONE, TOKEN)])), 0)
+        place.look()
+        assert place._process is not None and place._process.pid is not None
+        os.kill(place._process.pid, signal.SIGSTOP)
+        os.waitpid(place._process.pid, os.WUNTRACED)  # it has stopped
+        begun = time.monotonic()
+        replicas._end([place], PATIENT_S if at_once else 0.3, lambda: at_once)
+    assert (time.monotonic() - begun >= 0.3) is not at_once
+    assert place._process.exitcode == -signal.SIGKILL
+
+
+def _sleep(common: replicas.Common, number: int) -> None:
+    time.sleep(10 * PATIENT_S)
+
+
+def test_tokens_that_change_while_a_replica_starts_reach_it(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "tokens"
+    path.write_text(f"{ALONE} {TOKEN}\n")
+    path.chmod(0o600)
+    tokens, start = read_tokens(path), ChildProcess.start
+
+    def start_then_change(process: ChildProcess) -> None:
+        start(process)
+        path.write_text(f"{ALONE} another-{TOKEN}\n")
+        os.kill(os.getpid(), signal.SIGHUP)
+
+    monkeypatch.setattr(ChildProcess, "start", start_then_change)
+    monkeypatch.setattr(replicas, "serve_replica", _sleep)
+    with listening(0) as listener:
+        place = replicas._Place(common_of(tmp_path, Network(listener), tokens), 0)
+        with rotating(tokens, path, lambda: place.tell(signal.SIGHUP)):
+            place.look()
+        assert tokens.owner_of(TOKEN) is None and place._process is not None
+        place._process.join(PATIENT_S)  # it takes no SIGHUP yet: another one starts with the new tokens
+        code = place._process.exitcode
+        place.kill()
+    assert code == -signal.SIGHUP

@@ -33,6 +33,8 @@ from clearway.serve.shared_sessions import SharedSessions
 from clearway.serve.tokens import Tokens
 
 LOOKS_EVERY_S = 0.2
+TELLS_EVERY_S = 1.0  # to end, until they do: one that has no handler yet may miss it
+END_S = 6.0  # beyond a request's deadline, after which a replica that has not ended is killed; by itself it takes 4
 STUCK_S = 30.0  # without a beat, after which a replica is ended
 START_S = 120.0  # for a replica's first beat
 SHORT_S = 10.0  # what ended sooner is started again after a pause
@@ -109,9 +111,7 @@ def run_replicas(
                         place.look()
                     wait([place.sentinel for place in places if place.sentinel is not None], LOOKS_EVERY_S)
         finally:
-            _tell(places, signal.SIGTERM)
-            for place in places:
-                place.join()
+            _end(places, limits.deadline_s + END_S, lambda: ending.count(signal.SIGINT) > 1)
 
 
 class _Place:
@@ -121,11 +121,17 @@ class _Place:
         self._common, self._number = common, number
         self._process: ChildProcess | None = None
         self._begun_s, self._next_s, self._pause_s = 0.0, 0.0, PAUSES_S[0]
+        self._told = 0  # signals, also where there was no replica to tell
 
     @property
     def sentinel(self) -> int | None:
         """Is ready once the replica has ended; None where there is none."""
         return None if self._process is None else self._process.sentinel
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether there is a replica that has not ended."""
+        return self._process is not None and self._process.is_alive()
 
     def look(self) -> None:
         """Start a replica where there is none and it is time; end a stuck one."""
@@ -155,7 +161,7 @@ class _Place:
     def _start(self, now: float) -> None:
         name = f"replica-{self._number + 1}"
         process = ChildProcess(target=serve_replica, args=(self._common, self._number), name=name)
-        self._begun_s = now
+        self._begun_s, told = now, self._told
         try:
             with signals_held(signal.SIGINT):  # the terminal's: the parent tells its replicas by SIGTERM
                 process.start()
@@ -163,22 +169,39 @@ class _Place:
             self._pause(now, fault.strerror)
         else:
             self._process = process
+            if self._told != told:  # to read the tokens again, when it may have had the old ones already
+                self.tell(signal.SIGHUP)
 
     def tell(self, number: signal.Signals) -> None:
         """Send a signal to the replica, where there is one; one that has not begun to answer ends by SIGHUP too."""
+        self._told += 1
         if self._process is not None and self._process.is_alive() and self._process.pid is not None:
             with suppress(ProcessLookupError):  # it has just ended
                 os.kill(self._process.pid, number)
 
-    def join(self) -> None:
-        """Wait for the replica's end, which comes in time, see `web.local.serve`."""
+    def kill(self) -> None:
+        """End the replica, whatever it does, and wait for its end."""
         if self._process is not None:
+            self._process.kill()
             self._process.join()
 
 
 def _tell(places: list[_Place], number: signal.Signals) -> None:
     for place in places:
         place.tell(number)
+
+
+def _end(places: list[_Place], within_s: float, at_once: Callable[[], bool]) -> None:
+    """Tell all replicas to end, and wait; who has not after `within_s`, or when it is to be `at_once`, is killed."""
+    latest = time.monotonic() + within_s
+    while running := [place for place in places if place.is_alive]:
+        left_s = latest - time.monotonic()
+        if left_s <= 0 or at_once():
+            break
+        _tell(running, signal.SIGTERM)
+        wait([place.sentinel for place in running if place.sentinel is not None], min(left_s, TELLS_EVERY_S))
+    for place in places:
+        place.kill()
 
 
 @contextmanager
