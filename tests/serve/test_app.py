@@ -265,6 +265,26 @@ def test_what_takes_too_long_is_given_up_and_leaves_the_session_as_it_was(called
     assert (answer.json()["value"], answer.json()["step"]) == (5, 2)
 
 
+def test_a_stream_waits_no_longer_for_its_session_than_for_a_step(called, monkeypatch) -> None:
+    """Shared sessions are in a table that may be busy."""
+    service = Service(Sums(), Limits(deadline_s=0.2), TOKENS)
+    client, found = called(service), service.sessions.get
+    session = opened(client)
+
+    async def late(session_id: str, owner: str) -> None:
+        await asyncio.sleep(PATIENT_S)
+
+    monkeypatch.setattr(service.sessions, "get", late)
+    with pytest.raises(WebSocketDenialResponse) as caught, client.websocket_connect(f"{session}/stream"):
+        pass
+    assert fault(caught.value) == "504 deadline_passed"
+    monkeypatch.setattr(service.sessions, "get", found)
+    with client.websocket_connect(f"{session}/stream") as socket:
+        monkeypatch.setattr(service.sessions, "get", late)
+        socket.send_bytes(grey(9))
+        assert json.loads(socket.receive_text())["error"]["code"] == "deadline_passed"
+
+
 def test_a_failing_agent_says_nothing_of_itself(called, caplog) -> None:
     class Broken(Sums):
         def reset(self, target, seed):

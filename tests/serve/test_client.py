@@ -156,6 +156,13 @@ def test_a_session_goes_on_uncounted_once_an_answer_is_lost_for_good(client, ser
         session._client._http = client
         lost(plain(2))
     assert session.act(plain(3)).value == 2000 + 1 + 1 + 2 + 3  # what was lost had been walked
+    monkeypatch.setattr("clearway.serve.client.AGAIN_S", 10.0)
+    way = Flaky(client, 1, True)
+    session._client._http = httpx.Client(base_url="http://testserver", transport=way, headers=client.headers)
+    for lost in (session.act, session.set_target):
+        with pytest.raises(ServiceError, match="unreachable"):
+            lost(plain(4))
+    assert set(way.seen.values()) == {1}  # without a number, it is not sent again and walked twice
 
 
 def test_how_pictures_are_sent(tmp_path) -> None:

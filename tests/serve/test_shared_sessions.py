@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clearway.serve.faults import Fault
+from clearway.serve.limits import Limits
+from clearway.serve.service import Service
 from clearway.serve.session_record import UnsealedError, most_record_bytes, sealed, shapes_of, unsealed
 from clearway.serve.session_table import SessionTable
 from clearway.serve.sessions import begun_state, new_session
 from clearway.serve.shared_sessions import SharedSessions
 from helpers.agents import equal
-from helpers.serving import OWNER
+from helpers.serving import OWNER, TOKENS, grey
 from helpers.session_records import KEY, goes_on_to_the_bit, walked
 from helpers.sums import Sums
 
@@ -33,6 +37,26 @@ def shared(
 ) -> SharedSessions:
     table = SessionTable(path / "sessions", most, most_record_bytes(SHAPES), 60.0, clock or Clock())
     return SharedSessions(table, most, lambda: owners, KEY, SHAPES)
+
+
+def slowed(monkeypatch, table: SessionTable, name: str) -> threading.Event:
+    """Let a method of the table take time before it does what it does; is set once it has begun."""
+    done, begun = getattr(table, name), threading.Event()
+
+    def slow(*arguments: object) -> object:
+        begun.set()
+        time.sleep(0.4)
+        return done(*arguments)
+
+    monkeypatch.setattr(table, name, slow)
+    return begun
+
+
+async def cancelled_once(begun: threading.Event, task: asyncio.Task) -> None:
+    await asyncio.to_thread(begun.wait)
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
 
 
 def test_a_state_goes_on_to_the_bit_after_a_round_trip() -> None:
@@ -139,3 +163,82 @@ def test_a_table_that_is_full_refuses_in_words_and_keeps_what_it_has(tmp_path, c
 def test_a_record_that_is_too_large_is_our_own_mistake(tmp_path) -> None:
     with pytest.raises(AssertionError, match="expected at most 10"):
         SessionTable(tmp_path / "sessions", 1, 10, 60.0).open("id", OWNER, bytes(11), [OWNER])
+
+
+def test_a_step_that_was_kept_is_answered_though_the_deadline_passes(tmp_path, called, monkeypatch) -> None:
+    """It was once refused, and walked."""
+    service = Service(Sums(), Limits(deadline_s=0.3), TOKENS)
+    sessions = service.sessions = shared(tmp_path)
+    client, png = called(service), {"content-type": "image/png"}
+    session = f"/sessions/{client.post('/sessions', json={}).json()['session_id']}"
+    slowed(monkeypatch, sessions._table, "write")
+    assert client.put(f"{session}/target", content=grey(2), headers=png).status_code == 204
+    answer = client.post(f"{session}/steps", content=grey(1), headers=png)
+    assert (answer.status_code, answer.json()["step"]) == (200, 1)
+    with client.websocket_connect(f"{session}/stream") as socket:
+        socket.send_bytes(grey(1))
+        assert '"step":2' in socket.receive_text()
+
+
+def test_what_was_cancelled_in_time_changes_nothing(tmp_path, monkeypatch) -> None:
+    async def ask() -> None:
+        sessions, after = shared(tmp_path), walked(Sums())[0]
+        session = await sessions.open(OWNER, "sampled", None)
+        before, ends = await sessions.progress(session), threading.Event()
+        sessions._thread.submit(ends.wait)
+        keeping = asyncio.create_task(sessions.keep(session, before, after))
+        await asyncio.sleep(0.05)
+        keeping.cancel()
+        await asyncio.wait([keeping], timeout=2)
+        ends.set()
+        assert keeping.cancelled()
+        assert (await sessions.progress(session)).version == before.version
+        assert await sessions.keep(session, before, after)
+        stale = asyncio.create_task(sessions.keep(session, before, after))
+        await cancelled_once(slowed(monkeypatch, sessions._table, "write"), stale)  # it had come too late anyway
+
+    asyncio.run(ask())
+
+
+def test_an_opening_that_was_cancelled_leaves_no_session(tmp_path, monkeypatch) -> None:
+    async def ask() -> None:
+        sessions = shared(tmp_path)
+        begun = slowed(monkeypatch, sessions._table, "open")
+        await cancelled_once(begun, asyncio.create_task(sessions.open(OWNER, "sampled", None)))
+        await asyncio.get_running_loop().run_in_executor(sessions._thread, int)  # all before it is done
+        await sessions.recount()
+        assert len(sessions) == 0
+
+    asyncio.run(ask())
+
+
+def test_another_name_that_knows_a_session_does_not_keep_it(tmp_path) -> None:
+    clock = Clock()
+
+    async def ask() -> None:
+        sessions = shared(tmp_path, clock=clock)
+        session = await sessions.open(OWNER, "sampled", None)
+        clock.now += 40
+        with pytest.raises(Fault, match="no such session"):
+            await sessions.get(session.id, "another")
+        clock.now += 40
+        with pytest.raises(Fault, match="no such session"):
+            await sessions.get(session.id, OWNER)
+
+    asyncio.run(ask())
+
+
+def test_a_count_waits_for_no_request(tmp_path) -> None:
+    """A replica that does not beat is ended as stuck."""
+
+    async def ask() -> None:
+        sessions, ends = shared(tmp_path), threading.Event()
+        await sessions.open(OWNER, "sampled", None)
+        sessions._thread.submit(ends.wait)
+        try:
+            await asyncio.wait_for(sessions.recount(), 5)
+        finally:
+            ends.set()
+        assert len(sessions) == 1
+
+    asyncio.run(ask())

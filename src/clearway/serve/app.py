@@ -270,7 +270,8 @@ async def _stream(service: Service, socket: WebSocket, session_id: str, step: in
     """Answer the pictures of a session, one after the other, until either side ends it."""
     owner = _owner(socket)
     try:
-        await service.sessions.get(session_id, owner)
+        async with _in_time(service):
+            await service.sessions.get(session_id, owner)
         if not service.streams.take(owner):
             raise Fault("overloaded", "too many streams are open. Close one, or try again later")
     except Fault as fault:
@@ -314,12 +315,19 @@ async def _answer_message(
     service: Service, owner: str, session_id: str, content: bytes | None, step: int | None
 ) -> str:
     """The answer to a message. Raises Fault."""
-    session = await service.sessions.get(session_id, owner)
-    if content is None:
-        raise Fault("invalid_request", "send pictures as binary messages")
+    async with _in_time(service):
+        session = await service.sessions.get(session_id, owner)
+        if content is None:
+            raise Fault("invalid_request", "send pictures as binary messages")
+        return _answer(service, await service.step(session, content, step)).model_dump_json()
+
+
+@asynccontextmanager
+async def _in_time(service: Service) -> AsyncIterator[None]:
+    """Raises Fault where what is done meanwhile takes longer than a request may."""
     try:
         async with asyncio.timeout(service.limits.deadline_s):
-            return _answer(service, await service.step(session, content, step)).model_dump_json()
+            yield
     except TimeoutError as late:
         told = f"not answered within {service.limits.deadline_s:g} s. Try again"
         raise Fault("deadline_passed", told) from late

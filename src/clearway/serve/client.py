@@ -85,7 +85,10 @@ class Client:
         return self.ask_json("GET", "/agent", "scene")
 
     def session(self, *, selection: Selection = "sampled", seed: int | None = None) -> ClientSession:
-        """Open a session; the arguments are `Navigator`'s. Raises ServiceError, DeployError."""
+        """Open a session; the arguments are `Navigator`'s. Raises ServiceError, DeployError.
+
+        Where the connection breaks meanwhile, one may stay open that nobody uses, until it expires.
+        """
         wanted = {"selection": selection, "seed": checked_seed(seed)}
         return ClientSession(self, self.ask_json("POST", "/sessions", "session_id", json=wanted)["session_id"])
 
@@ -106,13 +109,16 @@ class Client:
         raise ServiceError(code, message)
 
     def _answered(self, method: str, path: str, content: dict[str, Any]) -> tuple[Any, int]:
-        """An answer, and how often it was asked for: again where the connection broke, as when a replica dies."""
+        """An answer, and how often it was asked for: again where the connection broke, as when a replica dies.
+
+        A step or target without a number is asked for once: whether it was walked, nobody could tell.
+        """
         give_up, pause_s = time.monotonic() + AGAIN_S, FIRST_PAUSE_S
         for times in count(1):
             try:
                 return self._http.request(method, path, **content), times
             except self._broken:
-                if time.monotonic() + pause_s > give_up:
+                if time.monotonic() + pause_s > give_up or not _may_come_twice(method, path, content):
                     raise
                 time.sleep(pause_s)
                 pause_s *= 2
@@ -147,7 +153,8 @@ class Client:
 class ClientSession:
     """An agent on its way, kept by the service; see `Client.session`. Used as a context, it is closed at the end.
 
-    Its requests are numbered: one whose answer was lost is sent again and answered, and no step is walked twice.
+    Its requests are numbered: one whose answer was lost is sent again and answered, and no step is walked twice. Once
+    an answer was lost for good, requests of its kind have no numbers any more and are not sent again.
 
     Attributes:
         arrived: whether the agent held at its last act that it is at the target; None where it cannot tell.
@@ -208,6 +215,11 @@ class ClientSession:
         except ServiceError:
             if fault is None:
                 raise
+
+
+def _may_come_twice(method: str, path: str, content: dict[str, Any]) -> bool:
+    """Whether a request may be sent again: what it asks for is then not done twice, or is another session."""
+    return method in ("GET", "DELETE") or path == "/sessions" or bool(content.get("params"))
 
 
 def picture_file(picture: object) -> tuple[bytes, str]:

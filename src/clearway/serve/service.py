@@ -95,7 +95,9 @@ class Service:
         return await self.sessions.open(owner, selection, seed)
 
     async def set_target(self, session: Session, content: bytes, episode: int | None = None) -> None:
-        """Begin an episode with the picture file of a target; on a Fault the session stays as it was.
+        """Begin an episode with the picture file of a target; on a Fault, or cancelled, the session stays as it was.
+
+        A cancellation that comes once the episode has begun is too late: it returns as if there had been none.
 
         Args:
             session: whose episode.
@@ -118,6 +120,8 @@ class Service:
 
     async def step(self, session: Session, content: bytes, number: int | None = None) -> Answer:
         """What to do, seeing a picture file; on a Fault, or cancelled, the session stays as it was.
+
+        A cancellation that comes once the step is walked is too late: it is answered as if there had been none.
 
         Args:
             session: whose agent.

@@ -20,14 +20,14 @@ CREATE TRIGGER IF NOT EXISTS gone AFTER DELETE ON sessions BEGIN DELETE FROM rec
 PAGE_BYTES = 4096
 SPARE_PAGES = 1000  # for indices, and for what is changed before the old is gone
 LOG_BYTES = 64 << 20  # to which SQLite's write-ahead log is cut once it has been written to the table
-PATIENCE_S = 5.0  # for another process to finish its change, each of which takes a millisecond
+PATIENCE_S = 3.0  # for another process to finish its change, each of which takes a millisecond
 
 
 class SessionTable:
     """Records of sessions, each with a version: only who knows the newest may write the next.
 
     A change is whole or not at all, also where its process is killed in the middle. The table is not synced to the
-    disk: it need not outlive the machine.
+    disk: it need not outlive the machine. One thread may count while another does the rest.
 
     Args:
         path: of the database; it is made where there is none.
@@ -44,23 +44,16 @@ class SessionTable:
         self, path: Path, most: int, most_bytes: int, idle_s: float, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._most, self._most_bytes, self._idle_s, self._clock = most, most_bytes, idle_s, clock
-        self._database = sqlite3.connect(path, PATIENCE_S, isolation_level=None, check_same_thread=False)
         pages = most * (most_bytes // PAGE_BYTES + 3) + SPARE_PAGES
-        for name, value in (
-            ("page_size", PAGE_BYTES),
-            ("journal_mode", "wal"),
-            ("synchronous", "off"),
-            ("journal_size_limit", LOG_BYTES),
-            ("max_page_count", pages),
-        ):
-            self._database.execute(f"PRAGMA {name} = {value}")
+        self._database = _connected(path, pages)
         self._database.executescript(TABLES)
+        self._counted = _connected(path, pages)
 
     def open(self, session_id: str, owner: str, record: bytes, owners: Collection[str]) -> str | None:
         """Add a session, where there is room for another one of this owner's among all `owners`; else says why not."""
         self._check_size(record)
         with self._change():
-            self._expire()
+            self._expire(self._database)
             places = Places(self._most, lambda: owners, dict(self._database.execute(HELD)))
             if (refusal := place_refused(places, owner)) is not None:
                 return refusal
@@ -68,11 +61,11 @@ class SessionTable:
             self._database.execute("INSERT INTO records VALUES (?, ?)", (session_id, record))
         return None
 
-    def touch(self, session_id: str) -> bool:
-        """Whether there is such a session; its time begins anew."""
+    def touch(self, session_id: str, owner: str) -> bool:
+        """Whether there is such a session of this owner's; its time begins anew."""
         now = self._clock()
-        touched = "UPDATE sessions SET used_s = ? WHERE id = ? AND used_s > ?"
-        return self._database.execute(touched, (now, session_id, now - self._idle_s)).rowcount == 1
+        touched = "UPDATE sessions SET used_s = ? WHERE id = ? AND owner = ? AND used_s > ?"
+        return self._database.execute(touched, (now, session_id, owner, now - self._idle_s)).rowcount == 1
 
     def read(self, session_id: str) -> tuple[int, bytes] | None:
         """Version and record of a session; None where there is none."""
@@ -96,18 +89,19 @@ class SessionTable:
 
     def count(self) -> int:
         """Sessions."""
-        self._expire()
-        return int(self._database.execute("SELECT count(*) FROM sessions").fetchone()[0])
+        self._expire(self._counted)
+        return int(self._counted.execute("SELECT count(*) FROM sessions").fetchone()[0])
 
     def close(self) -> None:
         """Leave the database."""
         self._database.close()
+        self._counted.close()
 
     def _check_size(self, record: bytes) -> None:
         assert len(record) <= self._most_bytes, f"a record of {len(record)} bytes, expected at most {self._most_bytes}"
 
-    def _expire(self) -> None:
-        self._database.execute("DELETE FROM sessions WHERE used_s <= ?", (self._clock() - self._idle_s,))
+    def _expire(self, database: sqlite3.Connection) -> None:
+        database.execute("DELETE FROM sessions WHERE used_s <= ?", (self._clock() - self._idle_s,))
 
     @contextmanager
     def _change(self) -> Iterator[None]:
@@ -119,6 +113,20 @@ class SessionTable:
             if self._database.in_transaction:  # else SQLite has taken it back itself, as where there is no room
                 self._database.execute("ROLLBACK")
             raise
+
+
+def _connected(path: Path, pages: int) -> sqlite3.Connection:
+    """A connection to a database of at most so many pages."""
+    database = sqlite3.connect(path, PATIENCE_S, isolation_level=None, check_same_thread=False)
+    for name, value in (
+        ("page_size", PAGE_BYTES),
+        ("journal_mode", "wal"),
+        ("synchronous", "off"),
+        ("journal_size_limit", LOG_BYTES),
+        ("max_page_count", pages),
+    ):
+        database.execute(f"PRAGMA {name} = {value}")
+    return database
 
 
 HELD = "SELECT owner, count(*) FROM sessions GROUP BY owner"

@@ -139,7 +139,10 @@ class KeepsSessions(Protocol):
         """How far a session has come. Raises Fault where it is gone."""
 
     async def keep(self, session: Session, before: Progress, after: Progress) -> bool:
-        """Put another in the place of a session's progress; False where that is not `before` any more."""
+        """Put another in the place of a session's progress; False where that is not `before` any more.
+
+        Cancelled, it has put nothing there. Once it has, it returns True, though it was cancelled meanwhile.
+        """
 
 
 class Sessions:

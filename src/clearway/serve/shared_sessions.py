@@ -6,8 +6,9 @@ import asyncio
 import logging
 import sqlite3
 from collections import OrderedDict
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -36,6 +37,7 @@ class SharedSessions:
     ) -> None:
         self._table, self._most, self._owners, self._key, self._shapes = table, most, owners, key, shapes
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="sessions")
+        self._counter = ThreadPoolExecutor(1, thread_name_prefix="count")  # a beat waits for no other's request
         self._known: OrderedDict[str, Session] = OrderedDict()  # that this replica has had to do with
         self._count = 0  # lately
 
@@ -49,28 +51,29 @@ class SharedSessions:
 
     async def recount(self) -> None:
         """Count the sessions of all replicas anew."""
-        self._count = await self._asked(self._table.count)
+        self._count = await self._asked(self._counter, self._table.count)
 
     async def open(self, owner: str, selection: Selection, seed: int | None) -> Session:
-        """See `KeepsSessions`."""
+        """See `KeepsSessions`. Cancelled, it leaves none."""
         made = new_session(owner, selection, seed, 0.0)
         record = sealed(made, made.progress, self._key)
-        held = await self._asked(self._table.open, made.id, owner, record, list(self._owners()))
+        held, cancelled = await self._settled(self._table.open, made.id, owner, record, list(self._owners()))
+        if cancelled is not None:
+            if held is None:
+                await self._forget(made.id)
+            raise cancelled
         if held is not None:
             raise too_many(held)
         return self._remembered(made)
 
     async def get(self, session_id: str, owner: str) -> Session:
         """See `KeepsSessions`."""
-        if not await self._asked(self._table.touch, session_id):
-            self._known.pop(session_id, None)
+        if not await self._asked(self._thread, self._table.touch, session_id, owner):
             raise no_such_session()
         found = self._known.get(session_id)
         if found is None:
             header, _ = await self._read(session_id)
             found = Session(session_id, header["owner"], header["selection"], header["seed"], 0.0)
-        if found.owner != owner:
-            raise no_such_session()
         return self._remembered(found)
 
     async def close(self, session_id: str, owner: str) -> None:
@@ -84,11 +87,15 @@ class SharedSessions:
 
     async def keep(self, session: Session, before: Progress, after: Progress) -> bool:
         """See `KeepsSessions`."""
-        return await self._asked(self._table.write, session.id, before.version, sealed(session, after, self._key))
+        record = sealed(session, after, self._key)
+        kept, cancelled = await self._settled(self._table.write, session.id, before.version, record)
+        if cancelled is not None and not kept:
+            raise cancelled
+        return kept
 
     async def _read(self, session_id: str) -> tuple[dict[str, Any], Progress]:
         """Header and progress of a session. Raises Fault where it is gone, or was altered: then it goes."""
-        found = await self._asked(self._table.read, session_id)
+        found = await self._asked(self._thread, self._table.read, session_id)
         if found is None:
             raise no_such_session()
         version, record = found
@@ -112,12 +119,39 @@ class SharedSessions:
 
     async def _forget(self, session_id: str) -> None:
         self._known.pop(session_id, None)
-        await self._asked(self._table.remove, session_id)
+        await self._settled(self._table.remove, session_id)
 
-    async def _asked(self, ask: Callable[..., Found], *arguments: object) -> Found:
+    async def _asked(self, thread: ThreadPoolExecutor, ask: Callable[..., Found], *arguments: object) -> Found:
         """What the table answers, in a thread. Raises Fault where it cannot."""
-        try:
-            return await asyncio.get_running_loop().run_in_executor(self._thread, ask, *arguments)
-        except sqlite3.Error as fault:
-            logging.getLogger("clearway.serve").error("sessions cannot be kept: %s", fault)
-            raise Fault("overloaded", "no session can be kept now. Try again") from fault
+        with _table_needed():
+            return await asyncio.get_running_loop().run_in_executor(thread, ask, *arguments)
+
+    async def _settled(
+        self, change: Callable[..., Found], *arguments: object
+    ) -> tuple[Found, asyncio.CancelledError | None]:
+        """What the table answers to a change, and the cancellation that came once the change had begun.
+
+        A thread that writes cannot be cancelled: who asked for the change must know whether it was made. Cancelled
+        before it has begun, it is not made. Raises Fault as `_asked`.
+        """
+        asked = self._thread.submit(change, *arguments)
+        answer, cancelled = asyncio.wrap_future(asked), None
+        while not answer.done():
+            try:
+                await asyncio.wait([answer])
+            except asyncio.CancelledError as late:
+                if asked.cancel():
+                    raise
+                cancelled = late
+        with _table_needed():
+            return answer.result(), cancelled
+
+
+@contextmanager
+def _table_needed() -> Iterator[None]:
+    """Raises Fault, and logs why, where the table cannot be used."""
+    try:
+        yield
+    except sqlite3.Error as fault:
+        logging.getLogger("clearway.serve").error("sessions cannot be kept: %s", fault)
+        raise Fault("overloaded", "no session can be kept now. Try again") from fault

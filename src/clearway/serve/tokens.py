@@ -16,6 +16,7 @@ ANSWERED = "clearway.answered"  # in the scope of a WebSocket: to be called of e
 KNOWN = "clearway.known"  # in the state of a request: told the owner once its token was right; False: too many
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
+MOST_NAME_LETTERS = 100  # which every record of a session holds
 MOST_BYTES = 1 << 20  # of a file of tokens
 
 
@@ -64,6 +65,9 @@ def read_tokens(path: Path) -> Tokens:
             continue
         if len(words) != 2:
             raise ClearwayError(f"{path}, line {number}: expected a name and a token. Write them with a space between")
+        if len(words[0]) > MOST_NAME_LETTERS:
+            problem = f"{path}, line {number}: a name of {len(words[0])} letters, expected at most {MOST_NAME_LETTERS}"
+            raise ClearwayError(f"{problem}. Choose a shorter one")
         named.append((words[0], checked_token(words[1], f"{path}, line {number},")))
     if not named:
         raise ClearwayError(f"{path}: no tokens in it. Write a name and a token a line")
