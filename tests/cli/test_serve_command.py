@@ -42,7 +42,7 @@ def test_tokens_that_are_too_weak_or_cannot_be_sent(clearway, monkeypatch, token
     ("words", "part"),
     [
         (("--port", "70000"), "--port is 70000"),
-        (("--replicas", "65"), "--replicas is 65, expected 1 to 64"),
+        (("--replicas", "17"), "--replicas is 17, expected 1 to 16"),
         (("--host", "192.0.2.1"), "192.0.2.1"),
         (("--host", "no such host"), "--host no such host --port 0: "),
     ],

@@ -20,7 +20,6 @@ UNENCRYPTED = (
     "WARNING: NOT ENCRYPTED. Tokens and pictures cross the network in the clear; whoever listens can use them. "
     "Give --tls-cert and --tls-key, or put a proxy with TLS before the service"
 )
-MOST_REPLICAS = 64
 NOTABLE_BYTES = 100_000_000  # of all sessions: what is less is not worth a line
 
 
@@ -60,12 +59,12 @@ class Serve:
     deadline_s: float = 10.0
     """Seconds that a request may take."""
     replicas: int = 1
-    """Processes that answer at the one address; sessions go on when one of them dies."""
+    """Processes that answer at the one address, at most 16; sessions go on when one of them dies."""
 
     def run(self) -> None:
         """Load the agent, then answer until interrupted."""
         from clearway.serve.access_log import to_stderr
-        from clearway.serve.limits import Limits
+        from clearway.serve.limits import MOST_REPLICAS, Limits
         from clearway.serve.replicas import run_replicas
         from clearway.serve.run import Network, check_tls, rotating, run_service, servable_agent
         from clearway.serve.sessions import state_bytes

@@ -7,6 +7,9 @@ import os
 from dataclasses import dataclass, field, replace
 
 from clearway.errors import DeployError
+from clearway.serve.shares import MOST_SHARES
+
+MOST_REPLICAS = 16  # no more than `wrong_tokens`, of which each replica looks at one at least
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,13 @@ class Limits:
             raise DeployError(f"{problem}. Let sessions live more than twice as long as requests")
 
     def divided(self, replicas: int) -> Limits:
-        """Of one of several replicas, which share all but their sessions evenly."""
+        """Of one of several replicas, which share all but their sessions evenly.
+
+        Each has one of everything at least, and bytes for the largest body of any name, whose part is the smallest
+        there is, with a quarter of it for what else is held. So they may have more together than one service alone.
+        """
         shared = ("waiting", "connections", "strangers", "wrong_tokens", "bodies_bytes", "decoders")
-        return replace(self, **{name: max(getattr(self, name) // replicas, 1) for name in shared})
+        parts = {name: max(getattr(self, name) // replicas, 1) for name in shared}
+        least_bytes = MOST_SHARES * (self.body_bytes + self.body_bytes // 4)
+        parts["bodies_bytes"] = max(parts["bodies_bytes"], min(least_bytes, self.bodies_bytes))
+        return replace(self, **parts)
