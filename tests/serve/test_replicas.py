@@ -19,6 +19,7 @@ from websockets.sync.client import connect
 
 import clearway
 from clearway.children import ChildProcess
+from clearway.deploy.navigator import open_agent
 from clearway.errors import DeployError
 from clearway.serve import replicas
 from clearway.serve.limits import Limits
@@ -183,13 +184,15 @@ def test_tokens_that_change_while_a_replica_starts_reach_it(tmp_path: Path, monk
     assert code == -signal.SIGHUP
 
 
-def test_a_service_ends_where_no_replica_can_begin(monkeypatch) -> None:
+def test_a_service_ends_where_no_replica_can_begin(monkeypatch, capfd) -> None:
     monkeypatch.setattr(replicas, "MOST_FAILED", 2)
     monkeypatch.setattr(replicas, "PAUSES_S", (0.0, 0.0))
     with listening(0) as listener:
         network, tokens = Network(listener), Tokens([(ALONE, TOKEN)])
         with pytest.raises(DeployError, match="no replica begins to answer, 2 tries"):
-            replicas.run_replicas(partial(open, "no-such-agent.onnx"), network, tokens, None, Limits(), 1)
+            replicas.run_replicas(partial(open_agent, "no-such-agent.onnx"), network, tokens, None, Limits(), 1)
+    said = capfd.readouterr().err
+    assert said.count("replica 1: no-such-agent.onnx: cannot be read") == 2 and "Traceback" not in said
 
 
 def test_a_replica_that_has_answered_is_started_again_for_ever(tmp_path: Path, monkeypatch) -> None:

@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import secrets
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -22,7 +23,7 @@ from types import FrameType
 from clearway import files
 from clearway.children import ChildProcess, signals_held
 from clearway.deploy.agent import DeployedAgent
-from clearway.errors import DeployError
+from clearway.errors import ClearwayError, DeployError
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import count_no_more, count_together
 from clearway.serve.replica import Beats, Replica
@@ -73,7 +74,11 @@ class Common:
 def serve_replica(common: Common, number: int) -> None:
     """Answer as one of several, until told to end by SIGTERM."""
     count_together(common.folder, number)
-    agent, limits, tokens = common.opened(), common.limits, common.tokens
+    limits, tokens = common.limits, common.tokens
+    try:
+        agent = common.opened()
+    except ClearwayError as fault:
+        sys.exit(f"replica {number + 1}: {fault}")
     shapes = shapes_of(begun_state(agent))
     table = SessionTable(common.folder / "sessions", limits.sessions, most_record_bytes(shapes), limits.idle_s)
     sessions = SharedSessions(table, limits.sessions, lambda: tokens.owners, common.key, shapes)
