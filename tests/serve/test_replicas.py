@@ -31,6 +31,7 @@ from helpers.running import PATIENT_S, Running, running
 from helpers.serving import TOKEN, grey
 from helpers.sums import Sums, plain
 
+LEAST_STEPS = 8
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
 
 
@@ -48,12 +49,13 @@ def until(holds, seconds: float = PATIENT_S) -> None:
         time.sleep(0.05)
 
 
-def walk(service: Running, number: int, ends: threading.Event, least: int, told: list[object]) -> None:
+def walk(service: Running, number: int, opened: threading.Barrier, ends: threading.Event, told: list[object]) -> None:
     """Episodes of one session, each answer held against a navigator's own; adds how many steps, or what went wrong."""
     try:
         navigator, rng, steps = clearway.Navigator(Sums(), seed=number), np.random.default_rng(number), 0
         with service.client() as client, client.session(seed=number) as session:
-            while steps < least or not ends.is_set():
+            opened.wait(PATIENT_S)
+            while steps < LEAST_STEPS or not ends.is_set():
                 if steps % 7 == 0:
                     for walker in (session, navigator):
                         walker.set_target(plain(number))
@@ -68,10 +70,11 @@ def walk(service: Running, number: int, ends: threading.Event, least: int, told:
 
 def walk_while_replicas_die(service: Running, sessions: int, kills: int, pause_s: float) -> int:
     told: list[object] = []
-    ends, dice = threading.Event(), random.Random(5)
-    walkers = [threading.Thread(target=walk, args=(service, number, ends, 8, told)) for number in range(sessions)]
+    opened, ends, dice = threading.Barrier(sessions + 1), threading.Event(), random.Random(5)
+    walkers = [threading.Thread(target=walk, args=(service, number, opened, ends, told)) for number in range(sessions)]
     for walker in walkers:
         walker.start()
+    opened.wait(PATIENT_S)  # a session whose opening is cut off is opened twice, and one of the two is left
     for _ in range(kills):
         time.sleep(pause_s * (0.5 + dice.random()))
         until(lambda: service.process.poll() is not None or service.replicas())
@@ -86,7 +89,7 @@ def walk_while_replicas_die(service: Running, sessions: int, kills: int, pause_s
 def test_replicas_die_under_load_and_no_session_is_lost_nor_a_step_walked_twice() -> None:
     with running(replicas=2, seconds=0.002, health=True) as service:
         steps = walk_while_replicas_die(service, sessions=6, kills=3, pause_s=0.5)
-        assert steps >= 6 * 8
+        assert steps >= 6 * LEAST_STEPS
         until(lambda: len(service.replicas()) == 2)
         own = f"http://127.0.0.1:{service.health_port}"
         assert httpx.get(f"{own}/ready", timeout=PATIENT_S).status_code == 200
@@ -94,7 +97,8 @@ def test_replicas_die_under_load_and_no_session_is_lost_nor_a_step_walked_twice(
         lines = httpx.get(f"{own}/metrics", timeout=PATIENT_S).text.splitlines()
         route = 'clearway_requests_total{route="/sessions/{session_id}/steps",status="200"} '
         counted = [float(line.removeprefix(route)) for line in lines if line.startswith(route)]
-        assert counted and steps - 60 <= counted[0] <= steps + 60  # of all replicas, but for answers that died
+        died = 6 * 3  # answers at most: of every session, with every kill
+        assert counted and steps - died <= counted[0] <= steps + died  # of all replicas
         replicas = service.replicas()
         service.process.send_signal(signal.SIGTERM)
         assert service.process.wait(PATIENT_S) == 0
