@@ -110,6 +110,8 @@ def train_by_workers(
     """
     check_tracker(track)
     request.check_workers(workers)
+    if ray is None:
+        _check_gpus(request.device, workers)
     folder = RunFolder(out)
     opened_copy(copy_to, folder, resume)
     record = record_of(request)
@@ -136,6 +138,13 @@ def train_by_workers(
         if INTERRUPTED in outcomes:
             raise KeyboardInterrupt
     return folder
+
+
+def _check_gpus(device: str, workers: int) -> None:
+    """Raises RunError where this machine has no GPU for each."""
+    if torch.device(device).type == "cuda" and workers > (count := torch.cuda.device_count()):
+        problem = f"{workers} workers on {count} GPU{'s' * (count != 1)}: each needs one of its own"
+        raise RunError(f"{problem}. Give fewer --workers, or --device cpu")
 
 
 def _launched_on_ray(task: Task, workers: int, address: str) -> list[str | None]:
