@@ -26,6 +26,7 @@ ORDER = (
         "spelling",
         "spread",
         "terminal",
+        "torch_device",
         "torch_threads",
     },
     {"scenes"},

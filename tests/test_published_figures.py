@@ -146,3 +146,41 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         assert verdict == claim.verdict
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
+
+
+@pytest.mark.slow
+def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
+    records["unpack"](DOCS / "records" / "ablations-two-rooms.tar.xz", tmp_path / "ablations")
+    (section,) = gather(tmp_path / "ablations").sections
+    assert not section.missing
+    told = {
+        "as it is: history 4": ("default", "collision-aware"),
+        "history 1": ("default, history 1", "collision-aware"),
+        "history 2": ("default, history 2", "collision-aware"),
+        "history 8": ("default, history 8", "collision-aware"),
+        "one head": ("default, one head", "collision-aware"),
+        "the collision zone's penalty alone": ("default", "beta-alone"),
+        "the precollision zone's penalty alone": ("default", "gamma-alone"),
+    }
+    rows = [dict(zip(table.headings, row, strict=True)) for table in section.tables for row in table.rows]
+    part = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### What single parts bring")[2]
+    lines = part.partition("\n### ")[0].splitlines()
+    for begin, (learner, agent) in told.items():
+        (line,) = [line for line in lines if line.startswith(f"| {begin}") and line.count("|") == 5]
+        shown = line.strip("|").split("|")[1:]
+        mine = [row for row in rows if (row["learner"], row["agent"]) == (learner, agent) and "seed" not in row]
+        steps, collisions, settled = (
+            next(row for row in mine if row.get("figure") == "steps"),
+            next(row for row in mine if row.get("figure") == "collisions"),
+            next(row for row in mine if "settled" in row),
+        )
+        for text, row, name in zip(shown, (steps, collisions, settled), ("average", "average", "frames"), strict=True):
+            mean, *interval = numbers(text.replace(",", "").replace("-", " "))
+            expect(mean, row[name], begin)
+            assert interval == numbers(str(row["95 %"]).replace(",", ""))
+    verdicts = [claim.verdict for claim in section.claims]
+    assert verdicts == ["undecided"] * 6
+    claimed = [line.strip("| ").split(" | ") for line in lines if line.endswith("| undecided |")]
+    for cells, claim in zip(claimed, section.claims, strict=True):
+        assert f"p = {cells[2]}, for 6 claims {cells[3]} (Holm)" in claim.evidence

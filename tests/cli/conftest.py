@@ -72,10 +72,11 @@ def clearway() -> Callable[..., Answer]:
 
 @pytest.fixture(autouse=True, scope="session")
 def _alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A cache of our own, and tables wide enough not to break words."""
+    """A cache of our own, tables wide enough not to break words, and small pictures."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CLEARWAY_CACHE", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("COLUMNS", "200")
+        patch.setattr("clearway.viz.figures.DPI", 50)
         yield
 
 

@@ -36,11 +36,18 @@ def test_it_walks_in_scenes_that_it_was_not_trained_in(clearway, run):
     assert shown.code == 0 and "10 goals in 2 scenes" in shown.out and "shortest path" in shown.out
 
 
-def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_path):
+@pytest.fixture(scope="module")
+def rooms(clearway, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of one generated room."""
+    folder = tmp_path_factory.mktemp("rooms")
     words = ("--kind", "room", "--count", 1, "--split", "validation", "--size", 32, 48, "--encoder", "none")
-    made = clearway("scenes", "generate", *words, "--workers", 1, "--out", tmp_path)
+    made = clearway("scenes", "generate", *words, "--workers", 1, "--out", folder)
     assert made.code == 0, made
-    words = ("evaluate", run / "run", tmp_path, "--goals", 5, "--step-limit", 60, "--perturb", "all", "--takes", 1)
+    return folder
+
+
+def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, rooms):
+    words = ("evaluate", run / "run", rooms, "--goals", 5, "--step-limit", 60, "--perturb", "all", "--takes", 1)
     found = clearway(*words, "--json").json
     assert found["perturbed"]["takes"] == 1 and found["perturbed"]["perturbations"]["pixel_noise"] == 10
     plain = clearway(*words[:-4], "--json").json
@@ -48,7 +55,7 @@ def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, tmp_
     assert [one["scenes"] for one in plain["others"]] == [one["scenes"] for one in found["others"]]
     shown = clearway(*words)
     assert shown.code == 0 and "5 goals in 1 scenes, pictures perturbed: move ± 0.05 m" in shown.out
-    words = ("evaluate", run / "run", tmp_path, "--goals", 3, "--step-limit", 30, "--live", "--json")
+    words = ("evaluate", run / "run", rooms, "--goals", 3, "--step-limit", 30, "--live", "--json")
     (live,) = clearway(*words).json["results"]
     assert live["agent"] == "recurrent" and live["average"]["episodes"] == 3 and live["average"]["steps"] > 1
 
@@ -141,11 +148,8 @@ def test_the_generalist_walks_to_goals_where_nothing_is_said_of_them(clearway, r
     assert clearway("evaluate", "nobody", "--rooms", "validation").refusal("nobody: no run here")
 
 
-def test_the_generalist_walks_off_the_grid(clearway, tmp_path):
-    words = ("--kind", "room", "--count", 1, "--split", "validation", "--size", 32, 48, "--encoder", "none")
-    made = clearway("scenes", "generate", *words, "--workers", 1, "--out", tmp_path)
-    assert made.code == 0, made
-    words = ("evaluate", "generalist", tmp_path, "--live", "--goals", 2, "--step-limit", 2)
+def test_the_generalist_walks_off_the_grid(clearway, rooms):
+    words = ("evaluate", "generalist", rooms, "--live", "--goals", 2, "--step-limit", 2)
     (found,) = clearway(*words, "--angle-noise", 5, "--json").json["results"]
     assert found["agent"] == "generalist" and found["perturbed"]["perturbations"]["angle_noise"] == 5
     wanted = {"success", "success_4x", "spl", "collisions", "steps", "episodes"}

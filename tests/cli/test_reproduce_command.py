@@ -52,12 +52,12 @@ def dumps(small, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def first(clearway, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
-    """fig5, reproduced once: its words, its answer and the folder that it left."""
+    """fig5, reproduced once: its words, its answer and the folder that it left. Later calls need one worker alone."""
     folder = tmp_path_factory.mktemp("reproduced")
     words = ("--scenes", write_rooms(folder / "dumps"), "--seeds", 1, "--json")
     with small_experiments():
         answer = clearway("reproduce", "fig5", *words, "--learners", "default", "--out", folder / "out")
-    return SimpleNamespace(words=words, answer=answer, out=folder / "out")
+    return SimpleNamespace(words=(*words, "--workers", 1), answer=answer, out=folder / "out")
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from helpers.small_setting import small_setting
 
 def made_job(out: Path) -> Job:
     setting = small_setting(out, seeds=1)
-    learner = replace(setting.learners["default"], lr_start=1e-2, lr_end=1e-2)  # every update shows
+    learner = replace(setting.learners["default"], frames=400, lr_start=1e-2, lr_end=1e-2)  # every update shows
     (run,) = setting.runs(learner, COLLISION_AWARE)
     return Job(run, (setting.trial(), setting.trial(halfway=True), setting.trial(((1,), (2, 3)))))
 

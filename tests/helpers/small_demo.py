@@ -22,7 +22,7 @@ def small_bathroom() -> Scene:
 
 
 def shrink_demo(patch: pytest.MonkeyPatch) -> None:
-    """Let the demo take the small room as it is, learn with few environments and walk few, short episodes."""
+    """Let the demo take the small room as it is, learn with few environments, walk few, short episodes, draw small."""
 
     def room(name: str, *, progress: bool) -> Scene:
         assert name == "bathroom"
@@ -31,6 +31,7 @@ def shrink_demo(patch: pytest.MonkeyPatch) -> None:
     def encode(scenes: Sequence[Scene], encoder: str, *, progress: bool) -> list[Scene]:
         return list(scenes)
 
+    patch.setattr("clearway.viz.figures.DPI", 50)
     patch.setattr("clearway.experiments.demo.cached_room_scene", room)
     patch.setattr("clearway.experiments.demo.encode_scenes", encode)
 

@@ -16,14 +16,14 @@ from helpers.made import grid_scene
 from helpers.small_runs import FEATURES, small_learner
 
 PRESETS = {"paper": PAPER_A2C, "default": DEFAULT}
-FRAMES = 400
-BUDGET = replace(SMOKE, episodes_per_target=3, step_limit=60)
+FRAMES = 160  # two updates
+BUDGET = replace(SMOKE, default_frames=2_400, episodes_per_target=3, step_limit=40)
 
 
 def small_rooms() -> list[Scene]:
     """Two grids, large enough for the experiments' targets."""
     return [
-        grid_scene(seed, width=5, depth=5, obstacle_share=0.1, feature_count=FEATURES, name=name)
+        grid_scene(seed, width=4, depth=4, obstacle_share=0.1, feature_count=FEATURES, name=name)
         for seed, name in ((1, "bathroom"), (2, "kitchen"))
     ]
 

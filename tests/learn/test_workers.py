@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+import torch
 
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
@@ -122,6 +123,14 @@ def test_what_several_workers_cannot_train_is_refused_before_a_folder_is_made(tm
     for told, (request, workers) in refused.items():
         with pytest.raises(RunError, match=told):
             train_by_workers(request, tmp_path / "run", workers)
+    assert not (tmp_path / "run").exists()
+
+
+def test_workers_without_a_gpu_for_each_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("clearway.learn.train.usable_device", torch.device)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
+    with pytest.raises(RunError, match=r"2 workers on 1 GPU: each needs one of its own\. Give fewer"):
+        train_by_workers(small_request(device="cuda"), tmp_path / "run", 2)
     assert not (tmp_path / "run").exists()
 
 

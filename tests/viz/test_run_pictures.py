@@ -10,7 +10,7 @@ from PIL import Image
 
 from clearway.learn.load import load_agent
 from clearway.learn.train import train
-from clearway.viz import run_pictures
+from clearway.viz import figures, run_pictures
 from clearway.viz.run_pictures import draw_run_pictures
 from clearway.zones import scene_zones
 from helpers.small_runs import small_learner, small_request, small_scenes, small_targets
@@ -63,7 +63,8 @@ def test_maps_and_sheets_show_one_walk_in_the_zones_of_the_run(run, tmp_path, mo
     assert rows["collision-aware"][-1]["frames"] == 160
 
 
-def test_the_seed_chooses_the_episode(run, tmp_path):
+def test_the_seed_chooses_the_episode(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(figures, "DPI", 50)
     pictures = [
         {path.name: path.read_bytes() for path in draw_run_pictures(*run, small_scenes(), tmp_path / name, seed=seed)}
         for name, seed in (("a", 0), ("b", 0), ("c", 1))

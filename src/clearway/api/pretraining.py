@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from clearway.api.arguments import as_path, as_whole
+from clearway.api.arguments import as_path, as_whole, as_word
 
 if TYPE_CHECKING:
     from clearway.choices import TrackerName
@@ -26,6 +26,7 @@ def pretrain(
     keeping: str | None = None,
     try_on: Sequence[PathLike] = (),
     threads: int | None = None,
+    device: str = "cpu",
     resume: bool = False,
     track: TrackerName | None = None,
     show_progress: bool = False,
@@ -40,7 +41,9 @@ def pretrain(
         keeping: eyes, clearway or a folder, whose features stay as they are: only what is told from them is taught, for
             example on rooms like one's own. None: all is taught, from nothing.
         try_on: views of other rooms, to try the eyes on once they are trained.
-        threads: of torch; None leaves its own choice. Results repeat bit for bit at one number.
+        threads: of torch; None leaves its own choice. Results repeat bit for bit at one number. On a GPU so many
+            threads make ready what it learns from.
+        device: of torch, "cpu" or "cuda".
         resume: go on from the newest checkpoint in `out`.
         track: where figures are shown as they come, "tensorboard" or "wandb", beside `metrics.jsonl`.
         show_progress: draw a progress bar, if standard error is a terminal.
@@ -68,7 +71,7 @@ def pretrain(
     count = None if threads is None else as_whole("threads", threads, 1)
     tried = views_in([as_path("try_on", path) for path in try_on]) if try_on else None
     shown = views_in([as_path("views", path) for path in views])
-    request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept)
+    request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept, as_word("device", device))
     folder = as_path("out", out)
     with torch_threads(count), picture_progress("learning to see", settings.pictures, show_progress) as show_done:
         train_eyes(request, folder, resume=resume, track=track, done=show_done)

@@ -37,6 +37,8 @@ class Pretrain:
     """Views of other rooms, to try the eyes on once they are trained."""
     threads: int | None = None
     """Threads of torch. Results repeat bit for bit at one number of threads."""
+    device: str = "cpu"
+    """cpu or cuda."""
     track: TrackerName | None = None
     """Show figures elsewhere as they come: tensorboard, in --out; wandb, offline unless you are logged in. Needs the
     extra of that name; by default metrics.jsonl in --out alone."""
@@ -57,6 +59,7 @@ class Pretrain:
             keeping=self.keeping,
             try_on=self.try_on,
             threads=self.threads,
+            device=self.device,
             resume=self.resume,
             track=self.track,
             show_progress=True,

@@ -28,6 +28,7 @@ from clearway.learn.tracking import check_tracker
 from clearway.reward import Reward
 from clearway.scenes.features import FileFeatures
 from clearway.scenes.scene import Scene
+from clearway.torch_device import usable_device
 from clearway.world.mapped_scenes import mapped_scenes
 from clearway.world.world import World, make_world
 
@@ -267,21 +268,6 @@ def _resumed(trainer: Learning, folder: RunFolder, peers: Peers = ALONE) -> floa
     if peers.leads:
         folder.forget_metrics_after(progress.frames)
     return progress.seconds
-
-
-def usable_device(name: str) -> torch.device:
-    """The torch device of that name.
-
-    Raises:
-        RunError: there is none on this machine.
-    """
-    try:
-        device = torch.device(name)
-        torch.zeros(1, device=device).item()
-    except (RuntimeError, AssertionError) as error:  # torch without CUDA asserts
-        reason = str(error).splitlines()[0]
-        raise RunError(f"device {name}: cannot be used here ({reason}). Give another --device, such as cpu") from error
-    return device
 
 
 def set_threads(count: int | None) -> None:

@@ -112,6 +112,8 @@ def train_by_workers(
     """
     check_tracker(track)
     request.check_workers(workers)
+    if ray is None:
+        _check_gpus(request.device, workers)
     folder = RunFolder(out)
     opened_copy(copy_to, folder, resume)
     own_files = features_read_once(request) if ray is None else nullcontext(request)  # which other machines do not see
@@ -143,6 +145,13 @@ def _record(request: RunRequest, workers: int) -> RunRecord:
     """The record of a run by so many workers."""
     record = record_of(request)
     return replace(record, hardware={**record.hardware, "workers": workers})
+
+
+def _check_gpus(device: str, workers: int) -> None:
+    """Raises RunError where this machine has no GPU for each."""
+    if torch.device(device).type == "cuda" and workers > (count := torch.cuda.device_count()):
+        problem = f"{workers} workers on {count} GPU{'s' * (count != 1)}: each needs one of its own"
+        raise RunError(f"{problem}. Give fewer --workers, or --device cpu")
 
 
 def _launched_on_ray(task: Task, workers: int, address: str) -> list[str | None]:

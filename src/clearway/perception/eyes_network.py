@@ -165,8 +165,8 @@ class Eyes(nn.Module):
 
     def count(self, where: Tensor, stands: Tensor) -> None:
         """Keep how often what it has learnt from was so: bins (P,) int64 of pairs, and places to stand (B, 63) bool."""
-        self.whereabouts_seen += torch.bincount(where, minlength=WHEREABOUTS)
-        self.stood += torch.cat([stands.sum(dim=0), torch.tensor([len(stands)])])
+        self.whereabouts_seen += torch.bincount(where, minlength=WHEREABOUTS).to(self.whereabouts_seen.device)
+        self.stood += torch.cat([stands.sum(dim=0), torch.tensor([len(stands)])]).to(self.stood.device)
 
     def compare(self, first: Tensor, second: Tensor, first_depth: Tensor, second_depth: Tensor) -> Comparison:
         """What tokens (P, T, C) of two pictures, and their depth (P, T) as `glance` tells it, tell of the cameras."""

@@ -1,34 +1,49 @@
-"""Things that are made in a thread of their own before they are asked for."""
+"""Things that are made in threads of their own before they are asked for."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 T = TypeVar("T")
-AHEAD = 2  # of them at a time
+U = TypeVar("U")
+AHEAD = 2  # of them, beside one for each thread
 
 
-def made_ahead(things: Iterator[T], count: int = AHEAD) -> Iterator[T]:
-    """The same things in the same order; the next `count` are made meanwhile. What goes wrong there is raised here."""
-    with ThreadPoolExecutor(1) as thread:
-        waiting: deque[Future[tuple[T, ...]]] = deque()
+def made_ahead(parts: Iterator[T], make: Callable[[T], U], threads: int = 1) -> Iterator[U]:
+    """What `make` makes of each part, in their order; what goes wrong there is raised here.
 
-        def one() -> tuple[T, ...]:
-            for thing in things:
-                return (thing,)
+    Args:
+        parts: read one after the other, in a thread of their own.
+        make: called by several threads at once.
+        threads: that make things meanwhile.
+    """
+    with ThreadPoolExecutor(1) as reader, ThreadPoolExecutor(threads) as makers:
+        read: deque[Future[tuple[T, ...]]] = deque()
+        waiting: deque[Future[tuple[U, ...]]] = deque()
+
+        def part() -> tuple[T, ...]:
+            for one in parts:
+                return (one,)
             return ()
+
+        def made(reading: Future[tuple[T, ...]]) -> tuple[U, ...]:
+            return tuple(make(one) for one in reading.result())
 
         try:
             while True:
-                while len(waiting) <= count:
-                    waiting.append(thread.submit(one))
-                made = waiting.popleft().result()
-                if not made:
+                while len(waiting) < AHEAD + threads:
+                    read.append(reader.submit(part))
+                    waiting.append(makers.submit(made, read[-1]))
+                thing = waiting.popleft().result()
+                read.popleft()
+                if not thing:
                     return
-                yield made[0]
+                yield thing[0]
         finally:
-            for future in waiting:
-                future.cancel()
+            for making in waiting:
+                making.cancel()
+            for reading in read:
+                reading.cancel()

@@ -40,7 +40,7 @@ def record_of(request: PretrainRequest) -> dict[str, Any]:
         "keeping": None if request.keeping is None else _kept(card_of(request.keeping.record)),
         "views": {"rooms": len(views.rooms), "pictures": len(views), "digest": digest, **views.settings.to_json()},
         "versions": package_versions(),
-        "hardware": hardware(),
+        "hardware": hardware(request.device),
         "command": list(sys.argv),
     }
 

@@ -80,11 +80,13 @@ class Lesson:
 
 
 def losses(eyes: Eyes, lesson: Lesson, bfloat16: bool) -> Parts:
-    """The loss of a batch; `bfloat16`: the trunk multiplies in it."""
-    with torch.autocast(lesson.pixels.device.type, torch.bfloat16, enabled=bfloat16):
-        tokens = eyes(lesson.pixels)
+    """The loss of a batch, on the device of the eyes; `bfloat16`: the trunk multiplies in it."""
+    device = eyes.slopes.device
+    with torch.autocast(device.type, torch.bfloat16, enabled=bfloat16):
+        tokens = eyes(lesson.pixels.to(device))
         glance = eyes.glance(tokens)
-    tokens, first, second = tokens.float(), lesson.first, lesson.second
+    first, second = (torch.from_numpy(numbers).to(device) for numbers in (lesson.first, lesson.second))
+    tokens = tokens.float()
     comparison = eyes.compare(tokens[first], tokens[second], glance.depth[first], glance.depth[second])
     free, stands, depth, place = _of_glance(glance, lesson.batch, eyes)
     pose, overlap, match, where = _of_comparison(comparison, lesson.labels)
@@ -99,19 +101,22 @@ def drawn_pairs(count: int, partners: int, group: int, rng: np.random.Generator)
 
 def _of_glance(glance: Glance, batch: ViewBatch, eyes: Eyes) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Losses of free ways, of places to stand at, of depth, and of descriptions."""
-    free = torch.from_numpy(np.log(batch.table.free_m + NEAREST_M).astype(np.float32))
-    deep = torch.from_numpy(np.log(np.maximum(token_depth_m(batch.seen["depth"], eyes.shape.grid), SHALLOWEST_M)))
+    device = glance.free.device
+    free = torch.from_numpy(np.log(batch.table.free_m + NEAREST_M).astype(np.float32)).to(device)
+    deep_m = np.maximum(token_depth_m(batch.seen["depth"], eyes.shape.grid), SHALLOWEST_M)
+    deep = torch.from_numpy(np.log(deep_m)).to(device)
     alike = glance.description[0::2] @ glance.description[1::2].T * SHARPNESS
-    same = torch.arange(len(alike))
+    same = torch.arange(len(alike), device=device)
     place = (functional.cross_entropy(alike, same) + functional.cross_entropy(alike.T, same)) / 2
-    stands = torch.from_numpy(batch.table.stands.astype(np.float32))
+    stands = torch.from_numpy(batch.table.stands.astype(np.float32)).to(device)
     standing = functional.binary_cross_entropy_with_logits(glance.stands, stands)
     return _bent(glance.free, free).mean(), standing, _bent(glance.depth, deep).mean(), place
 
 
 def _of_comparison(comparison: Comparison, labels: PairLabels) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Losses of poses (metres count less the farther the cameras stand apart), overlap, matches, and bins of poses."""
-    place_m, turn, match, overlap, where = (torch.from_numpy(part) for part in vars(labels).values())
+    device = comparison.turn.device
+    place_m, turn, match, overlap, where = (torch.from_numpy(part).to(device) for part in vars(labels).values())
     weight = (overlap + WITHOUT_OVERLAP).unsqueeze(1)
     scale = 1 / (0.5 + place_m.norm(dim=1, keepdim=True))
     placed = (_bent(comparison.place_m * scale, place_m * scale) * weight).mean()

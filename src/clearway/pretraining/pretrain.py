@@ -39,6 +39,7 @@ from clearway.pretraining.labels import pair_labels
 from clearway.pretraining.losses import Lesson, drawn_pairs, losses
 from clearway.pretraining.settings import PretrainSettings
 from clearway.scenes.sensors import DEPTH, RGB
+from clearway.torch_device import usable_device
 from clearway.views.stream import ViewBatch, Views
 
 ROWS = 200  # of metrics.jsonl, about
@@ -55,6 +56,7 @@ class PretrainRequest:
         settings: how.
         seed: of the first parameters, of the order of the views, and of all other chances.
         keeping: eyes that are taught on, whose features stay as they are; None: all is learnt anew.
+        device: of torch, for example "cpu" or "cuda".
 
     Raises:
         ArgumentError: the views are of another kind, or too few.
@@ -64,6 +66,7 @@ class PretrainRequest:
     settings: PretrainSettings
     seed: int = 0
     keeping: EyesEncoder | None = None
+    device: str = "cpu"
 
     def __post_init__(self) -> None:
         self.settings.check()
@@ -107,11 +110,13 @@ def pretrain(
         done: is told how many pictures are used.
 
     Raises:
-        RunError: `out` holds a training already (and resume is off) or another one, is in use, or training failed.
+        RunError: `out` holds a training already (and resume is off) or another one, is in use, training failed, or
+            there is no such device.
         SceneError: a shard is damaged or gone.
         KeyboardInterrupt: the user interrupted; it can be resumed.
     """
     check_tracker(track)
+    usable_device(request.device)
     folder = EyesFolder(out)
     with folder.held():
         trainer = Pretrainer(request)
@@ -127,7 +132,7 @@ class Pretrainer:
     """Eyes that learn.
 
     Attributes:
-        eyes: the network.
+        eyes: the network, on the device.
         updates: made so far.
     """
 
@@ -138,16 +143,18 @@ class Pretrainer:
             self.eyes = Eyes(self.settings.shape)
         if request.keeping is not None:
             self.eyes.teach_on(request.keeping.eyes)
+        self.device = usable_device(request.device)
+        self.eyes.to(self.device)
         self._named = {name: value for name, value in self.eyes.named_parameters() if value.requires_grad}
         parameters = list(self._named.values())
         self._optimiser = torch.optim.AdamW(parameters, lr=0.0, weight_decay=self.settings.weight_decay, fused=True)
         for parameter in parameters:
             self._optimiser.state[parameter] = {
-                "step": torch.zeros((), dtype=torch.float32),
+                "step": torch.zeros((), dtype=torch.float32, device=self.device),
                 "exp_avg": torch.zeros_like(parameter),
                 "exp_avg_sq": torch.zeros_like(parameter),
             }
-        self._bfloat16 = multiplies_bfloat16(torch.device("cpu"))
+        self._bfloat16 = multiplies_bfloat16(self.device)
         self.updates = 0
 
     @property
@@ -172,12 +179,13 @@ class Pretrainer:
             epoch, start = epoch + 1, 0
 
     def lessons(self) -> Iterator[Lesson]:
-        """The batches that are next, relit and paired, without end."""
-        for update, batch in enumerate(self.batches(), self.updates):
-            yield self._lesson(batch, update)
+        """The batches that are next, relit and paired, without end; on a GPU all of torch's threads make them."""
+        threads = 1 if self.device.type == "cpu" else torch.get_num_threads()
+        return made_ahead(enumerate(self.batches(), self.updates), self._lesson, threads)
 
-    def _lesson(self, batch: ViewBatch, update: int) -> Lesson:
-        """A batch, relit and paired by the chances of an update."""
+    def _lesson(self, numbered: tuple[int, ViewBatch]) -> Lesson:
+        """The batch of an update, relit and paired by that update's chances."""
+        update, batch = numbered
         settings, number = self.settings, [self.request.seed, update]
         levels = relit(batch.seen[RGB], np.random.default_rng([*number, LIGHT]))
         rng = np.random.default_rng([*number, PARTNERS])
@@ -249,7 +257,7 @@ def _run(
     saved_at = time.monotonic()
     with interruption() as interrupted:
         try:
-            for lesson in made_ahead(trainer.lessons()):
+            for lesson in trainer.lessons():
                 begun = time.monotonic()
                 figures = trainer.update(lesson)
                 seconds += time.monotonic() - begun
