@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -102,7 +103,9 @@ def main() -> None:
     print(
         f"run folder begun after {began - started:.1f} s; first update after {written - row['seconds'] - started:.1f} s"
     )
-    print(f"the update took {row['seconds']:.1f} s; all of it {took_s:.1f} s")
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu_s = used.ru_utime + used.ru_stime
+    print(f"the update took {row['seconds']:.1f} s; all of it {took_s:.1f} s, and {cpu_s:.1f} s of processor")
     print(f"memory of each process, GB at most: {', '.join(f'{gb:.2f}' for gb in most.values() if gb > 0.05)}")
 
 
