@@ -184,3 +184,23 @@ def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> 
     claimed = [line.strip("| ").split(" | ") for line in lines if line.endswith("| undecided |")]
     for cells, claim in zip(claimed, section.claims, strict=True):
         assert f"p = {cells[2]}, for 6 claims {cells[3]} (Holm)" in claim.evidence
+
+
+def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:
+    sets = json.loads((DOCS / "figures" / "fresh-rooms.json").read_text(encoding="utf-8"))
+    runs = [run for one in sets for run in one["seeds"]]
+    assert len(runs) == 6 and all(run["met"]["all"] and run["solved_targets"] == 20 for run in runs)
+    first, solved = ([run["first_met"][name]["seconds"] for run in runs] for name in ("all", "solved_targets"))
+    columns = [[run[name] for run in runs] for name in ("path_ratio", "worst_path_ratio", "collisions")]
+    (line,) = [
+        line for line in (DOCS / "results.md").read_text(encoding="utf-8").splitlines() if "three times four" in line
+    ]
+    for cell, values in zip(line.strip("|").split("|")[1:], [*columns, solved, first], strict=True):
+        least, most = numbers(cell)
+        expect(least, min(values), cell)
+        expect(most, max(values), cell)
+    for one in sets:
+        for run in one["seeds"]:
+            rows = run["evaluation"]["targets"]
+            for name in ("steps", "collisions"):
+                assert run[name] == pytest.approx(sum(row[name] for row in rows) / len(rows))

@@ -134,6 +134,7 @@ BESIDE = {
     ("provenance.py", "CPU_INFO.read_text(encoding='utf-8', errors='replace')"): "the system's",
     ("checkpoint.py", "os.open(path, os.O_RDONLY)"): "flushes what was just written, and reads nothing",
     ("files.py", "part.open('rb+')"): "flushes what was just written, and reads nothing",
+    ("mapped_features.py", "place.path.open('r+b')"): "writes into a file of our own",
     ("browser.py", "os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 384)"): "writes",
     ("main.py", "os.open(os.devnull, os.O_WRONLY)"): "drops what cannot be printed",
     ("worker.py", "os.open(os.devnull, os.O_RDONLY)"): "stands in for standard input",

@@ -9,7 +9,7 @@ from clearway.experiments.budget import SMOKE
 from clearway.experiments.plan import SceneFile
 from clearway.experiments.setting import Setting
 from clearway.learn.presets import DEFAULT, PAPER_A2C
-from clearway.learn.run_folder import scene_digest
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import grid_scene

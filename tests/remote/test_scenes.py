@@ -9,8 +9,9 @@ import pytest
 import clearway
 from clearway.cli.main import main
 from clearway.learn.load import run_scenes
-from clearway.learn.run_folder import RunFolder, scene_digest
+from clearway.learn.run_folder import RunFolder
 from clearway.remote.address import fetched_folder
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene
 from helpers.servers_of_files import files_of, web_server

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clearway.errors import SceneError
-from clearway.learn.run_folder import scene_digest
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.features import FileFeatures
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import corridor_scene, grid_scene

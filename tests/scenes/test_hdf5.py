@@ -1,5 +1,6 @@
 """Arrays of our files stand under a checksum, whatever their size."""
 
+import zlib
 from pathlib import Path
 
 import h5py
@@ -47,3 +48,20 @@ def test_no_bit_of_a_scalar_changes_unnoticed(tmp_path: Path) -> None:
         path.write_bytes(hurt)
         with pytest.raises(SceneError):
             read_scalar(path)
+
+
+@pytest.mark.parametrize(("size", "refused"), [(80 * 1024**2, True), (None, False)])
+def test_a_chunk_that_would_unpack_to_more_than_any_may_is_measured(
+    tmp_path: Path, size: int | None, refused: bool
+) -> None:
+    path, values = tmp_path / "a.h5", np.arange(400, dtype=np.int32).reshape(100, 4)
+    with h5py.File(path, "w") as file:
+        dataset = file.create_dataset("a", values.shape, values.dtype, chunks=values.shape, compression="gzip")
+        dataset.id.write_direct_chunk((0, 0), zlib.compress(bytes(size) if size else values.tobytes()))
+    with hdf5.opened(path) as file:
+        dataset = hdf5.need_dataset(file, "a", path)
+        if refused:
+            with pytest.raises(SceneError, match=r"the chunk at \(0, 0\) unpacks to more than its 1,600 bytes"):
+                hdf5.read_values(dataset, path)
+        else:
+            assert np.array_equal(hdf5.read_values(dataset, path), values)

@@ -15,8 +15,9 @@ from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.experiments.plan import Job, PlannedRun, Trial
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_agent
-from clearway.learn.run_folder import RunFolder, scene_digest
+from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, set_threads, train
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
 from clearway.world.world import make_world

@@ -13,10 +13,10 @@ from clearway.experiments.budget import Budget
 from clearway.experiments.plan import PlannedRun, SceneFile, TargetSets, Trial
 from clearway.learn.learner import Learner
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
-from clearway.learn.run_folder import scene_digest
 from clearway.perception import encode_scenes
 from clearway.reward import Reward
 from clearway.rooms.library import cached_room_scene
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene, encoder_names
 from clearway.scenes.targets import default_targets, is_published
 from clearway.scenes.thor_v1 import read_scene, write_scene

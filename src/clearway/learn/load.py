@@ -16,12 +16,13 @@ from clearway.learn.checkpoint import newest_checkpoint, read_network, read_prog
 from clearway.learn.described import described
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
-from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord, scene_digest
+from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import ScenePolicy
 from clearway.remote.address import address_of
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES
 from clearway.scenes.thor_v1 import read_scene

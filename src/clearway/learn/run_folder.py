@@ -10,20 +10,17 @@ milestones/N/    the agent after N frames, where it was asked for: a checkpoint 
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import shutil
 import sys
 import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
-
-import numpy as np
 
 from clearway.choices import ZoneLevel
 from clearway.errors import ClearwayError, RunError, reason_of
@@ -36,6 +33,7 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.regular_files import read_bytes, read_text
 from clearway.remote.address import origin
 from clearway.reward import Reward, reward_from_json
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.features import FileFeatures
 from clearway.scenes.scene import Scene
 from clearway.spread.many import of_each
@@ -118,26 +116,10 @@ class RunRecord:
         return essence(self) == essence(other)
 
 
-def scene_digest(scene: Scene) -> str:
-    """Short SHA-256 of what training sees of a scene: graph, poses, features."""
-    digest = hashlib.sha256()
-    for array in (scene.graph, scene.locations_m, scene.headings_deg, scene.features):
-        if array is not None:
-            digest.update(str((array.shape, array.dtype.str)).encode())
-            digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def without_pictures(scenes: Sequence[Scene]) -> list[Scene]:
-    """Scenes with what training sees of them alone, as messages for other processes."""
-    return [replace(scene, observations=None, top_view=None, further=()) for scene in scenes]
-
-
 def record_of(request: RunRequest) -> RunRecord:
     """The record of a run that is about to start."""
     paths = request.paths or {}
-    in_files = all(isinstance(scene.features, FileFeatures) for scene in request.scenes)
-    digests = of_each(scene_digest, without_pictures(request.scenes)) if in_files else map(scene_digest, request.scenes)
+    digests = request.digests or _digests(request.scenes)
     return RunRecord(
         learner=request.learner,
         reward=request.paid,
@@ -158,6 +140,13 @@ def record_of(request: RunRequest) -> RunRecord:
         command=tuple(sys.argv),
         takes=request.takes_made,
     )
+
+
+def _digests(scenes: Sequence[Scene]) -> Iterable[str]:
+    """Of each scene."""
+    if all(isinstance(scene.features, FileFeatures) for scene in scenes):
+        return of_each(scene_digest, [scene.without_pictures() for scene in scenes])
+    return map(scene_digest, scenes)
 
 
 class RunFolder:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,10 @@ from clearway.learn.seeds import check_seed
 from clearway.learn.share import Share, check_scenes
 from clearway.learn.tracking import check_tracker
 from clearway.reward import Reward
+from clearway.scenes.features import FileFeatures
 from clearway.scenes.scene import Scene
 from clearway.torch_device import usable_device
+from clearway.world.mapped_scenes import mapped_scenes
 from clearway.world.world import World, make_world
 
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
@@ -47,6 +49,7 @@ class RunRequest:
         takes: features of other pictures of each scene's poses, (S, K, F) float32; at every step one of them or of the
             scene's own is seen, targets in the scene's own.
         takes_made: how they were made, JSON values.
+        digests: of the scenes (`scene_digest`), where they are known.
 
     Raises:
         RunError: the seed is out of range, or the algorithm learns from no takes.
@@ -63,6 +66,7 @@ class RunRequest:
     feature_store: FeatureStore = "memory"
     takes: Sequence[np.ndarray] | None = None
     takes_made: Mapping[str, Any] | None = None
+    digests: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -141,9 +145,11 @@ def train(
         KeyboardInterrupt: the user interrupted; the run can be resumed.
     """
     check_tracker(track)
-    trainer, folder = request.trainer(), RunFolder(out)  # what cannot be trained leaves no folder
-    copy = opened_copy(copy_to, folder, resume)
-    with folder.held(), folder.begun(record_of(request), resume) as other_bits:
+    folder = RunFolder(out)
+    with features_read_once(request) as read:
+        trainer = read.trainer()  # what cannot be trained leaves no folder
+        copy, record = opened_copy(copy_to, folder, resume), record_of(read)
+    with folder.held(), folder.begun(record, resume) as other_bits:
         if on_begin is not None:
             on_begin(out)
         told_of_other_bits(folder, request, other_bits)
@@ -157,6 +163,21 @@ def train(
             run = Running(trainer, folder, view, interrupted, milestones, until_solved, track, ALONE, every_s, copy)
             run.go_on(seconds)
     return folder
+
+
+@contextmanager
+def features_read_once(request: RunRequest) -> Iterator[RunRequest]:
+    """The request, where it keeps features mapped, with those of scene files in one file: see `mapped_scenes`.
+
+    Raises:
+        RunError, SceneError: see there; or there is no such device.
+    """
+    usable_device(request.device)  # before what takes long
+    if request.feature_store == "mapped" and all(isinstance(scene.features, FileFeatures) for scene in request.scenes):
+        with mapped_scenes(request.scenes) as (scenes, digests):
+            yield replace(request, scenes=scenes, digests=digests)
+    else:
+        yield request
 
 
 def train_part(

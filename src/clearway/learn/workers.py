@@ -15,6 +15,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from pathlib import Path
@@ -26,11 +27,12 @@ from clearway.children import end_with_parent
 from clearway.choices import TrackerName
 from clearway.errors import ClearwayError, RunError
 from clearway.learn.peers import LostPeer, Peers
-from clearway.learn.run_folder import RunFolder, record_of, without_pictures
+from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.learn.tracking import check_tracker
 from clearway.learn.train import (
     SECONDS_BETWEEN_CHECKPOINTS,
     RunRequest,
+    features_read_once,
     opened_copy,
     set_threads,
     told_of_other_bits,
@@ -114,21 +116,20 @@ def train_by_workers(
         _check_gpus(request.device, workers)
     folder = RunFolder(out)
     opened_copy(copy_to, folder, resume)
-    record = record_of(request)
-    record = replace(record, hardware={**record.hardware, "workers": workers})
-    task = Task(
-        replace(request, scenes=without_pictures(request.scenes)),
-        out,
-        os.getpid(),
-        show_progress,
-        until_solved,
-        track,
-        threads or (1 if ray else max(1, torch.get_num_threads() // workers)),
-        checkpoint_s,
-        copy_to,
-    )
-    with folder.held(), folder.begun(record, resume) as other_bits:
+    own_files = features_read_once(request) if ray is None else nullcontext(request)  # which other machines do not see
+    with own_files as read, folder.held(), folder.begun(_record(read, workers), resume) as other_bits:
         told_of_other_bits(folder, request, other_bits)
+        task = Task(
+            replace(read, scenes=[scene.without_pictures() for scene in read.scenes]),
+            out,
+            os.getpid(),
+            show_progress,
+            until_solved,
+            track,
+            threads or (1 if ray else max(1, torch.get_num_threads() // workers)),
+            checkpoint_s,
+            copy_to,
+        )
         if on_begin is not None:
             on_begin(out)
         outcomes = _launched(task, workers) if ray is None else _launched_on_ray(task, workers, ray)
@@ -138,6 +139,12 @@ def train_by_workers(
         if INTERRUPTED in outcomes:
             raise KeyboardInterrupt
     return folder
+
+
+def _record(request: RunRequest, workers: int) -> RunRecord:
+    """The record of a run by so many workers."""
+    record = record_of(request)
+    return replace(record, hardware={**record.hardware, "workers": workers})
 
 
 def _check_gpus(device: str, workers: int) -> None:

@@ -186,4 +186,5 @@ def evenly_spaced(features: Tensor, most: int) -> Tensor:
 
 def all_finite(features: Tensor) -> bool:
     """No feature (S, F) is NaN or Inf."""
-    return all(bool(torch.isfinite(block).all()) for block in features.split(BLOCK_ROWS))
+    blocks = features.split(BLOCK_ROWS) if features.numel() else ()
+    return all(bool(torch.isfinite(torch.stack(torch.aminmax(block))).all()) for block in blocks)  # NaN is both

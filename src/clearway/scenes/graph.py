@@ -56,12 +56,6 @@ def turn_circles(graph: np.ndarray) -> np.ndarray:
     return rank[circle]
 
 
-def turn_counts(graph: np.ndarray) -> np.ndarray:
-    """Right turns that lead each state back to itself, (S,) int; right turns must be a permutation of the states."""
-    circle = turn_circles(graph)
-    return np.bincount(circle)[circle]
-
-
 def components(graph: np.ndarray) -> np.ndarray:
     """Label of the strongly connected component of each state, (S,) int; 0 is the largest component."""
     _, labels = connected_components(adjacency(graph), directed=True, connection="strong")

@@ -90,10 +90,9 @@ def find_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset | 
         SceneError: it is a link, not a dataset, keeps its values in another file, or is packed in an unknown way.
     """
     with faults_named(source, name):
-        link = parent.get(name, getlink=True)
-        if link is None:
+        if not parent.id.links.exists(name.encode()):
             return None
-        if not isinstance(link, h5py.HardLink):
+        if parent.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
             raise SceneError(source, "is a link, which is not followed", "Copy the data into the file", name)
         found = parent[name]
         if not isinstance(found, h5py.Dataset):
@@ -169,6 +168,8 @@ def _selected(shape: tuple[int, ...], selection: Selection) -> tuple[np.ndarray,
     """The indices along the first axis that a selection has, (R,), and how many values it has in all."""
     if not shape:
         return np.zeros(0, np.int64), 1
+    if selection is ...:
+        return np.arange(shape[0]), math.prod(shape)
     first, *others = selection if isinstance(selection, tuple) else (selection,)
     rows = np.atleast_1d(np.arange(shape[0])[first])
     kept = [np.arange(length)[part].size for length, part in zip(shape[1:], others, strict=False)]
@@ -178,14 +179,15 @@ def _selected(shape: tuple[int, ...], selection: Selection) -> tuple[np.ndarray,
 def read_attribute(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> str | int | float | None:
     """A small attribute as a Python number or text, None where there is none."""
     with faults_named(source, problem=f"attribute '{name}' cannot be read"):
-        if name not in item.attrs:
+        attributes = item.attrs
+        if name not in attributes:
             return None
-        kept = item.attrs.get_id(name)
+        kept = attributes.get_id(name)
         if kept.shape != () or kept.dtype.kind not in "iufbSO":
             raise SceneError(source, f"attribute '{name}' is neither a number nor a text", MAKE_AGAIN)
         if kept.get_storage_size() > MAX_JSON_BYTES:
             raise SceneError(source, f"attribute '{name}' is too large", MAKE_AGAIN)
-        value = item.attrs[name]
+        value = attributes[name]
         value = value.item() if isinstance(value, np.generic) else value
         value = value.decode() if isinstance(value, bytes) else value
     if not isinstance(value, str | int | float) or (isinstance(value, str) and len(value) > MAX_JSON_BYTES):

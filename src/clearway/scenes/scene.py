@@ -163,10 +163,10 @@ class Scene:
         """Cell of each state, (S,) int64: states that turns lead to share a cell; numbered by first appearance."""
         return graphs.turn_circles(self.graph)
 
-    @cached_property
+    @property
     def heading_count(self) -> int:
         """Headings at a location: so many right turns lead back to the same state."""
-        return int(graphs.turn_counts(self.graph)[0])
+        return int(np.count_nonzero(self.cells == 0))
 
     @property
     def turn_deg(self) -> float:
@@ -196,6 +196,12 @@ class Scene:
     def encoder_name(self) -> str:
         """Name of what made the features."""
         return self.encoder.name if self.encoder else "unknown"
+
+    def without_pictures(self) -> Scene:
+        """The same scene with what training sees of it alone, and what was found of its graph so far."""
+        bare = replace(self, observations=None, top_view=None, further=())
+        bare.__dict__.update({name: self.__dict__[name] for name in ("cells", "components") if name in self.__dict__})
+        return bare
 
     def with_features(self, features: np.ndarray, encoder: EncoderRecord) -> Scene:
         """The same scene with other features, (S, F) float32, and the record of what made them."""

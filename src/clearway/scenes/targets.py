@@ -5,6 +5,8 @@ In generated rooms and flats the choice leaves out the poses that are held out (
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from clearway.errors import SceneError
@@ -64,7 +66,7 @@ def seeded_targets(
         SceneError: there are fewer, or nothing is held out in the scene.
     """
     order = target_order(scene, seed, held_out)
-    most = _most_targets(scene, held_out)
+    most = _most_targets(scene, order)
     if count < 1 or count > most:
         raise SceneError(
             scene.name,
@@ -74,9 +76,16 @@ def seeded_targets(
     return tuple(sorted(order[:count]))
 
 
-def _most_targets(scene: Scene, held_out: bool) -> int:
-    """Of the scene: a target needs a start beside it."""
-    return min(len(possible_targets(scene, held_out)), int((scene.components == 0).sum()) - 1)
+def _few_targets(scene: Scene, seed: int, held_out: bool) -> tuple[int, ...]:
+    """Five seeded targets, fewer where there are no more to draw; one at least, or SceneError."""
+    order = target_order(scene, seed, held_out)
+    most = _most_targets(scene, order)
+    return tuple(sorted(order[: min(TARGETS_PER_SCENE, most)])) or seeded_targets(scene, most, seed, held_out)
+
+
+def _most_targets(scene: Scene, possible: Sequence[int]) -> int:
+    """Of a scene's possible ones: a target needs a start beside it."""
+    return min(len(possible), int((scene.components == 0).sum()) - 1)
 
 
 def target_order(scene: Scene, seed: int = 0, held_out: bool = False) -> tuple[int, ...]:
@@ -89,7 +98,7 @@ def target_order(scene: Scene, seed: int = 0, held_out: bool = False) -> tuple[i
     _, first_of_cell = np.unique(scene.cells[order], return_index=True)
     one_a_cell = order[np.sort(first_of_cell)]
     others = np.delete(order, np.sort(first_of_cell))
-    return tuple(int(state) for state in np.concatenate([one_a_cell, others]))
+    return tuple(np.concatenate([one_a_cell, others]).tolist())
 
 
 def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
@@ -99,7 +108,7 @@ def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
     """
     if is_published(scene):
         return ZHU_TARGETS[scene.name]
-    return seeded_targets(scene, min(TARGETS_PER_SCENE, _most_targets(scene, False)), seed)
+    return _few_targets(scene, seed, held_out=False)
 
 
 def default_held_out_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
@@ -108,7 +117,7 @@ def default_held_out_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:
     Raises:
         SceneError: nothing is held out in the scene.
     """
-    return seeded_targets(scene, min(TARGETS_PER_SCENE, _most_targets(scene, True)), seed, held_out=True)
+    return _few_targets(scene, seed, held_out=True)
 
 
 def is_published(scene: Scene) -> bool:

@@ -13,7 +13,6 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, MOVES, TURNS, Action
-from clearway.scenes.graph import turn_counts
 from clearway.scenes.scene import Observations, Scene, TopView
 from clearway.scenes.sensors import RGB, STEPS_DTYPE, Readings, Sensor
 
@@ -40,6 +39,7 @@ def check_scene(scene: Scene, source: str | Path | None = None) -> None:
     source = scene.name if source is None else source
     check_graph(scene.graph, source)
     check_turns(scene.graph, source)
+    check_headings(scene.cells, source)
     check_moves(scene.graph, source)
     check_poses(scene.locations_m, scene.headings_deg, scene.state_count, source)
     if scene.features is not None:
@@ -76,17 +76,22 @@ def check_graph(graph: np.ndarray, source: str | Path) -> None:
 
 
 def check_turns(graph: np.ndarray, source: str | Path) -> None:
-    """Check that turns are never blocked, right then left leads back, and so does one number of rights everywhere.
-
-    Raises:
-        SceneError: one of these is not so.
-    """
+    """Check that turns are never blocked, and that right then left leads back. Raises SceneError."""
     states = np.arange(len(graph))
     for turn in TURNS:
         _check_states(graph[:, turn] != BLOCKED, source, f"the {_words(turn)} is blocked")
     right, left = (graph[:, turn].astype(np.int64) for turn in TURNS)
     _check_states(left[right] == states, source, "a right and a left turn do not lead back")
-    turns = turn_counts(graph)
+
+
+def check_headings(cells: np.ndarray, source: str | Path) -> None:
+    """Check that one number of right turns leads back everywhere. Raises SceneError.
+
+    Args:
+        cells: (S,) int64, cell of each state, see `Scene.cells`.
+        source: the file, for the error.
+    """
+    turns = np.bincount(cells)[cells]
     usual = int(np.bincount(turns).argmax())
     _check_states(turns == usual, source, f"the right turns that lead back are not {usual}, as elsewhere,")
     allowed = MIN_HEADINGS <= usual <= MAX_HEADINGS

@@ -42,6 +42,10 @@ class Beats:
         told = zip(self.shared[::2], self.shared[1::2], strict=True)
         return any(ready and beaten > oldest for beaten, ready in told)
 
+    def any_fresh(self) -> bool:
+        """Whether a replica has beaten lately, ready or not."""
+        return max(self.shared[::2]) > time.monotonic() - FRESH_S
+
 
 @dataclass(frozen=True)
 class Replica:

@@ -32,6 +32,7 @@ from clearway.serve.session_record import KEY_BYTES, most_record_bytes, shapes_o
 from clearway.serve.session_table import SessionTable
 from clearway.serve.sessions import begun_state
 from clearway.serve.shared_sessions import SharedSessions
+from clearway.serve.stand_in import standing_in
 from clearway.serve.tokens import Tokens
 
 LOOKS_EVERY_S = 0.2
@@ -115,7 +116,8 @@ def run_replicas(
         common = Common(opened, network, tokens, tokens_file, limits, count, folder, key, beats)
         places = [_Place(common, number) for number in range(count)]
         try:
-            with rotating(tokens, tokens_file, lambda: _tell(places, signal.SIGHUP)):
+            further = rotating(tokens, tokens_file, lambda: _tell(places, signal.SIGHUP))
+            with further, standing_in(network, beats.any_fresh):
                 while not ending:
                     for place in places:
                         place.look()

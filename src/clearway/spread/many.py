@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +32,7 @@ def of_each(function: Callable[[Thing], Result], things: Sequence[Thing]) -> Ite
         return
     parts = [(function, things[first : first + AT_ONCE]) for first in range(0, len(things), AT_ONCE)]
     environment = {"OMP_NUM_THREADS": "1"}
-    work: Work[None, _Part, _Done] = Work(_nothing, _done, _died, environment=environment)
+    work: Work[None, _Part, _Done] = Work(_ready, _done, _died, environment=environment)
     with workers_for(work, workers=cores) as crew:
         for results, told in crew.results(parts):
             for message, kind in told:
@@ -39,8 +40,9 @@ def of_each(function: Callable[[Thing], Result], things: Sequence[Thing]) -> Ite
             yield from results
 
 
-def _nothing() -> None:
-    """No tool is needed."""
+def _ready() -> None:
+    """Keep what was imported from being searched for garbage again and again."""
+    gc.freeze()
 
 
 def _done(_: None, part: _Part) -> _Done:

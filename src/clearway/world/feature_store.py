@@ -14,7 +14,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import IO
 
 import numpy as np
 import torch
@@ -23,8 +26,9 @@ from torch import Tensor
 from clearway.choices import FeatureStore
 from clearway.errors import RunError, SceneError
 from clearway.files import CACHE_VARIABLE, cache_dir
+from clearway.scenes.mapped_features import FLOAT_BYTES, MappedFeatures
 from clearway.scenes.records import FILE_ENCODER
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Features, Scene
 
 FEW_STATES = 16_384  # up to so many, whatever is computed of states is computed of all of them at once
 BLOCK_ROWS = 8_192  # features that go through memory at a time
@@ -40,6 +44,23 @@ def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | No
     """
     if all(scene.features is None for scene in scenes):
         return None
+    check_together(scenes)
+    features = [scene.features for scene in scenes]
+    assert features[0] is not None
+    if store == "mapped" and (whole := _adjoining(features)):
+        return torch.from_numpy(np.asarray(whole))
+    joined = empty_store(sum(scene.state_count for scene in scenes), features[0].shape[1], store)
+    for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
+        own = np.asarray(scene.features, np.float32)
+        if store == "float16" and np.abs(own).max() > LARGEST_FLOAT16:
+            problem = f"holds features beyond {LARGEST_FLOAT16:,.0f}, the largest of float16"
+            raise SceneError(scene.name, problem, "Keep features in another store, mapped", "resnet_feature")
+        rows.numpy()[:] = own
+    return joined
+
+
+def check_together(scenes: Sequence[Scene]) -> None:
+    """Raise SceneError where only some scenes have features, or features of other encoders."""
     first = scenes[0]
     for scene in scenes:
         if scene.features is None or first.features is None:
@@ -50,15 +71,19 @@ def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | No
         if _identity(scene) != _identity(first):
             problem = f"features made by {_identity(scene)}, those of {first.name} by {_identity(first)}"
             raise SceneError(scene.name, problem, _remedy(first), "resnet_feature")
-    assert first.features is not None
-    joined = empty_store(sum(scene.state_count for scene in scenes), first.features.shape[1], store)
-    for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
-        features = np.asarray(scene.features, np.float32)
-        if store == "float16" and np.abs(features).max() > LARGEST_FLOAT16:
-            problem = f"holds features beyond {LARGEST_FLOAT16:,.0f}, the largest of float16"
-            raise SceneError(scene.name, problem, "Keep features in another store, mapped", "resnet_feature")
-        rows.numpy()[:] = features
-    return joined
+
+
+def _adjoining(features: Sequence[Features | None]) -> MappedFeatures | None:
+    """All rows of features that lie one after the other in one file; None where they do not."""
+    first, rows = features[0], 0
+    for own in features:
+        if not isinstance(own, MappedFeatures) or not isinstance(first, MappedFeatures):
+            return None
+        if (own.path, own.first) != (first.path, first.first + rows):
+            return None
+        rows += own.shape[0]
+    assert isinstance(first, MappedFeatures)
+    return replace(first, shape=(rows, first.shape[1]))
 
 
 def _identity(scene: Scene) -> str:
@@ -78,10 +103,17 @@ def empty_store(states: int, features: int, store: FeatureStore) -> Tensor:
     Raises:
         RunError: there is not so much memory, or room in the cache folder.
     """
-    try:
+    with room_for(states, features, store):
         if store == "mapped":
             return _mapped(states, features)
         return torch.empty(states, features, dtype=torch.float16 if store == "float16" else torch.float32)
+
+
+@contextmanager
+def room_for(states: int, features: int, store: FeatureStore) -> Iterator[None]:
+    """Turn what goes wrong where memory or a file is asked for into RunError."""
+    try:
+        yield
     except (OSError, RuntimeError, MemoryError) as fault:
         size = f"{features} features of {states} states need {_gib(states, features, store):.1f} GiB"
         if store == "mapped":
@@ -94,13 +126,17 @@ def _mapped(states: int, features: int) -> Tensor:
     folder = cache_dir()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder) as file:
-        size = states * features * 4
-        if hasattr(os, "posix_fallocate"):  # a disk that is full later would end the process without a word
-            os.posix_fallocate(file.fileno(), 0, size)
-        else:
-            file.truncate(size)
+        reserve(file, states * features * FLOAT_BYTES)
         return torch.from_numpy(np.memmap(file, np.float32, "r+", shape=(states, features)))
 
 
+def reserve(file: IO[bytes], size: int) -> None:
+    """Make a new file so large, in bytes. Raises OSError where there is no room."""
+    if hasattr(os, "posix_fallocate"):  # a disk that is full later would end the process without a word
+        os.posix_fallocate(file.fileno(), 0, size)
+    else:
+        file.truncate(size)
+
+
 def _gib(states: int, features: int, store: FeatureStore) -> float:
-    return states * features * (2 if store == "float16" else 4) / 1024**3
+    return states * features * (2 if store == "float16" else FLOAT_BYTES) / 1024**3
