@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
@@ -22,6 +24,8 @@ from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder, record_of
 from clearway.learn.trainer import Trainer
 from clearway.reward import SHORTEST
+from clearway.scenes.features import FileFeatures
+from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
@@ -338,6 +342,40 @@ def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
     for name in ("nonsense", "cuda:99", "meta"):
         with pytest.raises(RunError, match=f"device {name}: cannot be used here"):
             train.train(small_request(device=name), tmp_path)
+
+
+def in_files(folder: Path) -> list[Scene]:
+    """The small scenes with features in their files."""
+    for scene in small_scenes():
+        write_scene(scene, folder / f"{scene.name}.h5")
+    return [read_scene(folder / f"{scene.name}.h5", features_in_file=True) for scene in small_scenes()]
+
+
+def test_a_training_reads_mapped_features_once_and_resumes_to_the_bits_of_one_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    whole = train.train(small_request(), tmp_path / "whole")
+    request = small_request(scenes=in_files(tmp_path), feature_store="mapped")
+    read: list[str] = []
+    features_of = FileFeatures.__array__
+
+    def counted(features: FileFeatures, *how: Any, **more: Any) -> np.ndarray:
+        read.append(features.path.stem)
+        return features_of(features, *how, **more)
+
+    monkeypatch.setattr(FileFeatures, "__array__", counted)
+    with monkeypatch.context() as patch:
+        interrupt_at(patch, 480)
+        with pytest.raises(KeyboardInterrupt):
+            train.train(request, tmp_path / "parts")
+    assert sorted(read) == ["corridor", "grid"]
+    parts = train.train(request, tmp_path / "parts", resume=True)
+    assert sorted(read) == ["corridor", "corridor", "grid", "grid"]
+    assert equal_bits(*[read_training(newest_checkpoint(folder.checkpoints)) for folder in (whole, parts)])
+    assert without_seconds(whole) == without_seconds(parts)
+    records = [folder.read_record() for folder in (whole, parts)]
+    assert records[0].same_experiment(records[1])
 
 
 def test_features_in_a_mapped_file_train_the_same_agent_bit_for_bit(

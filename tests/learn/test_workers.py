@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,15 +21,15 @@ from clearway.learn.workers import train_by_workers
 from clearway.scenes.thor_v1 import write_scene
 from helpers import killed_workers
 from helpers.made import corridor_scene
-from helpers.small_runs import equal_bits, small_learner, small_request
+from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 KILLS = int(os.environ.get("CLEARWAY_KILLS", "5"))
 PATIENCE_S = 60.0
 
 
-def started(folder: Path) -> subprocess.Popen[str]:
+def started(folder: Path, *scenes: Path) -> subprocess.Popen[str]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-m", "helpers.killed_workers", str(folder)]
+    command = [sys.executable, "-m", "helpers.killed_workers", str(folder), *map(str, scenes)]
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
 
 
@@ -111,6 +113,42 @@ def test_workers_killed_again_and_again_learn_the_same_bits(tmp_path: Path) -> N
     assert equal_bits(*[read_network(end) for end in ends])
     assert equal_bits(*[read_training(end) for end in ends])
     assert without_times(whole) == without_times(killed)
+
+
+def mapped_by(workers: Sequence[int], cache: Path) -> list[set[str]]:
+    """Which files below a folder each worker has mapped."""
+    lines = [[line.split() for line in Path(f"/proc/{worker}/maps").read_text().splitlines()] for worker in workers]
+    return [{words[5] for words in own if words[5:] and words[5].startswith(str(cache))} for own in lines]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="finds the workers in /proc")
+def test_a_worker_that_is_started_again_maps_the_same_features_and_learns_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    scenes = [tmp_path / f"{scene.name}.h5" for scene in small_scenes()]
+    for scene, path in zip(small_scenes(), scenes, strict=True):
+        write_scene(scene, path)
+    whole, killed = RunFolder(tmp_path / "whole"), RunFolder(tmp_path / "killed")
+    request = replace(killed_workers.request(scenes), scenes=small_scenes(), feature_store="memory")
+    train_by_workers(request, whole.path, killed_workers.WORKERS, threads=1)
+
+    process, found = started(killed.path, *scenes), []
+    for _ in range(2):
+        before = frames_of(killed)
+        wait_until(lambda before=before: frames_of(killed) > before, process)
+        workers = all_workers_of(process)
+        found += mapped_by(workers, tmp_path / "cache")
+        if len(found) == killed_workers.WORKERS:
+            os.kill(workers[1], signal.SIGKILL)
+            wait_until(lambda workers=workers: all(map(gone, workers)), process)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0 and "go on from the newest checkpoint" in errors, errors
+    assert len(found) == 4 and found[1:] == found[:-1] and all(path.endswith("/features") for path in found[0])
+    assert len(found[0]) == 1
+    assert list((tmp_path / "cache/mapped").iterdir()) == []
+    assert equal_bits(*[read_training(newest_checkpoint(folder.checkpoints)) for folder in (whole, killed)])
 
 
 def test_what_several_workers_cannot_train_is_refused_before_a_folder_is_made(tmp_path: Path) -> None:

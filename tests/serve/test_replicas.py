@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import random
 import signal
-import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -26,10 +25,8 @@ from clearway.serve import replicas
 from clearway.serve.limits import Limits
 from clearway.serve.replica import Beats
 from clearway.serve.run import Network, rotating
-from clearway.serve.stand_in import LOOKS_EVERY_S, standing_in
 from clearway.serve.tokens import ALONE, Tokens, read_tokens
-from clearway.web.local import listening, port_of
-from helpers.certificates import certified
+from clearway.web.local import listening
 from helpers.running import PATIENT_S, Running, running
 from helpers.serving import TOKEN, grey
 from helpers.sums import Sums, plain
@@ -142,25 +139,6 @@ def test_a_stream_goes_on_in_another_replica_and_limits_hold_over_all(tmp_path: 
         assert codes == [201, 429, 429, 429]
         service.process.send_signal(signal.SIGTERM)
         assert service.process.wait(PATIENT_S) == 0
-
-
-@pytest.mark.parametrize("encrypted", [False, True], ids=["http", "https"])
-def test_their_parent_says_at_the_port_for_health_that_none_answers(tmp_path: Path, encrypted: bool) -> None:
-    certificate = certified(tmp_path) if encrypted else (None, None)
-    beats, scheme = Beats([0.0, 0.0, 0.0, 0.0]), "https" if encrypted else "http"
-    with listening(0) as listener, listening(0) as health, httpx.Client(verify=False, timeout=PATIENT_S) as client:
-        url = f"{scheme}://127.0.0.1:{port_of(health)}"
-        with standing_in(Network(listener, health, *certificate), beats.any_fresh):
-            for path in ("/ready", "/health", "/metrics"):
-                answer = client.get(url + path)
-                assert (answer.status_code, answer.json()["error"]["code"]) == (503, "overloaded")
-                assert "no replica answers" in answer.json()["error"]["message"]
-            with socket.create_connection(("127.0.0.1", port_of(health))):  # says nothing, and holds up nobody
-                assert client.get(url + "/ready").status_code == 503
-            beats.beat(1, False)  # from now on a replica answers for itself
-            time.sleep(2 * LOOKS_EVERY_S)
-            with pytest.raises(httpx.ReadTimeout):
-                httpx.get(f"http://127.0.0.1:{port_of(health)}/ready", timeout=0.5)
 
 
 def test_a_service_whose_replicas_are_all_dead_is_not_ready_until_the_next_are() -> None:

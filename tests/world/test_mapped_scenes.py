@@ -1,16 +1,21 @@
 """Features of scene files in one mapped file."""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import torch
 
 from clearway.errors import RunError, SceneError
 from clearway.scenes.digest import scene_digest
+from clearway.scenes.mapped_features import FLOAT_BYTES, MappedFeatures
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.scenes.validate import MAX_FEATURES
+from clearway.world.feature_store import joined_features
 from clearway.world.mapped_scenes import mapped_scenes
 from clearway.world.world import make_world
 from helpers.made import corridor_scene, grid_scene
@@ -49,19 +54,49 @@ def test_worlds_of_all_scenes_and_of_some_share_one_file_with_the_same_features(
     assert torch.equal(kept, torch.cat([wanted[first:], wanted[:first]]))
 
 
-def test_what_one_process_writes_to_its_features_stays_there(tmp_path: Path) -> None:
+def test_features_that_all_share_cannot_be_written_to(tmp_path: Path) -> None:
     with mapped_scenes(in_files(tmp_path)) as (mapped, _):
-        own = make_world(mapped, TARGETS, feature_store="mapped").features
-        own += 1
-        assert torch.equal(own, make_world(mapped, TARGETS).features + 1)
+        with pytest.raises(ValueError, match="read-only"):
+            np.asarray(mapped[0].features)[0, 0] = 1
 
 
-def test_a_file_that_has_changed_or_holds_no_numbers_is_refused_and_nothing_is_left(
-    tmp_path: Path, cache: Path
-) -> None:
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux for its memory")
+def test_features_larger_than_the_memory_are_mapped(tmp_path: Path) -> None:
+    sizes = dict(line.split()[:2] for line in Path("/proc/meminfo").read_text().splitlines())
+    states = 2 * 1024 * (int(sizes["MemTotal:"]) + int(sizes["SwapTotal:"])) // (FLOAT_BYTES * MAX_FEATURES)
+    scene = grid_scene(2)
+    with (tmp_path / "features").open("wb") as file:
+        file.truncate(states * MAX_FEATURES * FLOAT_BYTES)  # a hole: nothing is on the disk
+    large = replace(scene, features=MappedFeatures(tmp_path / "features", 0, (states, MAX_FEATURES)))
+    features = joined_features([large], "mapped")
+    assert features is not None
+    assert (tuple(features.shape), float(features[-1, -1])) == ((states, MAX_FEATURES), 0.0)
+
+
+def test_features_that_cannot_be_mapped_are_one_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise OSError(12, "Cannot allocate memory")
+
+    with mapped_scenes(in_files(tmp_path)) as (mapped, _):
+        monkeypatch.setattr(np, "memmap", refused)
+        with pytest.raises(RunError, match=r"features of .* states need .*Cannot allocate memory.*CLEARWAY_CACHE"):
+            make_world(mapped, TARGETS, feature_store="mapped")
+
+
+def test_a_file_that_has_changed_is_refused_and_nothing_is_left(tmp_path: Path, cache: Path) -> None:
     scenes = in_files(tmp_path)
     write_scene(grid_scene(3, feature_count=16), tmp_path / "grid.h5")
     with pytest.raises(SceneError, match=r"grid\.h5: has changed"), mapped_scenes(scenes):
+        pass
+    assert list((cache / "mapped").iterdir()) == []
+
+
+def test_features_that_are_no_numbers_are_refused_and_nothing_is_left(tmp_path: Path, cache: Path) -> None:
+    in_files(tmp_path)
+    with h5py.File(tmp_path / "grid.h5", "r+") as file:
+        file["resnet_feature"][1, ..., 3] = np.nan
+    scenes = [read_scene(tmp_path / f"{name}.h5", features_in_file=True) for name in TARGETS]
+    with pytest.raises(SceneError, match=r"grid\.h5.*1 states, first 1, hold NaN or Inf"), mapped_scenes(scenes):
         pass
     assert list((cache / "mapped").iterdir()) == []
 

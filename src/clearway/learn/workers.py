@@ -98,7 +98,8 @@ def train_by_workers(
     """Train by so many processes, two at least, as `train.train` does by this one; other arguments as there.
 
     Args:
-        request: what to train. Features of scenes are best left in their files: every worker then reads its own alone.
+        request: what to train. Features of scenes are best left in their files: every worker then reads those of its
+            own scenes alone. With `feature_store="mapped"`, and not on Ray, they are read once, and all map them.
         out: the run folder.
         workers: how many.
         resume, show_progress, until_solved, track, on_begin: as of `train.train`.

@@ -42,9 +42,16 @@ class MappedFeatures:
         return self.first * self.shape[1] * FLOAT_BYTES
 
     def __array__(self, dtype: np.dtype | None = None, /, *, copy: bool | None = None) -> np.ndarray:
-        """All features, (S, F) float32 or as asked for; what is written to it stays in this process."""
+        """All features, (S, F) float32 or as asked for, to be read alone.
+
+        Pages that could be written to by one process alone would count as memory from the start, whatever is looked at:
+        Linux refuses more of them than it has memory.
+
+        Raises:
+            OSError: the file cannot be mapped.
+        """
         with opened(self.path) as file:
-            rows = np.memmap(file, np.float32, "c", self.offset, self.shape)
+            rows = np.memmap(file, np.float32, "r", self.offset, self.shape)
         return rows if dtype is None else rows.astype(dtype, copy=False)
 
 

@@ -2,8 +2,9 @@
 
     memory     float32
     float16    float32 rounded to 11 bits; computed with in float32
-    mapped     float32 in a file without a name in the cache folder, which is gone with the process; the system keeps in
-               memory what is used, as far as there is room
+    mapped     float32 in a file in the cache folder; the system keeps in memory what is used, as far as there is room.
+               Where scenes come in one file (`mapped_scenes`), all processes share that, and none may write to it;
+               else it is one of the process's own, without a name. Neither outlives the training
 
 Each is a tensor (S, F), and `features[states].float()` gives features whatever the store.
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -48,7 +50,7 @@ def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | No
     features = [scene.features for scene in scenes]
     assert features[0] is not None
     if store == "mapped" and (whole := _adjoining(features)):
-        return torch.from_numpy(np.asarray(whole))
+        return _shared(whole)
     joined = empty_store(sum(scene.state_count for scene in scenes), features[0].shape[1], store)
     for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
         own = np.asarray(scene.features, np.float32)
@@ -128,6 +130,18 @@ def _mapped(states: int, features: int) -> Tensor:
     with tempfile.TemporaryFile(dir=folder) as file:
         reserve(file, states * features * FLOAT_BYTES)
         return torch.from_numpy(np.memmap(file, np.float32, "r+", shape=(states, features)))
+
+
+def _shared(features: MappedFeatures) -> Tensor:
+    """Features (S, F) where they lie; who writes to them ends the process.
+
+    Raises:
+        RunError: they cannot be mapped.
+    """
+    states, count = features.shape
+    with room_for(states, count, "mapped"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The given NumPy array is not writable", UserWarning)
+        return torch.from_numpy(np.asarray(features))
 
 
 def reserve(file: IO[bytes], size: int) -> None:
