@@ -184,6 +184,16 @@ def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> 
     claimed = [line.strip("| ").split(" | ") for line in lines if line.endswith("| undecided |")]
     for cells, claim in zip(claimed, section.claims, strict=True):
         assert f"p = {cells[2]}, for 6 claims {cells[3]} (Holm)" in claim.evidence
+        told = re.search(r"difference (\S+) \[(\S+) to (\S+)\]", claim.evidence)
+        assert told and re.findall(r"-?[\d.]+", cells[1]) == [f"{float(one):.3f}" for one in told.groups()], cells
+        arm = cells[0].rpartition("than with ")[2]
+        assert (
+            claim.text.endswith(arm)
+            or {"beta-alone": "collision", "gamma-alone": "precollision"}[claim.text.rpartition(" ")[2]]
+            == arm.split()[1]
+        ), cells
+    failed = {row["failed targets"] for row in rows if row.get("seeds") == 5 and "failed targets" in row}
+    assert "All 50\ntargets" in part and failed == {"0 of 50"}
 
 
 def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:

@@ -118,12 +118,14 @@ def test_sums_over_workers_stay_on_the_gpu(tmp_path: Path) -> None:
     try:
         peers = Peers(torch.distributed.group.WORLD, "cuda")
         peers.count = 2
-        values = [torch.arange(3.0, device="cuda"), torch.ones(2, 2, device="cuda")]
-        before = [value.clone() for value in values]
-        for sent_as in (None, torch.bfloat16):
+        values = [torch.arange(3.0, device="cuda") / 3, torch.ones(2, 2, device="cuda") / 3]
+        for sent_as in (torch.float32, torch.bfloat16):
+            wanted = [value.to(sent_as).float() for value in values]
             peers.add_up(*values, sent_as=sent_as)
-            assert all(torch.equal(value, one) and value.is_cuda for value, one in zip(values, before, strict=True))
-        assert torch.equal(peers.from_leader(values[0]), before[0])
+            assert all(torch.equal(value, one) and value.is_cuda for value, one in zip(values, wanted, strict=True))
+        assert not torch.equal(values[0], torch.arange(3.0, device="cuda") / 3)  # rounded on the way
+        assert torch.equal(peers.from_leader(values[0].clone()), values[0])
+        assert peers.messages == 3
     finally:
         torch.distributed.destroy_process_group()
 

@@ -65,3 +65,22 @@ def test_a_chunk_that_would_unpack_to_more_than_any_may_is_measured(
                 hdf5.read_values(dataset, path)
         else:
             assert np.array_equal(hdf5.read_values(dataset, path), values)
+
+
+@pytest.mark.parametrize("filters", [("deflate", "lzf"), ("lzf", "deflate"), ("deflate", "shuffle")])
+def test_what_is_packed_twice_is_refused_unread(tmp_path: Path, filters: tuple[str, str]) -> None:
+    """A zlib stream of some kilobytes in an LZF one would take gigabytes."""
+    path, plan = tmp_path / "a.h5", h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plan.set_chunk((100, 4))
+    for name in filters:
+        {
+            "deflate": lambda: plan.set_deflate(4),
+            "lzf": lambda: plan.set_filter(h5py.h5z.FILTER_LZF, h5py.h5z.FLAG_OPTIONAL),
+            "shuffle": plan.set_shuffle,
+        }[name]()
+    with h5py.File(path, "w") as file:
+        space = h5py.h5s.create_simple((100, 4))
+        h5py.h5d.create(file.id, b"a", h5py.h5t.NATIVE_INT32, space, plan)
+        file["a"][...] = np.arange(400, dtype=np.int32).reshape(100, 4)
+    with hdf5.opened(path) as file, pytest.raises(SceneError, match="packed in an odd order, or twice"):
+        hdf5.read_values(hdf5.need_dataset(file, "a", path), path)

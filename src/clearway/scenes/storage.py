@@ -51,8 +51,9 @@ def check_storage(dataset: h5py.Dataset, source: Path, name: str) -> None:
         problem = f"is packed with the filter {unknown[0]}, expected {', '.join(FILTERS.values())}"
         raise SceneError(source, problem, STORE_AGAIN, name)
     packing = [code for code in codes if code != h5py.h5z.FILTER_FLETCHER32]
-    if packing[1:] != sorted(set(packing[1:]) - {h5py.h5z.FILTER_SHUFFLE}) or len(set(packing)) < len(packing):
-        problem = f"is packed in an odd order: {', '.join(FILTERS[code] for code in codes)}"
+    packers = packing[1:] if packing[:1] == [h5py.h5z.FILTER_SHUFFLE] else packing
+    if len(packers) > 1 or h5py.h5z.FILTER_SHUFFLE in packers:  # what two of them unpack to multiplies
+        problem = f"is packed in an odd order, or twice: {', '.join(FILTERS[code] for code in codes)}"
         raise SceneError(source, problem, STORE_AGAIN, name)
 
 
