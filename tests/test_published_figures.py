@@ -214,3 +214,19 @@ def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:
             rows = run["evaluation"]["targets"]
             for name in ("steps", "collisions"):
                 assert run[name] == pytest.approx(sum(row[name] for row in rows) / len(rows))
+
+
+def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
+    arms = runpy.run_path(str(DOCS.parent / "benchmarks" / "quality_arms.py"))
+    records = arms["records_in"]([DOCS / "figures" / "history.json"])
+    assert [one["learner"]["history_length"] for one in records] == [1, 4]
+    part = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### What single parts bring")[2]
+    for name, (*values, p, corrected) in arms["compared"](*records).items():
+        (line,) = [line for line in part.splitlines() if line.startswith(f"| {name}")]
+        *shown, told, told_of_both = line.replace(",", "").strip("| ").split("|")[1:]
+        for cell, runs in zip(shown, values, strict=True):
+            for number, value in zip(numbers(cell), (runs.mean(), runs.min(), runs.max()), strict=True):
+                expect(number, value, cell)
+        expect(told.strip(), p, line)
+        expect(told_of_both.strip(), corrected, line)
+        assert corrected < 0.05
