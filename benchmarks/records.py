@@ -3,7 +3,8 @@
     python benchmarks/records.py pack reproduction docs/records/memory.tar.xz
     python benchmarks/records.py unpack docs/records/memory.tar.xz again && clearway report again
 
-Kept are settings, metrics and every episode of every run, and the scenes but for their pictures; not the weights.
+Kept are settings, metrics and every episode of every run, and the scenes but for their pictures; not the weights, nor
+where the folder lay.
 Of unpacked records a report is made as of the folder itself; nothing is trained.
 """
 
@@ -32,7 +33,7 @@ def pack(folder: Path, record: Path) -> None:
     with tarfile.open(part, "w:xz", preset=9) as archive:
         for path in sorted(_kept(folder)):
             name = path.relative_to(folder).as_posix()
-            _add(archive, name, _without_pictures(path) if path.suffix == ".h5" else path.read_bytes())
+            _add(archive, name, _without_pictures(path) if path.suffix == ".h5" else _by_its_name(path, folder))
     part.rename(record)
 
 
@@ -54,6 +55,11 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
     entry = tarfile.TarInfo(name)
     entry.size = len(content)
     archive.addfile(entry, io.BytesIO(content))
+
+
+def _by_its_name(path: Path, folder: Path) -> bytes:
+    """What a file holds, without where on this machine the folder lies."""
+    return path.read_bytes().replace(f"{folder.resolve().parent}/".encode(), b"")
 
 
 def _without_pictures(path: Path) -> bytes:

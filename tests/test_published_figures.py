@@ -3,6 +3,7 @@
 import json
 import re
 import runpy
+import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -230,3 +231,13 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
         expect(told.strip(), p, line)
         expect(told_of_both.strip(), corrected, line)
         assert corrected < 0.05
+
+
+@pytest.mark.parametrize("record", sorted((DOCS / "records").glob("*.tar.xz")), ids=lambda path: path.name)
+def test_a_record_does_not_say_where_its_folder_lay(record: Path) -> None:
+    with tarfile.open(record, "r:xz") as archive:
+        settings = [member for member in archive if member.name.endswith(("run.json", "reproduction.json"))]
+        assert len(settings) > 10
+        for member in settings:
+            file = archive.extractfile(member)
+            assert file is not None and not re.search(rb'(?:"| )/\w', file.read()), member.name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -9,12 +10,14 @@ import torch
 from torch import Tensor
 
 from clearway.learn.bc import Cloning
+from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
 from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedNetwork
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.rollout import sample_actions
-from clearway.learn.run_folder import record_of
+from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.running import Learning
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -107,3 +110,25 @@ def reached_from_everywhere(trainer: Trainer | Cloning) -> Tensor:
 def equal_bits(first: dict[str, Tensor], second: dict[str, Tensor]) -> bool:
     """The same names with the same tensors, bit for bit."""
     return first.keys() == second.keys() and all(torch.equal(first[name], second[name]) for name in first)
+
+
+def goes_on_to_the_same_bits(
+    request: RunRequest, whole: RunFolder, updates: int, prepare: Callable[[Learning], object] = lambda trainer: None
+) -> bool:
+    """A trainer that takes up what another one left after some updates ends as a finished run did.
+
+    `prepare` changes it before it goes on.
+    """
+    trainer, other = request.trainer(), request.trainer()
+    for _ in range(updates):
+        trainer.update()
+    other.load_tensors(
+        {name: tensor.clone() for name, tensor in trainer.tensors().items()}, trainer.frames, trainer.updates
+    )
+    prepare(other)
+    while not other.finished:
+        other.update()
+    end = newest_checkpoint(whole.checkpoints)
+    saved = read_network(end) | read_training(end)
+    kept = {name: tensor.cpu() for name, tensor in other.tensors().items() if name != "statistics.totals"}  # in rows
+    return equal_bits({name: saved[name] for name in kept}, kept)

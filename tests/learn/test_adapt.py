@@ -11,7 +11,6 @@ import torch
 from clearway.errors import RunError, SceneError
 from clearway.learn.adapt import Adapt
 from clearway.learn.adapting import AdaptingTrainer
-from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
 from clearway.learn.guided_walks import guided_walks
 from clearway.learn.mind_walks import MindWalks
 from clearway.learn.teacher import UNKNOWN, Teacher
@@ -22,7 +21,7 @@ from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_eyes import seen_by_eyes, ship, small_generalist
-from helpers.small_runs import corridor_world, equal_bits, reached_from_everywhere
+from helpers.small_runs import corridor_world, goes_on_to_the_same_bits, reached_from_everywhere
 
 LEARNER = Adapt(
     envs=20, rollout_steps=10, step_limit=20, width=32, minibatches=2, tour_steps=40, walks=2, walk_steps=10
@@ -115,19 +114,7 @@ def test_a_run_goes_on_bit_for_bit_and_says_what_was_adapted(scenes: list[Scene]
     whole = train(request, tmp_path / "whole")
     learner = whole.read_record().learner
     assert isinstance(learner, Adapt) and learner.source == "generalist"
-    trainer = request.trainer()
-    for _ in range(2):
-        trainer.update()
-    kept = {name: tensor.clone() for name, tensor in trainer.tensors().items()}
-    other = request.trainer()
-    other.load_tensors(kept, trainer.frames, trainer.updates)
-    monkeypatch.setattr(other, "generalist", None)  # it does not walk again
-    while not other.finished:
-        other.update()
-    end = newest_checkpoint(whole.checkpoints)
-    saved = read_network(end) | read_training(end)
-    kept = {name: tensor for name, tensor in other.tensors().items() if name != "statistics.totals"}  # told in rows
-    assert equal_bits({name: saved[name] for name in kept}, kept)
+    assert goes_on_to_the_same_bits(request, whole, 2, lambda trainer: setattr(trainer, "generalist", None))  # no walks
 
 
 def test_scenes_that_its_eyes_have_not_seen_are_refused_with_the_remedy(scenes: list[Scene], tmp_path: Path):

@@ -11,7 +11,6 @@ from clearway.evaluation.runs import evaluate_run
 from clearway.learn import trainer as trainer_module
 from clearway.learn.a2c import A2C
 from clearway.learn.bc import BC
-from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
 from clearway.learn.learner import Learner
 from clearway.learn.load import load_agent
 from clearway.learn.peers import Peers
@@ -21,7 +20,7 @@ from clearway.learn.recurrent import Recurrent
 from clearway.learn.train import train
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_eyes import seen_by_eyes
-from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
+from helpers.small_runs import goes_on_to_the_same_bits, small_learner, small_request, small_scenes
 
 pytestmark = [
     pytest.mark.gpu,
@@ -77,18 +76,7 @@ def test_a_run_goes_on_bit_for_bit(name: str, tmp_path: Path) -> None:
     request = small_request(learner=learner, device="cuda")
     whole = train(request, tmp_path / "whole")
     assert learner.frames == 800
-    trainer = request.trainer()
-    for _ in range(4):
-        trainer.update()
-    kept = {key: tensor.clone() for key, tensor in trainer.tensors().items()}
-    other = request.trainer()
-    other.load_tensors(kept, trainer.frames, trainer.updates)
-    while not other.finished:
-        other.update()
-    end = newest_checkpoint(whole.checkpoints)
-    saved = read_network(end) | read_training(end)
-    kept = {key: tensor.cpu() for key, tensor in other.tensors().items() if key != "statistics.totals"}  # told in rows
-    assert equal_bits({key: saved[key] for key in kept}, kept)
+    assert goes_on_to_the_same_bits(request, whole, updates=4)
 
 
 def test_what_a_gpu_began_the_processor_goes_on_with(tmp_path: Path) -> None:
