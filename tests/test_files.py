@@ -5,21 +5,18 @@ import json
 import os
 import subprocess
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
-from filelock import FileLock
 
 from clearway import files
 from clearway.errors import ClearwayError
-from clearway.files import folder_written_whole, json_text, part_folder, written_whole
+from clearway.files import folder_written_whole, json_text, written_whole
 
 WRITER = """
-import os, platform, sys; sys.path[:] = {path!r}
+import sys; sys.path[:] = {path!r}
 from pathlib import Path
-os.getpid, platform.node = lambda: {pid}, lambda: "container"
 from clearway.files import written_whole
 with written_whole(Path({target!r})) as part:
     part.write_text("half")
@@ -32,9 +29,9 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def writer(target: Path, pid: int = 1) -> subprocess.Popen[str]:
-    """A process in the midst of writing `target`, which has another number where it is: in a container."""
-    script = WRITER.format(path=sys.path, target=str(target), pid=pid)
+def writer(target: Path) -> subprocess.Popen[str]:
+    """A process in the midst of writing `target`."""
+    script = WRITER.format(path=sys.path, target=str(target))
     process = subprocess.Popen([sys.executable, "-c", script], stdin=-1, stdout=-1, text=True)
     assert process.stdout.readline() == "writing\n"
     return process
@@ -50,9 +47,8 @@ def test_what_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None
     assert names(tmp_path) == ["a.txt"]
 
 
-def test_unfinished_files_of_killed_processes_go_and_those_of_living_ones_stay(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("platform.node", lambda: "container")
-    killed, living = writer(tmp_path / "a.txt", pid=1), writer(tmp_path / "b.txt", pid=2**22 + 1)  # no process here
+def test_unfinished_files_of_killed_processes_go_and_those_of_living_ones_stay(tmp_path: Path) -> None:
+    killed, living = writer(tmp_path / "a.txt"), writer(tmp_path / "b.txt")
     assert len(names(tmp_path)) == 2
     killed.kill()
     killed.communicate()
@@ -64,57 +60,13 @@ def test_unfinished_files_of_killed_processes_go_and_those_of_living_ones_stay(t
     assert (tmp_path / "b.txt").read_text() == "half"  # all that it had to write
 
 
-def test_files_being_written_by_this_process_and_files_of_other_programs_stay(tmp_path: Path) -> None:
-    for name in (".a.h5.abcdefgh.part", ".a.part"):
+def test_files_of_other_machines_and_programs_stay(tmp_path: Path) -> None:
+    for name in (f".a.h5.00000000-{2**22 + 1}-x.part", f".a.h5.{files._host()}-{os.getpid()}-x.part", ".a.part"):
         (tmp_path / name).touch()
-    (tmp_path / ".folder.abcdefgh.part").mkdir()
-    (tmp_path / ".folder.abcdefgh.part" / "mine").touch()
     before = names(tmp_path)
-    with written_whole(tmp_path / "b.txt") as first, written_whole(tmp_path / "c.txt") as second:
-        first.write_text("first")
-        second.write_text("second")
-    assert names(tmp_path) == [*before, "b.txt", "c.txt"]
-
-
-def test_what_a_process_leaves_that_was_killed_before_it_held_the_lock_goes(tmp_path: Path) -> None:
-    (tmp_path / ".a.h5.abcdefgh.part").mkdir()
-    (tmp_path / ".b.h5.abcdefgh.part").mkdir()
-    (tmp_path / ".b.h5.abcdefgh.part" / files.PART_LOCK).touch()
-    with part_folder(tmp_path) as folder:
-        assert names(tmp_path) == [folder.parent.name]
-    assert names(tmp_path) == []
-
-
-def test_a_folder_taken_for_a_leftover_before_it_was_locked_is_made_anew(tmp_path: Path, monkeypatch) -> None:
-    make, made = files.tempfile.mkdtemp, []
-
-    def made_and_taken(**where) -> str:
-        made.append(make(**where))
-        if len(made) == 1:
-            files.remove_leftovers(tmp_path)
-        elif len(made) == 2:
-            other.enter_context(FileLock(Path(made[-1]) / files.PART_LOCK))
-        return made[-1]
-
-    monkeypatch.setattr(files.tempfile, "mkdtemp", made_and_taken)
-    for _ in range(2):  # gone, or about to be
-        with ExitStack() as other, written_whole(tmp_path / "a.txt") as part:
-            part.write_text("whole")
-            files.remove_leftovers(tmp_path)
-    assert names(tmp_path) == ["a.txt"] and len(made) == 3
-
-
-def test_where_there_are_no_locks_files_are_written_and_none_is_taken_for_a_leftover(
-    tmp_path: Path, monkeypatch
-) -> None:
-    def refuse(lock) -> None:
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr("filelock.FileLock._acquire", refuse)
-    with written_whole(tmp_path / "a.txt") as first, written_whole(tmp_path / "b.txt") as second:
-        first.write_text("first")
-        second.write_text("second")
-    assert names(tmp_path) == ["a.txt", "b.txt"]
+    with written_whole(tmp_path / "c.txt") as part:
+        part.touch()
+    assert names(tmp_path) == [*before, "c.txt"]
 
 
 @pytest.mark.parametrize("text", ["", "{", "[" * 100_000, "\ufeff{}"])
@@ -206,3 +158,14 @@ def test_a_folder_that_cannot_be_made_is_named_as_it_was_asked_for(tmp_path: Pat
     with pytest.raises(OSError) as refused, folder_written_whole(tmp_path / "page"):
         raise AssertionError("never begun")
     assert refused.value.filename == str(tmp_path / "page")
+
+
+def test_an_unfinished_folder_of_a_killed_process_goes(tmp_path: Path) -> None:
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    left = tmp_path / f".page.{files._host()}-{dead.pid}-x.part"
+    left.mkdir()
+    (left / "half").touch()
+    with folder_written_whole(tmp_path / "other") as part:
+        (part / "whole").touch()
+    assert names(tmp_path) == ["other"]

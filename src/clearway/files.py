@@ -6,24 +6,21 @@ import errno
 import json
 import math
 import os
+import platform
 import re
 import shutil
 import tempfile
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from clearway.errors import ClearwayError
 from clearway.regular_files import read_text
 
-if TYPE_CHECKING:
-    from filelock import BaseFileLock
-
 CACHE_VARIABLE = "CLEARWAY_CACHE"
-PART_NAME = re.compile(r"\..+\.\w{8}\.part")
-PART_LOCK = ".clearway.lock"
-TRIES = 3  # for a folder of one's own, which another process may take for a leftover until it is locked
+PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
 MAX_JSON_BYTES = 64 * 1024**2
 
 
@@ -43,13 +40,20 @@ def written_whole(path: Path) -> Iterator[Path]:
     if path.exists() and not path.is_file():
         raise OSError(errno.EEXIST, "is a device or a pipe, no file", str(path))
     final = path.resolve()
-    with _part_of(final, path) as part, _faults_named(part, path):
-        part.touch(0o600)
-        yield part
-        with part.open("rb+") as file:
-            os.fsync(file.fileno())
-        part.chmod(0o666 & ~_umask())
-        part.replace(final)
+    final.parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(final.parent)
+    handle, name = tempfile.mkstemp(prefix=f".{final.name}.{_host()}-{os.getpid()}-", suffix=".part", dir=final.parent)
+    os.close(handle)
+    part = Path(name)
+    try:
+        with _faults_named(part, path):
+            yield part
+            with part.open("rb+") as file:
+                os.fsync(file.fileno())
+            part.chmod(0o666 & ~_umask())
+            part.replace(final)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def check_free(folder: Path) -> None:
@@ -70,62 +74,34 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
     """
     check_free(path)
     final = path.resolve()
-    with _part_of(final, path) as part, _faults_named(part, path):
-        part.mkdir(0o700)
-        yield part
-        part.chmod(0o777 & ~_umask())
-        if final.exists():
-            final.rmdir()
-        part.replace(final)
+    final.parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(final.parent)
+    prefix = f".{final.name}.{_host()}-{os.getpid()}-"
+    try:
+        part = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=final.parent))
+    except OSError as fault:
+        raise OSError(fault.errno, os.strerror(fault.errno or 0), str(path)) from fault
+    try:
+        with _faults_named(part, path):
+            yield part
+            part.chmod(0o777 & ~_umask())
+            if final.exists():
+                final.rmdir()
+            part.replace(final)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
     """A temporary folder in `parent`, gone afterwards; what processes that were killed left there is removed too."""
-    with _part_of(parent / "part", parent) as part:
-        part.mkdir(0o700)
+    parent.mkdir(parents=True, exist_ok=True)
+    _remove_leftovers(parent)
+    part = Path(tempfile.mkdtemp(prefix=f".part.{_host()}-{os.getpid()}-", suffix=".part", dir=parent))
+    try:
         yield part
-
-
-@contextmanager
-def _part_of(final: Path, path: Path) -> Iterator[Path]:
-    """Where to make what is to become `final`, a path beside it that is not there yet and is gone afterwards.
-
-    It is in a folder of its own with a lock, which the system frees when this process ends.
-
-    Raises:
-        OSError: such a folder cannot be made; its name is that of `path`.
-    """
-    final.parent.mkdir(parents=True, exist_ok=True)
-    remove_leftovers(final.parent)
-    try:
-        folder, lock = _locked_folder(final)
-    except OSError as fault:
-        raise OSError(fault.errno, os.strerror(fault.errno or 0), str(path)) from fault
-    try:
-        yield folder / final.name
     finally:
-        lock.release()  # before: Windows removes no open file
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _locked_folder(final: Path) -> tuple[Path, BaseFileLock]:
-    """A new folder beside `final`, and its lock, which is held where the file system has locks."""
-    from filelock import FileLock
-
-    def new() -> tuple[Path, BaseFileLock]:
-        folder = Path(tempfile.mkdtemp(prefix=f".{final.name}.", suffix=".part", dir=final.parent))
-        return folder, FileLock(folder / PART_LOCK, timeout=0)
-
-    for _ in range(TRIES):
-        folder, lock = new()
-        with suppress(OSError, NotImplementedError):  # taken for a leftover before it was locked; or no locks are here
-            lock.acquire()
-            if (folder / PART_LOCK).exists():
-                return folder, lock
-        lock.release()
-        shutil.rmtree(folder, ignore_errors=True)
-    return new()  # where there are no locks, nobody takes it for a leftover
+        shutil.rmtree(part, ignore_errors=True)
 
 
 @contextmanager
@@ -139,25 +115,31 @@ def _faults_named(part: Path, path: Path) -> Iterator[None]:
         raise OSError(fault.errno, os.strerror(fault.errno), str(path)) from fault
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Remove what processes that were killed left unfinished in a folder; what living ones write stays.
-
-    Whether its maker lives is told by its lock, also where that is in another container or on another machine.
-    """
+def _remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files of processes of this machine that are no more; others may still be written to."""
     for part in folder.glob(".*.part"):
-        if PART_NAME.fullmatch(part.name) and part.is_dir() and not part.is_symlink():
-            with suppress(OSError, NotImplementedError):  # it is held, gone, another user's, or there are no locks
-                _remove_unless_held(part)
+        maker = PART_NAME.fullmatch(part.name)
+        if maker and maker["host"] == _host() and not _is_alive(int(maker["process"])):
+            if part.is_dir() and not part.is_symlink():
+                shutil.rmtree(part, ignore_errors=True)
+            else:
+                part.unlink(missing_ok=True)
 
 
-def _remove_unless_held(part: Path) -> None:
-    """Remove what has a lock that can be had, or is empty: it was about to have one. Raises OSError where it cannot."""
-    from filelock import FileLock
+def _host() -> str:
+    return f"{zlib.crc32(platform.node().encode()):08x}"
 
-    if (part / PART_LOCK).exists() or not any(part.iterdir()):  # else another program's
-        with FileLock(part / PART_LOCK, timeout=0):
-            shutil.rmtree(part, ignore_errors=True)
-        part.rmdir()  # is left by Windows, which removes no open file
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # elsewhere the question could end it
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _umask() -> int:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from clearway.errors import RunError
-from clearway.files import PART_LOCK
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder, RunRecord, record_of
 from clearway.reward import BUMP
@@ -212,11 +211,8 @@ def test_a_second_process_is_refused_until_the_first_lets_go(tmp_path: Path) -> 
 def test_half_written_files_of_a_killed_process_are_swept(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path)
     folder.write_record(made_record())
-    for name in ("run.json", "metrics.jsonl"):
-        part = tmp_path / f".{name}.abcd_123.part"
-        part.mkdir()
-        (part / PART_LOCK).touch()
-        (part / name).write_text("half")
+    for name in (".run.json.x7_a.part", ".metrics.jsonl.q.part"):
+        (tmp_path / name).write_text("half")
     (tmp_path / "mine.part").write_text("the user's")
     with folder.held():
         assert {path.name for path in tmp_path.iterdir()} == {".lock", "run.json", "mine.part"}

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import ClearwayError
-from clearway.files import PART_LOCK
 from clearway.remote import cache
 from clearway.remote.address import fetched_folder, origin
 from clearway.remote.cache import LIMIT_VARIABLE, fetched
@@ -127,9 +126,13 @@ def test_a_cache_that_cannot_be_written(web: str, tmp_path: Path, monkeypatch: p
 
 
 def test_a_killed_process_leaves_nothing(web: str) -> None:
-    part = fetched_folder() / ".part.abcdefgh.part"
+    part = fetched_folder() / f".part.{cache_host()}-{2**22 + 1}-x.part"
     part.mkdir(parents=True)
-    (part / PART_LOCK).touch()
-    (part / "part").mkdir()
     fetched([f"{web}/a.h5"], SUFFIXES)
     assert not part.exists()
+
+
+def cache_host() -> str:
+    from clearway.files import _host
+
+    return _host()

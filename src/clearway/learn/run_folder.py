@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 
 from clearway.choices import ZoneLevel
 from clearway.errors import ClearwayError, RunError, reason_of
-from clearway.files import parse_json, read_json, remove_leftovers, written_whole
+from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.algorithms import algorithm
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.learner import Learner
@@ -195,7 +195,9 @@ class RunFolder:
 
     def clear_parts(self) -> None:
         """Remove what a process that was killed left unfinished."""
-        remove_leftovers(self.path)
+        for name in (RUN_FILE, METRICS_FILE):
+            for part in self.path.glob(f".{name}.*.part"):
+                part.unlink()
         for part in self.path.glob(f"{COPIED}*"):
             shutil.rmtree(part)
 
