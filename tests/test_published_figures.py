@@ -231,6 +231,21 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
         expect(told.strip(), p, line)
         expect(told_of_both.strip(), corrected, line)
         assert corrected < 0.05
+    lines = [line.strip("| ").split(" | ") for line in part.splitlines()]
+    (ratios,) = [cells[1:3] for cells in lines if cells[0].startswith("steps, x the shortest path (not asked)")]
+    (met,) = [cells[1:3] for cells in lines if cells[0].startswith("all criteria met")]
+    for record, ratio, count in zip(records, ratios, met, strict=True):
+        runs = record["seeds"]
+        for number, value in zip(
+            numbers(ratio), [f([run["path_ratio"] for run in runs]) for f in (min, max)], strict=True
+        ):
+            expect(number, value, ratio)
+        assert count == f"{sum(run['met']['all'] for run in runs)} of {len(runs)}"
+    worst = max(run["worst_path_ratio"] for run in records[1]["seeds"])
+    assert f"ends with a target {100 * (worst - 1):.1f} % above" in part
+    results = (DOCS / "results.md").read_text(encoding="utf-8")
+    fewest = [float(np.mean([run["collisions"] for run in record["seeds"]])) for record in records]
+    assert "{:.4f} collisions an episode, not {:.4f}".format(*fewest) in results
 
 
 @pytest.mark.parametrize("record", sorted((DOCS / "records").glob("*.tar.xz")), ids=lambda path: path.name)

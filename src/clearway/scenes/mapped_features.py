@@ -45,7 +45,7 @@ class MappedFeatures:
         """All features, (S, F) float32 or as asked for, to be read alone.
 
         Pages that could be written to by one process alone would count as memory from the start, whatever is looked at:
-        Linux refuses more of them than it has memory.
+        Linux refuses more of them than it has memory, unless told otherwise.
 
         Raises:
             OSError: the file cannot be mapped.
