@@ -12,11 +12,11 @@ from __future__ import annotations
 import argparse
 import statistics
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 import torch
+from family import processor_s
 
 import clearway
 from clearway.agents.agent import Agent, State
@@ -49,9 +49,9 @@ class Both:
         for _ in range(steps):
             ms, actions = [], []
             for number, agent in enumerate(agents):
-                begun = time.process_time()
+                begun = processor_s()
                 decisions, states[number] = agent.act({RGB: scene.observations[at : at + 1]}, states[number])
-                ms.append((time.process_time() - begun) * 1000)
+                ms.append((processor_s() - begun) * 1000)
                 actions.append(int(decisions.action[0]))
             same.append(actions[0] == actions[1])
             self.acts.setdefault(part, []).append((ms[0], ms[1], same[-1]))

@@ -13,12 +13,12 @@ from __future__ import annotations
 import argparse
 import statistics
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import torch
+from family import processor_s
 from throughput import matrix_peak
 from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
@@ -39,11 +39,11 @@ LEAST_S = 1.0  # that a case is repeated for in a round
 def cpu_ms(work: Callable[[], object], count: int) -> float:
     """Processor time of a picture, milliseconds, of work on so many."""
     work()
-    begun, times = time.process_time(), 0
-    while time.process_time() - begun < LEAST_S:
+    begun, times = processor_s(), 0
+    while processor_s() - begun < LEAST_S:
         work()
         times += 1
-    return (time.process_time() - begun) / times / count * 1000
+    return (processor_s() - begun) / times / count * 1000
 
 
 def gflop(network: Callable[[torch.Tensor], object], preprocessing: Preprocessing) -> float:

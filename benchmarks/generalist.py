@@ -4,7 +4,7 @@
     python benchmarks/generalist.py rooms-test --tour 500               # and who goes by the tour's nearest pictures
     python benchmarks/generalist.py rooms-test --perturb all
     python benchmarks/generalist.py rooms-test --json record.json       # figures of every scene
-    python benchmarks/generalist.py rooms-test --eyes eyes --alone      # by eyes of one's own; see clearway pretrain
+    python benchmarks/generalist.py rooms-test --eyes eyes --rivals     # alone; by eyes of your own
 
 Scenes are files or folders of them, with pictures. All agents walk to the same goals from the same starts. Intervals
 are of the mean over scenes, and so are differences, scene by scene; see `by_scene`.
@@ -27,6 +27,7 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.perception import eyes
 
 CARELESS, RETRIEVAL = "collisions cost nothing", "nearest picture of the tour"
+RIVALS = ("careless", "nearest")
 
 
 def main() -> None:
@@ -38,27 +39,29 @@ def main() -> None:
     parser.add_argument("--tour", type=int, default=0, help="steps")
     parser.add_argument("--perturb", nargs="+", default=["none"])
     parser.add_argument("--eyes", default=eyes.NAME, help="a folder of eyes; by default those that come along")
-    parser.add_argument("--alone", action="store_true", help="without the other agents")
+    told = "careless: collisions cost nothing; nearest: goes by the tour's nearest pictures. Without a name: none"
+    parser.add_argument("--rivals", nargs="*", choices=RIVALS, default=RIVALS, help=told)
     parser.add_argument("--json", type=Path, help="where the record is written")
     args = parser.parse_args()
     generalist = Generalist.by_eyes(eyes.from_record(eyes.find_record(args.eyes)))
-    rivals = {CARELESS: replace(generalist, settings=replace(generalist.settings, collision_cost=0.0))}
-    if args.tour:
-        rivals[RETRIEVAL] = Retrieving(generalist.encoder, generalist.sight, generalist.settings)
+    careless = replace(generalist, settings=replace(generalist.settings, collision_cost=0.0))
+    agents = {"generalist": generalist} | ({CARELESS: careless} if "careless" in args.rivals else {})
+    if "nearest" in args.rivals and args.tour:
+        agents[RETRIEVAL] = Retrieving(generalist.encoder, generalist.sight, generalist.settings)
     asked = {"goals": args.goals, "seed": args.seed, "tour": args.tour, "perturb": args.perturb}
+    record = {"asked": asked, "eyes": args.eyes, "versions": package_versions(), "hardware": hardware()}
     found: dict[str, GoalEvaluation] = {}
-    for name, agent in {"generalist": generalist, **({} if args.alone else rivals)}.items():
+    for name, agent in agents.items():
         own, *others = clearway.evaluate_goals(agent, args.scenes, **asked)
         found |= {name: own} | {other.agent: other for other in others}
+        if args.json:  # after each: it may be hours until the next is done
+            args.json.write_text(json.dumps({**record, **{name: one.to_json() for name, one in found.items()}}) + "\n")
     print_table(found)
     own = found["generalist"]
     if CARELESS in found:
         print_difference(found[CARELESS], own, "collisions", "collisions spared an episode")
     if RETRIEVAL in found:
         print_difference(own, found[RETRIEVAL], "spl", "SPL above the nearest picture's")
-    if args.json:
-        record = {"asked": asked, "eyes": args.eyes, "versions": package_versions(), "hardware": hardware()}
-        args.json.write_text(json.dumps({**record, **{name: one.to_json() for name, one in found.items()}}) + "\n")
 
 
 if __name__ == "__main__":

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.agents.agent import FEATURES, Decisions, Observation, State
-from clearway.agents.exploring import map_of
 from clearway.agents.generalist import Generalist
+from clearway.agents.tour_map import map_of
 from clearway.mapping.beliefs import LatticePose
 from clearway.mapping.following import SURE
 from clearway.mapping.room_map import RoomMap
@@ -58,4 +58,4 @@ class Retrieving(Generalist):
 
     def after(self, state: State, *, camera: bool = False) -> Retrieval:  # type: ignore[override]  # an agent, too
         """See `Generalist.after`."""
-        return Retrieval(self.sight, map_of(state))
+        return Retrieval(self.sight, map_of(state, self.sight, self.settings))

@@ -18,8 +18,8 @@ from contextlib import ExitStack, suppress
 from urllib.parse import urlsplit
 
 import httpx
+from family import family, resident_mib
 from serve_attack import ANSWER_S, TOKENS, opened, served_to_robots
-from serve_soak import family, resident_mib
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from statistics import median
 
 import httpx
+from family import family, resident_mib
 from serve_attack import (
     ROBOTS,
     Step,
@@ -105,24 +106,6 @@ def watched(pid: int, seen: list[tuple[float, float]], over: threading.Event) ->
     begun = time.monotonic()
     while not over.wait(LOOKS_EVERY_S):
         seen.append((time.monotonic() - begun, sum(map(resident_mib, family(pid)))))
-
-
-def family(pid: int) -> list[int]:
-    """A process and all that it and those have started."""
-    found = [pid]
-    for each in found:
-        for task in Path(f"/proc/{each}/task").glob("*/children"):
-            found += [int(child) for child in task.read_text().split()]
-    return found
-
-
-def resident_mib(pid: int) -> float:
-    """Resident memory of a process; 0 where it has ended."""
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except (FileNotFoundError, ProcessLookupError):
-        return 0.0
-    return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmRSS:")), 0.0)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from pathlib import Path
 import atheris
 
 with atheris.instrument_imports(include=["clearway"]):
+    from clearway.deploy.agent import MAX_PICTURE_SIDE
     from clearway.deploy.onnx_file import check_seal, sealed
     from clearway.deploy.onnx_graph_check import problem_of
     from clearway.errors import ClearwayError
@@ -37,11 +38,15 @@ with atheris.instrument_imports(include=["clearway"]):
     from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
     from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
     from clearway.scenes.thor_v1 import read_scene, write_scene
+    from clearway.serve.decoding import Bounds, Refused, decoded
+    from clearway.serve.limits import Limits
     from clearway.settings_file import read_settings
 
 import numpy as np
+from PIL import Image
 
 LARGEST = 200_000  # bytes of an input
+BOUNDS = Bounds(Limits().picture_pixels, MAX_PICTURE_SIDE, Limits().picture_scans)
 PLAN = FloorPlan("plan", np.array([[0, 0], [0, 1], [1, 1]]))
 
 
@@ -71,6 +76,20 @@ def read_graph(path: Path) -> None:
     with contextlib.suppress(ValueError):  # no message of protobuf, which `read_onnx` tells in a line
         problem_of(content)
     check_seal(content, str(path))
+
+
+def read_picture(path: Path) -> None:
+    """A picture of a client of the service."""
+    with contextlib.suppress(Refused):
+        decoded(path.read_bytes(), BOUNDS)
+
+
+def picture_bytes(kind: str) -> bytes:
+    """A small picture with some structure."""
+    file = io.BytesIO()
+    pixels = np.add.outer(np.arange(24), 3 * np.arange(32))[..., None] * np.array([1, 2, 3])
+    Image.fromarray(pixels.astype(np.uint8)).save(file, kind, **({"progressive": True} if kind == "JPEG" else {}))
+    return file.getvalue()
 
 
 def scene_bytes() -> bytes:
@@ -164,6 +183,9 @@ READERS: tuple[tuple[str, Callable[[Path], object], Callable[[], bytes]], ...] =
     ("agent.onnx", read_graph, graph_bytes),
     ("metrics.jsonl", lambda path: RunFolder(path.parent).metrics(), lambda: b'{"frames": 80, "seconds": 1}\n' * 2),
     ("room.map", lambda path: read_map(path, "eyes", 3), map_bytes),
+    ("seen.jpg", read_picture, lambda: picture_bytes("JPEG")),
+    ("seen.png", read_picture, lambda: picture_bytes("PNG")),
+    ("seen.webp", read_picture, lambda: picture_bytes("WEBP")),
     ("run.yaml", read_settings, lambda: b"frames: 6e5\nset: {envs: 10}\n"),
 )
 

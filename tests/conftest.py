@@ -16,8 +16,12 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
+gc.disable()  # while all is imported
+
+
 def pytest_collection_finish() -> None:
     """What is there by now stays: the garbage collector need not look at it again and again, nor every moment."""
+    gc.enable()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
 

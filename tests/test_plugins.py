@@ -11,6 +11,7 @@ import pytest
 import clearway
 from clearway.cli.imports.command import ImportScenes
 from clearway.cli.imports.plugin import ImportPlugin
+from clearway.cli.main import main
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_run_in_scene
 from clearway.errors import EncoderError, PluginError
@@ -118,16 +119,17 @@ def test_rewards_agents_and_algorithms_are_found_by_name(here) -> None:
         plugin_of("rewards", "cheap")
 
 
-def test_its_algorithm_trains_for_its_reward_and_its_agent_walks_beside(package, tmp_path) -> None:
+def test_its_algorithm_trains_for_its_reward_and_its_agent_walks_beside(here, tmp_path, capsys) -> None:
     write_scene(grid_scene(1), tmp_path / "grid.h5")
     chosen = ("--algorithm", "hasty", "--reward", "dear", "--frames", "4000", "--targets", "5")
-    words = ("train", tmp_path / "grid.h5", "--out", tmp_path / "run", *chosen)
-    trained = clearway_with(package, words=words, cache=tmp_path / "cache")
-    assert trained.returncode == 0, trained.stderr
-    words = ("evaluate", tmp_path / "run", "--beside", "still", "--episodes", "3", "--step-limit", "20", "--json")
-    evaluated = clearway_with(package, words=words, cache=tmp_path / "cache")
-    assert evaluated.returncode == 0, evaluated.stderr
-    first, *others = [json.loads(evaluated.stdout), *json.loads(evaluated.stdout)["others"]]
+    evaluate = ("evaluate", tmp_path / "run", "--beside", "still", "--episodes", "3", "--step-limit", "20", "--json")
+    for words in (("train", tmp_path / "grid.h5", "--out", tmp_path / "run", *chosen), evaluate):
+        with pytest.raises(SystemExit) as leaving:
+            main([str(word) for word in words])
+        told = capsys.readouterr()
+        assert leaving.value.code == 0, told.err
+    first = json.loads(told.out)
+    others = first["others"]
     assert first["agent"] == "dear" and first["trained"]["reward"]["name"] == "dear"
     (still,) = [other for other in others if other["agent"] == "still"]
     assert still["average"]["collisions"] == 0 and still["average"]["steps"] > first["average"]["steps"]

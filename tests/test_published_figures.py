@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
-from clearway.experiments.reproduce import gather
+from clearway.experiments.reproduce import REQUEST_FILE, gather
+from clearway.experiments.section import Section
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "seeing.md").read_text(encoding="utf-8")
@@ -18,6 +19,7 @@ AGENTS = r"collision-aware|dearer|shuffled|shortest"
 COLUMNS = ("success", "success_4x", "spl", "collisions")
 SHARES = ("success", "success_4x", "spl")
 THIRD, FOURTH = "generalist-test-third.json", "generalist-test-fourth.json"
+TOURS = "generalist-tours.json"
 ROWS = [
     (THIRD, "rooms", "generalist", "| no tour | 100 % | 93.3"),
     (THIRD, "rooms", "collisions cost nothing", "| no tour, collisions cost nothing | 100 % | 92.5"),
@@ -30,11 +32,16 @@ ROWS = [
     (FOURTH, "rooms", "generalist", "| rooms, no tour | 100 % (99.8-100) | 92.8"),
     (FOURTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing |"),
     (FOURTH, "rooms-perturbed-tour", "generalist", "| rooms, everything perturbed, after a tour that sees it too |"),
-    (FOURTH, "flats", "generalist", "| flats, no tour, now |"),
+    (FOURTH, "flats", "generalist", "| flats, no tour | 85.0"),
     (FOURTH, "validation-rooms", "generalist", "| validation rooms, no tour |"),
     (FOURTH, "validation-rooms-perturbed", "generalist", "| validation rooms, everything perturbed, no tour |"),
     (FOURTH, "validation-rooms-perturbed-tour", "generalist", "| validation rooms, everything perturbed, after"),
     (FOURTH, "validation-flats", "generalist", "| validation flats, no tour |"),
+    (TOURS, "rooms-perturbed-tour", "generalist", "| toured for 500 steps, perturbed |"),
+    (TOURS, "rooms-perturbed-tour", "nearest picture of the tour", "| who goes by that tour's nearest picture |"),
+    (TOURS, "held-out-perturbed-tour", "generalist", "| known room, targets held out |"),
+    (TOURS, "rooms-perturbed", "generalist", "| not toured, perturbed |"),
+    (TOURS, "rooms", "generalist", "| not toured, nothing perturbed |"),
     (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
 ]
 
@@ -75,6 +82,18 @@ def test_a_row_of_the_page_is_what_the_record_comes_to(record: str, part: str, a
             expect(written, value, f"interval of {name} in {row}")
 
 
+def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_said() -> None:
+    spl = [
+        np.array([scene["spl"] for scene in scenes_of(TOURS, "rooms-perturbed-tour", agent)])
+        for agent in ("generalist", "nearest picture of the tour")
+    ]
+    said = re.search(r"by (\S+) points of SPL \((\S+) to ([\d.]+)\)", PAGE)
+    assert said is not None
+    apart = 100 * (spl[0] - spl[1])
+    for written, value in zip(said.groups(), (apart.mean(), *ends(apart)), strict=True):
+        expect(written, float(value), said[0])
+
+
 def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
     expect("93.3", 93.34, "near")
     with pytest.raises(AssertionError, match=r"written 93\.3, recorded 93\.36"):
@@ -112,11 +131,50 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
 
 
+def check_zones_of_cells(section: Section) -> None:
+    """Rows and claims of its section of the evidence."""
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones of cells")[2]
+    lines = page.partition("\n### ")[0].splitlines()
+    steps, _, settled = section.tables
+    for agent in ("shortest", "collision-aware, zones of poses", "collision-aware, zones of cells"):
+        (line,) = [line for line in lines if line.startswith(f"| {agent} |")]
+        cells = [cell.replace(",", "") for cell in re.split(r" \| ", line.strip("| "))]
+        row = dict(zip(steps.headings, next(r for r in steps.rows if r[:3] == ("steps", "paper", agent)), strict=True))
+        bumps = dict(
+            zip(steps.headings, next(r for r in steps.rows if r[:3] == ("collisions", "paper", agent)), strict=True)
+        )
+        late = dict(zip(settled.headings, next(r for r in settled.rows if r[:2] == ("paper", agent)), strict=True))
+        for cell, value, interval in (
+            (cells[1], late["frames"], late["95 %"]),
+            (cells[2], row["average"], row["95 %"]),
+            (cells[3], bumps["average"], bumps["95 %"]),
+        ):
+            mean, low, high = numbers(cell)[:3]
+            expect(mean, float(value), agent)
+            assert [float(low), float(high)] == [
+                pytest.approx(float(end.replace(",", "")), rel=0.01) for end in interval.split(" to ")
+            ]
+        assert cells[1].split()[-3] == str(late["settled"])
+        assert cells[4] == row["failed targets"]
+    told = [re.split(r" \| ", line.strip("| ")) for line in lines if re.match(r"\| (fewer|no more|settles)", line)]
+    by_text = {
+        claim.text.removeprefix("paper: ").replace(" with zones of cells", ""): claim for claim in section.claims
+    }
+    assert {text for text, *_ in told} == set(by_text) and len(told) == 5
+    for text, difference, p, corrected in told:
+        claim = by_text[text]
+        assert f"p = {p}, for 5 claims {corrected} (Holm)" in claim.evidence
+        low_to_high = difference.replace(" (", " [").replace(")", "]")
+        assert f"difference {low_to_high}" in claim.evidence
+        assert claim.verdict == "undecided"
+
+
 def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
     records["unpack"](DOCS / "records" / "zones-or-step-bathroom.tar.xz", tmp_path / "zones")
-    (section,) = gather(tmp_path / "zones").sections
-    assert not section.missing
+    section, of_cells = gather(tmp_path / "zones").sections
+    assert not section.missing and not of_cells.missing
+    check_zones_of_cells(of_cells)
     table = section.tables[-1]
     rows = {row["agent"]: row for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows)}
     told = {
@@ -147,6 +205,70 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         assert verdict == claim.verdict
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
+
+
+def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    records, folder = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py")), tmp_path / "bedroom"
+    records["unpack"](DOCS / "records" / "bedroom.tar.xz", folder)
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### The bedroom alone")[2]
+    page = page.partition("\n## ")[0]
+    asked = json.loads((folder / REQUEST_FILE).read_text(encoding="utf-8"))
+    compared = 0
+    for millions, settled in (("2.5", []), ("5", [("shortest", 2.3, 3), ("collision-aware", 4.25, 2)])):
+        (folder / REQUEST_FILE).write_text(json.dumps({**asked, "frames": int(float(millions) * 1e6)}))
+        (section,) = gather(folder).sections
+        assert not section.missing
+        ends, late = section.tables[:2]
+        for _, agent, frames, _, failed, steps, between, collisions, between_collisions in ends.rows:
+            begin = f"| {agent} | {frames / 1e6:g} M | {millions} M |"
+            (line,) = [line for line in page.splitlines() if line.startswith(begin)]
+            written = line.removeprefix(begin).strip(" |").split(" | ")
+            for cell, value, interval in zip(written, (steps, collisions), (between, between_collisions), strict=False):
+                mean, _, low_to_high = cell.replace(",", "").partition(" ")
+                expect(mean, value, begin)
+                assert low_to_high == f"({interval.replace(',', '').replace(' to ', '-')})", begin
+            assert written[2] == failed
+            compared += 1
+        rows = {row[1]: row for row in late.rows}
+        for agent, mean, count in settled:
+            assert rows[agent][3:5] == (count, mean * 1e6)
+            assert f"`{agent}` after {mean:.2f} M" in page
+    assert compared == 8
+
+
+def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
+    records["unpack"](DOCS / "records" / "off-grid-bathroom.tar.xz", tmp_path / "off-grid")
+    (section,) = gather(tmp_path / "off-grid").sections
+    assert not section.missing
+    (table,) = section.tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    lines = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Five seeds, published settings")[2]
+    lines = lines.partition("\n### ")[0].splitlines()
+    figures = [heading for heading in table.headings[4:] if not heading.startswith("95 %")]
+    means = [row for row in rows if row["setting"] == "all settings, mean"]
+    assert len(means) == 4
+    for row in means:
+        (line,) = [line for line in lines if line.startswith(f"| {row['reward']} |")]
+        for cell, name in zip(line.strip("|").split("|")[1:], figures, strict=True):
+            scale = 1 if name == "contacts" else 100
+            ends = (float(end) for end in str(row[f"95 % of {name}"]).split(" to "))
+            for written, value in zip(re.findall(r"[\d.]+", cell), (float(str(row[name])), *ends), strict=True):
+                assert abs(float(written) - scale * value) <= (0.0051 if name == "contacts" else 0.051), (
+                    f"{row['reward']}, {name}"
+                )
+    claims = [
+        line.strip("|").split("|") for line in lines if line.endswith(("undecided |", "holds |", "does not hold |"))
+    ]
+    assert len(claims) == len(section.claims) == 12
+    for (text, difference, p, corrected, verdict), claim in zip(claims, section.claims, strict=True):
+        assert claim.text.endswith(f": {text.strip()}")
+        found = claim.numbers["difference"]
+        assert found.interval is not None
+        told = f"{found.value:.3g} ({found.interval[0]:.3g} to {found.interval[1]:.3g})"
+        assert difference.strip() == told
+        assert f"p = {p.strip()}, for 6 claims {corrected.strip()} (Holm)" in claim.evidence
+        assert verdict.strip() == claim.verdict
 
 
 @pytest.mark.slow
@@ -215,6 +337,26 @@ def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:
             rows = run["evaluation"]["targets"]
             for name in ("steps", "collisions"):
                 assert run[name] == pytest.approx(sum(row[name] for row in rows) / len(rows))
+
+
+def test_other_encoders_and_rooms_meet_the_criteria_as_their_record_says() -> None:
+    made = json.loads((DOCS / "figures" / "other-encoders-and-rooms.json").read_text(encoding="utf-8"))
+    assert [one["command"].split()[-1] for one in made] == [
+        f"{k}{n}.json" for k in ("encoder", "room") for n in range(1, 6)
+    ]
+    part = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("**Other encoders, other rooms**")[2]
+    for first, name in ((0, "| the random ResNet-50"), (5, "| the rooms")):
+        runs = [run for one in made[first : first + 5] for run in one["seeds"]]
+        assert len(runs) == 5 and all(run["met"]["all"] and run["solved_targets"] == 10 for run in runs)
+        (line,) = [line for line in part.splitlines() if line.startswith(name)]
+        cells = line.strip("|").split("|")[2:]
+        for cell, figure in zip(cells, ("path_ratio", "worst_path_ratio", "collisions"), strict=True):
+            least, most = numbers(cell)
+            expect(least, min(run[figure] for run in runs), cell)
+            expect(most, max(run[figure] for run in runs), cell)
+        for run in runs:
+            rows = run["evaluation"]["targets"]
+            assert run["collisions"] == pytest.approx(sum(row["collisions"] for row in rows) / len(rows))
 
 
 def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:

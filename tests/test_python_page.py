@@ -14,8 +14,8 @@ from helpers.made import grid_scene
 
 PAGE = ROOT / "docs/python.md"
 FEWER = {"frames=600_000": "frames=4_000", "frames=200_000": "frames=4_000", "episodes=100": "episodes=2"}
-SMALLER = {**FEWER, "episodes=20": "episodes=2, step_limit=200"}
-TWICE = {"step_limit=200, step_limit=500": "step_limit=200"}
+SMALLER = {**FEWER, "episodes=100": "episodes=1", "episodes=20": "episodes=1, step_limit=100"}
+TWICE = {"step_limit=100, step_limit=500": "step_limit=100"}
 
 
 def run_page(changes: dict[str, str]) -> dict[str, object]:

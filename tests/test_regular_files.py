@@ -135,11 +135,14 @@ BESIDE = {
     ("checkpoint.py", "os.open(path, os.O_RDONLY)"): "flushes what was just written, and reads nothing",
     ("files.py", "part.open('rb+')"): "flushes what was just written, and reads nothing",
     ("mapped_features.py", "place.path.open('r+b')"): "writes into a file of our own",
+    ("own_number.py", "os.open(path, os.O_RDWR | os.O_CREAT, 384)"): "a lock of our own, of which nothing is read",
     ("browser.py", "os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 384)"): "writes",
     ("main.py", "os.open(os.devnull, os.O_WRONLY)"): "drops what cannot be printed",
     ("worker.py", "os.open(os.devnull, os.O_RDONLY)"): "stands in for standard input",
-    ("hdf5.py", "h5py.is_hdf5(path)"): "after `check_regular`: the library wants names",
-    ("hdf5.py", "h5py.File(path, 'r')"): "after `check_regular`: the library wants names",
+    ("hdf5.py", "h5py.h5o.open(parent.id, name.encode())"): "an object of a file that the door has opened",
+    ("hdf5.py", "h5py.h5a.open(item.id, name.encode())"): "an attribute of it",
+    ("hdf5.py", "h5py.is_hdf5(name)"): "of what the door has opened: the library wants names",
+    ("hdf5.py", "h5py.File(name, 'r')"): "of what the door has opened: the library wants names",
     ("mjcf_compile.py", "mujoco.MjSpec.from_string(EMPTY)"): "names no file",
     ("mjcf_compile.py", "mujoco.MjSpec.from_string(files.text, include=files.models, assets=files.assets)"): (
         "in a process that can open nothing, see tests/importers/test_mjcf_compile.py"
@@ -216,3 +219,16 @@ def test_what_may_pass_beside_the_door_is_there() -> None:
 
 def _calls(path: Path) -> list[ast.Call]:
     return [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fadvise"), reason="the system fetches nothing ahead")
+def test_small_regular_files_are_fetched_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    small, large, pipe = (tmp_path / name for name in ("small", "large", "pipe"))
+    small.write_bytes(b"12")
+    with large.open("wb") as file:
+        file.truncate(regular_files.AHEAD_BYTES + 1)
+    os.mkfifo(pipe)
+    fetched = []
+    monkeypatch.setattr(os, "posix_fadvise", lambda handle, *how: fetched.append((os.fstat(handle).st_size, how)))
+    regular_files.read_ahead([tmp_path / "gone", pipe, large, tmp_path, small])
+    assert fetched == [(2, (0, 0, os.POSIX_FADV_WILLNEED))]

@@ -30,7 +30,7 @@ def test_an_empty_file_holds_nothing(tmp_path):
         (b"a: 2020-13-45", "not read"),
         (b"\xff\xfe\xfa", "not read"),
         (b"[" * 5000, "not read"),
-        (b"a: 1\n" + b"#" * MAX_BYTES, "larger than 1 MiB"),
+        (b"a: 1\n" + b"#" * MAX_BYTES, "larger than 8 MiB"),
     ],
 )
 def test_what_is_no_file_of_settings_is_one_line(tmp_path, content, told):

@@ -10,6 +10,7 @@ A child says so itself, first of all:
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -18,7 +19,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
-from multiprocessing.context import SpawnProcess
+from multiprocessing.context import SpawnContext, SpawnProcess
 
 ORPHANED = 1  # exit code; nobody is left to see it
 LOOKS_EVERY_S = 1.0
@@ -61,10 +62,21 @@ def _end_if_orphaned(parent: int) -> None:
 
 
 class ChildProcess(SpawnProcess):
-    """A process of `multiprocessing` that ends with its parent as `end_with_parent` says.
+    """A process of `multiprocessing` that ends with its parent as `end_with_parent` says, and never gets Ctrl+C.
 
-    It does from the first moment on, though it may take seconds to import what it is to run.
+    Ctrl+C is for its parent, which tells it by SIGTERM. It ends with its parent from the first moment on, though it may
+    take seconds to import what it is to run; meanwhile its garbage collector rests, see `collector_rests`.
     """
+
+    def start(self) -> None:
+        """Start it."""
+        with signals_held(signal.SIGINT):
+            super().start()
+
+    def run(self) -> None:
+        """Run the target, once all is imported."""
+        gc.enable()
+        super().run()
 
     def __reduce__(self) -> tuple:
         """In the child the function is called before the state, and what that names, is read."""
@@ -73,7 +85,46 @@ class ChildProcess(SpawnProcess):
 
 def _begun(kind: type[ChildProcess], parent: int) -> ChildProcess:
     end_with_parent(parent)
+    gc.disable()
     return kind.__new__(kind)
+
+
+@contextmanager
+def collector_rests() -> Iterator[None]:
+    """Collect no garbage meanwhile: imports leave none, and to look for it takes a sixth of the time of PyTorch's."""
+    rested = not gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if not rested:
+            gc.enable()
+
+
+@contextmanager
+def all_children_end() -> Iterator[None]:
+    """Meanwhile, processes that other packages start by `multiprocessing`'s spawn are of `ChildProcess`."""
+    before = SpawnContext.Process
+    SpawnContext.Process = ChildProcess
+    try:
+        yield
+    finally:
+        SpawnContext.Process = before
+
+
+def command_of(module: str) -> list[str]:
+    """Words that run a module's `main` in a child of this process, which `end_with_parent`; its arguments come after.
+
+    The child looks for modules where this process does, also in another folder.
+    """
+    path = [os.path.abspath(folder) for folder in sys.path]
+    statements = (
+        f"import sys; sys.path[:] = {path!r}",
+        f"from clearway.children import collector_rests, end_with_parent; end_with_parent({os.getpid()})",
+        f"with collector_rests(): from {module} import main",
+        "main()",
+    )
+    return [sys.executable, "-S", "-c", "\n".join(statements)]
 
 
 def limit(*, memory_bytes: int | None = None, seconds: int | None = None) -> None:

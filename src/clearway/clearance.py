@@ -25,5 +25,15 @@ def scene_clearance_m(scene: Scene) -> np.ndarray:
     blocked_m = np.concatenate(places_m)
     if not len(blocked_m):
         return np.full(scene.state_count, np.inf)
-    distance_m, _ = cKDTree(blocked_m).query(scene.locations_m)
-    return np.maximum(distance_m - scene.cell_size_m / 2, 0.0)
+    distinct_m, place = _distinct_places(scene)
+    distance_m, _ = cKDTree(blocked_m).query(distinct_m)
+    return np.maximum(distance_m - scene.cell_size_m / 2, 0.0)[place]
+
+
+def _distinct_places(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Locations (L, 2) metres, and the one of each pose, (S,): one a cell, unless poses of a cell lie apart."""
+    _, first = np.unique(scene.cells, return_index=True)
+    one_a_cell = scene.locations_m[first]
+    if np.array_equal(one_a_cell[scene.cells], scene.locations_m):
+        return one_a_cell, scene.cells
+    return scene.locations_m, np.arange(scene.state_count)

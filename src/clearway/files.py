@@ -11,14 +11,15 @@ import re
 import shutil
 import tempfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, RunError, reason_of
 from clearway.regular_files import read_text
 
+T = TypeVar("T")
 CACHE_VARIABLE = "CLEARWAY_CACHE"
 PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
 MAX_JSON_BYTES = 64 * 1024**2
@@ -156,6 +157,21 @@ def read_json(path: Path, most_bytes: int = MAX_JSON_BYTES) -> Any:
         ValueError: it is not JSON.
     """
     return parse_json(read_text(path, most_bytes))
+
+
+def read_kept(path: Path, newest: int, taken: Callable[[Mapping[str, Any]], T]) -> T:
+    """What `taken` takes from a JSON file that can be made again, of a format up to `newest`.
+
+    Raises:
+        RunError: the file is missing, damaged or of a newer version.
+    """
+    try:
+        content = read_json(path)
+        if int(content["format_version"]) > newest:
+            raise RunError(f"{path}: written by a newer clearway. Upgrade clearway")
+        return taken(content)
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        raise RunError(f"{path}: not readable ({reason_of(error)}). Remove it, and it is made again") from error
 
 
 def parse_json(text: str) -> Any:

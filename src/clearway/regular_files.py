@@ -11,13 +11,14 @@ import errno
 import hashlib
 import os
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
 
 MIB = 1024**2
 BLOCK_BYTES = MIB
+AHEAD_BYTES = 4 * MIB  # of a file that is fetched whole; of larger ones, with pictures, little is looked at
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
 _KINDS = {stat.S_IFIFO: "a pipe", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
@@ -50,10 +51,31 @@ def _check_kind(mode: int, path: Path) -> None:
         raise OSError(errno.EINVAL, f"it is {kind}, no regular file", str(path))
 
 
-def check_regular(path: Path) -> None:
-    """Open and close a file that a library is going to open by its name. Raises OSError as `opened` does."""
-    with opened(path):
+@contextmanager
+def name_of_opened(path: Path) -> Iterator[Path]:
+    """A name of a regular file, for a library that opens files itself.
+
+    On Linux it names this very file, never another that takes its path; elsewhere it is the path, after a look.
+
+    Raises:
+        OSError: as `opened`.
+    """
+    with opened(path) as file:
+        own = Path(f"/proc/self/fd/{file.fileno()}")
+        yield own if own.exists() else path
+
+
+def read_ahead(paths: Iterable[Path]) -> None:
+    """Have the system fetch small files that are read soon, all at once; where it cannot, they are fetched one by one.
+
+    Whoever reads a file tells what is wrong with it.
+    """
+    if not hasattr(os, "posix_fadvise"):
         return
+    for path in paths:
+        with suppress(OSError), opened(path) as file:
+            if os.fstat(file.fileno()).st_size <= AHEAD_BYTES:
+                os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_WILLNEED)
 
 
 def read_at_most(file: BufferedReader, most_bytes: int, path: Path) -> bytes:

@@ -14,7 +14,7 @@ from clearway.agents.recurrent import RecurrentAgent
 from clearway.agents.selection import Argmax, ArgmaxUntried
 from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.learn.q_learning import QLearning, TrainedTable
-from clearway.learn.run_folder import record_of
+from clearway.learn.run_record import record_of
 from clearway.model.recurrent import RecurrentActorCritic, RecurrentShape, SeenPairs
 from clearway.perception.eyes_network import EyesShape
 from clearway.reward import COLLISION_AWARE

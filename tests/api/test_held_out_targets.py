@@ -14,7 +14,6 @@ from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
 from clearway.live.live_room import live_room
 from clearway.scenes.floor_plans import GENERATED, floor_plan_scene
-from clearway.scenes.held_out import held_out
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from clearway.scenes.validate import SceneWarning
@@ -34,7 +33,7 @@ def room() -> Scene:
 
 @pytest.fixture(scope="module")
 def held(room: Scene) -> set[int]:
-    return set(np.flatnonzero(held_out(room)).tolist())
+    return set(np.flatnonzero(room.held_out).tolist())
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from clearway.agents.named import AGENTS
 from clearway.errors import AgentError, ArgumentError
 from clearway.plugins import BUILT_IN
 from clearway.scenes.actions import Action
+from clearway.scenes.scene import Scene
 from clearway.world.world import make_world
 from helpers.made import corridor_scene, grid_scene
 
@@ -40,9 +41,13 @@ class Turner:
         return clearway.Decisions(np.full(len(turns), int(Action.TURN_RIGHT))), {"turns": turns}
 
 
-@pytest.fixture
-def scene():
+def small_grid() -> Scene:
     return grid_scene(1, width=4, depth=3, picture_size=(10, 10), feature_count=8)
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return small_grid()
 
 
 @pytest.fixture
@@ -163,36 +168,36 @@ def test_the_named_agents_are_those_that_there_are() -> None:
     assert AGENTS["shortest path"] is shortest_paths
 
 
-def test_the_scene_of_an_exported_agent_is_asked_for(scene, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def exporting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scene, a run on it and its exported agent."""
     from clearway.deploy.export import export_onnx
     from clearway.deploy.from_run import load_run_in_scene
     from clearway.scenes.thor_v1 import write_scene
 
-    write_scene(scene, tmp_path / "grid.h5")
-    run = clearway.train(tmp_path / "grid.h5", targets=[5, 22], frames=400, envs=10, width=16, out=tmp_path / "run")
-    export_onnx(load_run_in_scene(tmp_path / "run"), tmp_path / "agent.onnx", with_encoder=False)
-    exported = clearway.evaluate(tmp_path / "agent.onnx", tmp_path / "grid.h5", **SHORT)
-    itself = clearway.evaluate(run, **SHORT)
+    folder = tmp_path_factory.mktemp("exporting")
+    write_scene(small_grid(), folder / "grid.h5")
+    clearway.train(folder / "grid.h5", targets=[5, 22], frames=400, envs=10, width=16, out=folder / "run")
+    export_onnx(load_run_in_scene(folder / "run"), folder / "agent.onnx", with_encoder=False)
+    return folder
+
+
+def test_the_scene_of_an_exported_agent_is_asked_for(exporting: Path) -> None:
+    exported = clearway.evaluate(exporting / "agent.onnx", exporting / "grid.h5", **SHORT)
+    itself = clearway.evaluate(exporting / "run", **SHORT)
     assert names(exported)[:3] == ["grid"] * 3
     for own, theirs in zip(exported.evaluations[:3], itself.evaluations[:3], strict=True):
         assert dict(own.average.values) == dict(theirs.average.values)
         assert own.protocol == theirs.protocol
     with pytest.raises(ArgumentError, match="the agent is for scene grid, given corridor"):
-        clearway.evaluate(tmp_path / "agent.onnx", corridor_scene(5, feature_count=8), **SHORT)
+        clearway.evaluate(exporting / "agent.onnx", corridor_scene(5, feature_count=8), **SHORT)
     with pytest.raises(ArgumentError, match="the agent is for scene grid, given corridor"):
-        clearway.evaluate(tmp_path / "agent.onnx", corridor_scene(5, feature_count=8), targets=[3], **SHORT)
+        clearway.evaluate(exporting / "agent.onnx", corridor_scene(5, feature_count=8), targets=[3], **SHORT)
 
 
-def test_features_that_an_exported_agent_does_not_see_are_refused(scene, tmp_path: Path) -> None:
+def test_features_that_an_exported_agent_does_not_see_are_refused(exporting: Path) -> None:
     """Else it would walk by numbers that mean something else, and nobody would be told."""
-    from clearway.deploy.export import export_onnx
-    from clearway.deploy.from_run import load_run_in_scene
-    from clearway.scenes.thor_v1 import write_scene
-
-    write_scene(scene, tmp_path / "grid.h5")
-    clearway.train(tmp_path / "grid.h5", targets=[5], frames=80, envs=10, rollout_steps=8, width=16, out=tmp_path / "r")
-    export_onnx(load_run_in_scene(tmp_path / "r"), tmp_path / "agent.onnx", with_encoder=False)
-    seen = clearway.load_scene(tmp_path / "grid.h5")
+    seen = clearway.load_scene(exporting / "grid.h5")
     assert seen.encoder is not None
     others = {
         "has 5 features": replace(seen, features=np.asarray(seen.features)[:, :5]),
@@ -200,7 +205,7 @@ def test_features_that_an_exported_agent_does_not_see_are_refused(scene, tmp_pat
     }
     for words, other in others.items():
         with pytest.raises(ArgumentError, match=f"{words}.*, the agent sees 8 of made-up .*Encode the scene") as caught:
-            clearway.evaluate(tmp_path / "agent.onnx", other, **SHORT)
+            clearway.evaluate(exporting / "agent.onnx", other, **SHORT)
         assert "\n" not in str(caught.value)
 
 

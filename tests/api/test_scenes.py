@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import clearway
+from clearway.api.scenes import scenes_and_files
 from clearway.errors import ArgumentError
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene, grid_scene, with_depth
@@ -23,6 +24,21 @@ def test_scenes_come_from_files_folders_and_memory(folder) -> None:
     assert clearway.load_scene(made) is made
     assert [scene.name for scene in clearway.load_scenes(folder)] == ["corridor", "grid"]
     assert [scene.name for scene in clearway.load_scenes([folder / "grid.h5", made])] == ["grid", "made"]
+
+
+def test_files_named_one_by_one_are_read_by_all_processes(folder, monkeypatch) -> None:
+    given = []
+
+    def noted(function, things, before):
+        given.append(list(things))
+        return map(function, things)
+
+    monkeypatch.setattr("clearway.api.scenes.of_each", noted)
+    made, files = corridor_scene(name="made"), [folder / "grid.h5", folder / "corridor.h5"]
+    pairs = scenes_and_files([files[0], made, files[1]], features_in_file=True)
+    assert given == [files]
+    assert [(scene.name, file) for scene, file in pairs] == [("grid", files[0]), ("made", None), ("corridor", files[1])]
+    assert all("components" in vars(scene) for scene, file in pairs if file is not None)  # found by who reads
 
 
 def test_a_file_system_path_of_any_kind_will_do(folder) -> None:

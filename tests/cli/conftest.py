@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from clearway.cli.main import main
+from helpers.small_pictures import shrink_pictures
 
 WIDTH, DEPTH = 6, 3  # cells of the dump's room
 ISLAND = (9, 9)  # a cell out of reach, such as bedroom_04 has
@@ -72,11 +73,18 @@ def clearway() -> Callable[..., Answer]:
 
 @pytest.fixture(autouse=True, scope="session")
 def _alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """A cache of our own, tables wide enough not to break words, and small pictures."""
+    """A cache of our own, and tables wide enough not to break words."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CLEARWAY_CACHE", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("COLUMNS", "200")
-        patch.setattr("clearway.viz.figures.DPI", 50)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _small_pictures() -> Iterator[None]:
+    """Not for the session: tests of pictures may come after these in the same process."""
+    with pytest.MonkeyPatch.context() as patch:
+        shrink_pictures(patch)
         yield
 
 

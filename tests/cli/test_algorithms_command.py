@@ -12,6 +12,7 @@ from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.small_eyes import seen_by_eyes, ship, small_generalist
 
+PICTURES = ("curves", "map-bathroom_02", "episode-bathroom_02")
 SETTINGS = ("--frames", 400, "--threads", 1, "--set", "envs=10")
 
 
@@ -36,9 +37,10 @@ def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, na
     record = json.loads((run / "run.json").read_text())
     assert (record["learner"]["algorithm"], record["learner"]["envs"]) == (name, 10)
     assert isinstance(RunFolder(run).read_record().learner, ALGORITHMS[name])
-    found = clearway("evaluate", run, "--episodes", 1, "--step-limit", 20, "--json").json
+    drawn = ("--pictures", tmp_path / "pictures")
+    found = clearway("evaluate", run, "--episodes", 1, "--step-limit", 20, "--json", *drawn).json
     assert {"random", "shortest path"} <= {other["agent"] for other in found["others"]}
-    assert clearway("evaluate", run, "--episodes", 1, "--step-limit", 20, "--pictures", tmp_path / "p").code == 0
+    assert {path.name for path in drawn[1].iterdir()} == {f"{name}.png" for name in PICTURES}
 
 
 @pytest.mark.parametrize("command", ["export", "view", "serve"])
@@ -86,12 +88,19 @@ def test_a_preset_is_an_algorithm_with_settings(clearway, trained, tmp_path, opt
     assert RunFolder(tmp_path).read_record().learner == expected
 
 
-def test_a_preset_s_settings_go_with_another_algorithm(clearway, trained, tmp_path):
+def test_a_preset_s_settings_go_with_another_algorithm(clearway, trained, tmp_path, monkeypatch):
+    asked = []
+
+    def asked_for(request, *_, **__):
+        asked.append(request.learner)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("clearway.api.training.train_alone", asked_for)
     words = ("--preset", "paper", "--algorithm", "a3c", "--frames", 200, "--threads", 1, "--set", "envs=7", "width=16")
-    assert clearway("train", trained.scene, "--out", tmp_path, *words).code == 0
-    learner = json.loads((tmp_path / "run.json").read_text())["learner"]
-    assert (learner["algorithm"], learner["clip_norm"], learner["envs"]) == ("a3c", 40.0, 7)
-    assert not {"epochs", "hindsight", "optimiser"} & set(learner)
+    assert clearway("train", trained.scene, "--out", tmp_path, *words).code == 130
+    (learner,) = asked
+    assert (learner.algorithm, learner.clip_norm, learner.envs) == ("a3c", 40.0, 7)
+    assert not {"epochs", "hindsight", "optimiser"} & set(vars(learner))
 
 
 def test_from_generalist_is_adapting_it(clearway, trained, tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ import pytest
 
 from clearway.cli.parse import one_line
 from clearway.learn.checkpoint import newest_checkpoint
+from helpers.small_demo import still
 
 
 @pytest.mark.parametrize(
@@ -176,7 +177,7 @@ def test_a_checkpoint_of_another_run_is_one_line_too(clearway, trained, tmp_path
     assert clearway("evaluate", trained.run, "--checkpoint", checkpoint).refusal(str(checkpoint), "not a checkpoint of")
 
 
-def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
+def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("not a folder")
     below = tmp_path / "file" / "below"
     source = dump(tmp_path / "attic.h5")
@@ -185,6 +186,7 @@ def test_places_that_cannot_be_written_to(clearway, trained, dump, tmp_path):
     assert clearway("scenes", "import", "thor-v1", source, "--out", below).refusal(str(tmp_path / "file"))
     assert clearway("train", trained.scene, "--out", below).refusal(str(tmp_path / "file"))
     assert clearway(*evaluate, "--pictures", below).refusal(str(tmp_path / "file"))
+    monkeypatch.setattr("clearway.examples.contrast.contrast", still)
     assert clearway("demo", "--out", below).refusal(str(tmp_path / "file"))
 
 

@@ -218,7 +218,8 @@ def test_warnings_are_shown_once_whatever_python_was_told(capsys):
 )
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no such device")
 def test_what_cannot_be_printed_is_told_in_one_line_or_let_be(trained, into, code, told):
-    command = f"{shlex.quote(sys.executable)} -m clearway oracle {shlex.quote(str(trained.scene))} --json {into}"
+    program, scene = shlex.quote(sys.executable), shlex.quote(str(trained.scene))
+    command = f"{program} -m clearway scenes inspect {scene} --json {into}"
     line = f"set -o pipefail; {command}; exit ${{PIPESTATUS[0]:-$?}}"
     done = subprocess.run(["bash", "-c", line], env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
     assert done.returncode == code, done.stderr

@@ -37,6 +37,9 @@ def test_views_become_an_encoder(clearway, trained, tmp_path, views):
     [
         (("--pictures", 0), ("--pictures 0", "1 to")),
         (("--seed", -1), ("--seed -1",)),
+        (("--workers", 13), ("--workers 13", "12 groups of pictures", "Give fewer")),
+        (("--device", "nonsense", "--workers", 2, "--ray", "local"), ("nonsense",)),
+        (("--ray", "local"), ("--ray 'local'", "several workers", "2 or more")),
         (("--try-on", "nowhere"), ("nowhere",)),
     ],
 )

@@ -1,6 +1,6 @@
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +14,11 @@ from clearway.choices import BudgetName, ExperimentName, LearnerName
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.job import do
+from clearway.experiments.plan import Job
 from clearway.experiments.reproduce import ReproduceRequest
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
+from clearway.learn.run_folder import RunFolder
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from helpers.small_runs import small_learner
@@ -29,6 +32,12 @@ def small_experiments() -> Iterator[None]:
         patch.setitem(BUDGETS, "smoke", BUDGET)
         patch.setattr(setting, "_budgeted", lambda name, budget: small_learner(setting.LEARNERS[name]))
         yield
+
+
+def do_here(out: Path, jobs: Sequence[Job], *, threads: int, **_: object) -> None:
+    """What `run_jobs` does, without processes of its own."""
+    for job in jobs:
+        do(out, job, threads)
 
 
 @pytest.fixture
@@ -52,17 +61,18 @@ def dumps(small, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def first(clearway, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
-    """fig5, reproduced once: its words, its answer and the folder that it left. Later calls need one worker alone."""
+    """fig5, reproduced once, by a process of its own: its words, its answer and the folder that it left."""
     folder = tmp_path_factory.mktemp("reproduced")
-    words = ("--scenes", write_rooms(folder / "dumps"), "--seeds", 1, "--json")
+    words = ("--scenes", write_rooms(folder / "dumps"), "--seeds", 1, "--workers", 1, "--json")
     with small_experiments():
         answer = clearway("reproduce", "fig5", *words, "--learners", "default", "--out", folder / "out")
-    return SimpleNamespace(words=(*words, "--workers", 1), answer=answer, out=folder / "out")
+    return SimpleNamespace(words=words, answer=answer, out=folder / "out")
 
 
 @pytest.fixture
-def out(small, first, tmp_path: Path) -> Path:
-    """A copy of what fig5 left."""
+def out(small, first, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of what fig5 left; what is still to be done there, this process does."""
+    monkeypatch.setattr(reproduce, "run_jobs", do_here)
     return shutil.copytree(first.out, tmp_path / "out")
 
 
@@ -103,8 +113,12 @@ def test_a_second_experiment_joins_the_report(clearway, first, out: Path) -> Non
     assert names(both) == ["fig3", "fig5"]
     assert "reproduce fig5" in both.json["facts"]["commands"] and "reproduce fig3" in both.json["facts"]["commands"]
     assert names(clearway("report", out, "--json")) == ["fig3", "fig5"]
-    alone = clearway("reproduce", "fig4", *first.words, "--learners", "paper", "--out", out)
+    changed = "--set", "lr_start=0.002"
+    alone = clearway("reproduce", "fig4", *first.words, "--learners", "default", *changed, "--out", out)
     assert names(alone) == ["fig4"]  # another question: a report of its own
+    assert alone.json["warning"].endswith("Changed in every learner: lr_start=0.002.")
+    rates = [RunFolder(run).read_record().learner.lr_start for run in (out / "runs").iterdir()]
+    assert rates.count(0.002) == 2 and len(rates) == 4  # two rewards, trained anew
     assert not (out / "tables" / "fig5.csv").exists()
 
 
@@ -160,7 +174,14 @@ def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("words", "part"), [(("--seeds", 0), "seeds"), (("--workers", 0), "workers"), (("--threads", 0), "threads")]
+    ("words", "part"),
+    [
+        (("--seeds", 0), "seeds"),
+        (("--workers", 0), "workers"),
+        (("--threads", 0), "threads"),
+        (("--set", "nosuch=1"), "--set nosuch=1: expected name=value"),
+        (("--set", "frames=5"), "--set frames=5: frames are the budget's. Give --frames"),
+    ],
 )
 def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_path: Path) -> None:
     assert clearway("reproduce", "table1", "--out", tmp_path / "out", *words).refusal(part)
@@ -213,6 +234,10 @@ def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "paper"]}))
     turned = replace(second, learners=("paper", "default"))
     assert list(reproduce._with_earlier(turned).names) == ["table1", "fig3"]
+    (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"changes": ["lr_start=0.002", "envs=5"]}))
+    assert reproduce._with_earlier(second) == second
+    respelt = replace(second, changes=("envs=5", "lr_start=2e-3"))
+    assert list(reproduce._with_earlier(respelt).names) == ["table1", "fig3"]
 
 
 def test_the_command_that_ends_last_reports_what_others_asked_for_meanwhile(

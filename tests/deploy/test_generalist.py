@@ -14,8 +14,13 @@ from clearway.deploy.generalist import exported_generalist
 from clearway.deploy.onnx_file import read_onnx, sealed
 from clearway.errors import ArgumentError, DeployError
 from clearway.evaluation.episodes import run_episodes
+from clearway.mapping.charting import charted
 from clearway.mapping.map_files import HEADER, read_map, write_map
 from clearway.mapping.room_map import RoomMap
+from clearway.mapping.settings import MappingSettings
+from clearway.mapping.smoothing import smoothed
+from clearway.mapping.walk import Walk
+from clearway.scenes.actions import BLOCKED
 from clearway.scenes.aspect import AspectWarning
 from clearway.scenes.sensors import RGB
 from clearway.world.world import make_world
@@ -75,6 +80,23 @@ def test_the_file_walks_whole_walks_as_pytorch_does(one_file) -> None:
     for one, other in zip(found.trajectories, expected.trajectories, strict=True):
         assert one.actions.tolist() == other.actions.tolist()
     assert found.false_arrivals.tolist() == expected.false_arrivals.tolist() and found.false_arrivals.any()
+
+
+def test_the_file_makes_the_same_map_of_pictures_that_do_not_repeat(one_file) -> None:
+    rng, state, seen, actions, settings = np.random.default_rng(2), 0, [], [], MappingSettings()
+    for _ in range(40):
+        seen.append(np.clip(PICTURES[state] + rng.integers(-20, 20, PICTURES[0].shape), 0, 255).astype(np.uint8))
+        actions.append(int(rng.choice([0, 0, 1, 2, 3])))
+        state = int(SCENE.graph[state, actions[-1]]) if SCENE.graph[state, actions[-1]] != BLOCKED else state
+    features = one_file.generalist.encoder.encode(np.stack(seen)).astype(np.float16)
+    walk = Walk(features, np.array(actions), np.full((40, 3), settings.side // 2) * (0, 1, 1))
+    poses, maps = [], []
+    for agent in (one_file.generalist, one_file.onnx.generalist):
+        poses.append(smoothed(walk, agent.sight, settings))
+        maps.append(charted(walk, poses[-1], agent.sight, settings))
+    assert poses[0].tolist() == poses[1].tolist() and len(np.unique(poses[0], axis=0)) > 5
+    np.testing.assert_allclose(maps[1].room, maps[0].room, atol=1e-3)
+    assert (maps[1].shut == maps[0].shut).all()
 
 
 @pytest.mark.parametrize("made", ["torch", "onnx"])
@@ -244,7 +266,11 @@ navigator.set_target(picture)
 navigator.act(picture)
 """
     loaded = imported_by(statement)
-    assert {"onnxruntime", "clearway.deploy.generalist"} <= loaded and not loaded & {"torch", "onnx", "gymnasium"}
+    assert {"clearway.deploy.onnx_session", "clearway.deploy.generalist"} <= loaded and not loaded & {
+        "torch",
+        "onnx",
+        "gymnasium",
+    }
 
 
 KNOWN = RoomMap(

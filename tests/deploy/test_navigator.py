@@ -197,8 +197,8 @@ navigator.set_target(numpy.zeros((6, 8, 3), numpy.uint8))
 navigator.act(numpy.zeros((6, 8, 3), numpy.uint8))
 """
     loaded = imported_by(statement)
-    assert {"onnxruntime", "clearway.deploy.navigator"} <= loaded
-    assert not loaded & {"torch", "gymnasium", "onnx", "h5py", "scipy", "transformers", "clearway.model"}
+    assert {"clearway.deploy.onnx_session", "clearway.deploy.navigator"} <= loaded
+    assert not loaded & {"torch", "gymnasium", "onnx", "onnxruntime", "h5py", "scipy", "transformers", "clearway.model"}
     ours = {name for name in loaded if name.startswith("clearway.")}
     elsewhere = {"learn", "envs", "perception", "model", "evaluation", "live"}
     assert not [name for name in ours if name.split(".")[1] in elsewhere]

@@ -21,6 +21,23 @@ def test_goals_are_distinct_poses_of_the_largest_part_and_repeat_by_seed():
     assert drawn_goals(scene, 11, 3) == goals != drawn_goals(scene, 11, 4)
     with pytest.raises(SceneError, match="12 goals asked for, the largest part has 12 poses"):
         drawn_goals(scene, 12, 3)
+    assert drawn_goals(scene, 4, 3, np.arange(4, 8)) == [4, 5, 6, 7] != drawn_goals(scene, 4, 3)
+    with pytest.raises(
+        SceneError, match=r"5 goals asked for, the largest part has 4 poses for them\. Ask for 4 at most"
+    ):
+        drawn_goals(scene, 5, 3, np.arange(4, 8))
+
+
+def test_goals_are_drawn_among_poses_where_they_are_given():
+    walked = []
+
+    def maker(world):
+        walked.append(world.target_state.tolist())
+        return shortest_paths(world)
+
+    evaluate_goals({"own": maker}, SCENES, goals=4, among={"corridor": np.arange(8, 12)})
+    (targets,) = walked
+    assert targets[:4] == [8, 9, 10, 11] and all(target >= SCENES[0].state_count for target in targets[4:])
 
 
 def test_shortest_paths_are_perfect_and_a_random_walk_is_not():

@@ -8,7 +8,7 @@ from clearway.evaluation.optimum import world_yardsticks
 from clearway.evaluation.runs import _optima, evaluate_run
 from clearway.evaluation.tables import markdown_table
 from clearway.learn.load import load_agent
-from clearway.learn.run_folder import record_of
+from clearway.learn.run_record import record_of
 from clearway.learn.train import train
 from clearway.reward import COLLISION_AWARE
 from helpers.agents import told_after

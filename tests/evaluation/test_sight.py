@@ -51,6 +51,28 @@ def test_an_agent_is_given_what_it_sees_and_nothing_more(sees: tuple[str, ...]) 
             assert observation[name].dtype == (np.int64 if name == POSE else wanted.dtype)
 
 
+class Counted:
+    """Pictures that note which of them are read."""
+
+    def __init__(self, pictures) -> None:
+        self.shape, self._pictures, self.read = pictures.shape, pictures, []
+
+    def __getitem__(self, index):
+        self.read += np.atleast_1d(np.arange(self.shape[0])[index]).tolist()
+        return self._pictures[index]
+
+
+@pytest.mark.parametrize(("most", "read"), [(512 * 2**20, [3, 1, 2]), (10, [3, 3, 1, 2, 3])])
+def test_a_picture_is_unpacked_once_where_all_fit(monkeypatch, most: int, read: list[int]) -> None:
+    monkeypatch.setattr("clearway.evaluation.sight.MOST_KEPT_BYTES", most)
+    counted = Counted(SCENES[0].observations)
+    sight = Sight(WORLD, Spy(RGB), [replace(SCENES[0], observations=counted), SCENES[1]])
+    for states in ([3, 3], [1, 2, 3]):
+        seen = sight(torch.tensor(states))[RGB]
+        assert np.array_equal(seen, [expected(RGB, state) for state in states])
+    assert [row for row in counted.read if row] == read  # row 0 tells the dtype
+
+
 def test_pictures_of_poses_in_two_scenes_are_gathered_right() -> None:
     first = SCENES[0].state_count
     states = torch.tensor([first + 4, 0, first - 1, first + 1, 3, WORLD.state_count - 1])

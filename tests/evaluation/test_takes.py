@@ -14,7 +14,8 @@ from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds, run_episodes
 from clearway.evaluation.goals import evaluate_goals
 from clearway.evaluation.sight import Sight
-from clearway.evaluation.takes import Takes, take_at
+from clearway.evaluation.takes import SMALL, Takes, never_again, take_at
+from clearway.mapping.again import marks_of
 from clearway.scenes.actions import Action
 from clearway.scenes.sensors import DEPTH, RGB
 from clearway.world.world import make_world
@@ -35,12 +36,12 @@ def marked(scene: int, state: int, take: int) -> np.ndarray:
 
 
 def marked_takes() -> Takes:
-    """Features (S, K, 3) that say which they are, and pictures of two pixels, one above the other, that do."""
+    """Features (S, K, 3) that say which they are, and pictures of two pixels that do by all but their lowest bit."""
     features = [
         np.array([[marked(number, state, take) for take in range(K)] for state in range(scene.state_count)])
         for number, scene in enumerate(SCENES)
     ]
-    pictures = [one[:, :, None, None].repeat(2, 2).astype(np.uint8) for one in features]
+    pictures = [2 * one[:, :, None, None].repeat(2, 2).astype(np.uint8) for one in features]
     return Takes(K, {FEATURES: features, RGB: pictures})
 
 
@@ -75,8 +76,21 @@ def test_every_step_shows_the_take_of_its_pose_and_targets_are_seen_as_they_are(
             take = int(take_at(seeds[[episode]], np.array([step]), K)[0])
             wanted = marked(scene, pose - int(first[scene]), take)
             assert observation[POSE][row] == pose
-            assert np.array_equal(observation[FEATURES][row], wanted) and observation[FEATURES].dtype == np.float32
-            assert np.array_equal(observation[RGB][row, 1, 0], wanted) and observation[RGB].dtype == np.uint8
+            assert observation[FEATURES].dtype == np.float32 and observation[RGB].dtype == np.uint8
+            assert np.allclose(observation[FEATURES][row], wanted, rtol=SMALL)
+            assert np.array_equal(observation[RGB][row, 1, 0] >> 1, wanted)
+
+
+def test_no_take_is_seen_twice_to_the_bit() -> None:
+    seed, step = np.repeat(np.arange(20), 30), np.tile(np.arange(30), 20)
+    picture = np.random.default_rng(0).integers(256, size=(8, 8, 3), dtype=np.uint8)
+    features = np.linspace(-1, 1, 64, dtype=np.float32)
+    for seen, apart in ((picture, 1), (features, SMALL)):
+        shown = never_again(np.stack([seen] * len(seed)), seed, step)
+        assert shown.dtype == seen.dtype and len(np.unique(shown.reshape(len(seed), -1), axis=0)) == len(seed)
+        assert 0 < np.abs(shown.astype(float) - seen).max() <= apart
+        assert np.array_equal(never_again(seen[None], seed[41:42], step[41:42])[0], shown[41])
+    assert len(set(marks_of(never_again(np.stack([features] * len(seed)), seed, step)).tolist())) == len(seed)
 
 
 class ByTake:

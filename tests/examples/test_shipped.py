@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clearway.errors import ClearwayError, RunError
+from clearway.evaluation.runs import evaluate_runs
 from clearway.examples import make, shipped
 from clearway.examples.shipped import CARD_FILE, MOST_BYTES, SHIPPED, load_example, read_card
 from clearway.examples.stage import example_stage
@@ -71,6 +73,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
         patch.setattr(make, "encode_scenes", encode)
         patch.setattr(make, "SOUGHT", 3)
+        patch.setattr(make, "evaluate_runs", partial(evaluate_runs, episodes_per_target=5, step_limit=60))
         scene = grid_scene(2, width=4, depth=3, feature_count=FEATURES, name="small")
         make.make_example(make.Recipe(scene, small_learner(frames=160)), folder)
     return folder

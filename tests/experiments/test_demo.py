@@ -64,7 +64,7 @@ def linked_files(page: Path) -> set[str]:
 def check_demo(out: Path) -> None:
     """What every demo leaves behind."""
     links = linked_files(out / "index.html")
-    assert {"pictures/map.png", "pictures/curves.png"} <= links
+    assert {"pictures/contrast.webp", "pictures/map.png", "pictures/curves.png"} <= links
     assert {f"pictures/episode-{agent}.png" for agent in ("collision-aware", "shortest")} <= links
     assert len([link for link in links if link.startswith("pictures/view-")]) == 6
     for link in links:
@@ -106,13 +106,13 @@ def test_a_second_demo_replaces_the_first_and_may_be_made_from_within(small, fir
     for old in ("old.txt", "pictures/old.png", "runs/shortest/old.txt"):
         (out / old).touch()
     monkeypatch.chdir(out)
-    answer = demo(Path(), "--seed", "5", "--json", frames=1600)
+    answer = demo(Path(), "--seed", "5", "--json", frames=400)
     assert answer.code == 0
     assert os.path.samefile(Path(), out)
     check_demo(out)
     assert not list(out.rglob("old.*"))
     record = RunFolder(out / "runs" / "shortest").read_record()
-    assert (record.seed, record.learner.frames) == (5, 1600)
+    assert (record.seed, record.learner.frames) == (5, 400)
     assert json.loads(answer.out) == json.loads((out / "evaluation.json").read_text())
 
 

@@ -10,6 +10,7 @@ from clearway.generation.request import Request
 from clearway.rooms.plans import decoration, plan_room
 from clearway.rooms.plans.layout import Layout
 from clearway.rooms.room import Room
+from helpers.plan_maps import COARSE
 
 THROUGH_M = 0.05  # covers of door frames in corners reach 4 cm into the wall beside them
 KEPT_LOW_M = 0.05  # skirting boards meet in corners
@@ -35,7 +36,7 @@ def through_walls_m(room: Room, layout: Layout) -> float:
 @pytest.mark.parametrize(("kind", "number"), [("flat", 2), *(("room", number) for number in range(4))])
 def test_nothing_reaches_through_walls_and_all_furniture_is_named(monkeypatch, kind, number) -> None:
     monkeypatch.setattr(plan_room, "bake", lambda *arguments, **options: None)
-    room, layout = plan_room.build_plan_room(generated_plan(Request(kind, "train", 4, number)))
+    room, layout = plan_room.build_plan_room(generated_plan(Request(kind, "train", 4, number)), detail=COARSE)
     assert all(piece.kind is not None for piece in layout.pieces)
     assert len(room.parts) > 80 and 0 < through_walls_m(room, layout) < THROUGH_M
 

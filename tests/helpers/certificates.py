@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+ELLIPTIC = ("ec", "-pkeyopt", "ec_paramgen_curve:prime256v1")
 
-def certified(folder: Path) -> tuple[Path, Path]:
-    """A certificate for 127.0.0.1 that is its own authority, and its key."""
+
+def certified(folder: Path, kind: tuple[str, ...] = ELLIPTIC) -> tuple[Path, Path]:
+    """A certificate for 127.0.0.1 that is its own authority, and its key of a kind, in openssl's words."""
     if shutil.which("openssl") is None:
         pytest.skip("openssl, which makes the certificate, is not installed")
     certificate, key = folder / "cert.pem", folder / "key.pem"
@@ -19,9 +21,7 @@ def certified(folder: Path) -> tuple[Path, Path]:
         "req",
         "-x509",
         "-newkey",
-        "ec",
-        "-pkeyopt",
-        "ec_paramgen_curve:prime256v1",
+        *kind,
         "-nodes",
         "-days",
         "1",

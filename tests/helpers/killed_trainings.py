@@ -32,8 +32,8 @@ from clearway.learn.recurrent import Recurrent
 from clearway.learn.run_folder import RunFolder
 from clearway.perception.eyes_network import EyesShape
 from clearway.pretraining import pretrain as pretraining
-from clearway.pretraining.pretrain import PretrainRequest
 from clearway.pretraining.settings import PretrainSettings
+from clearway.pretraining.trainer import PretrainRequest
 from clearway.views.settings import ViewSettings
 from clearway.views.stream import views_in
 from helpers.made import corridor_scene, grid_scene

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from clearway.rooms.detail import Detail
 from clearway.scenes.floor_plans import Area, FloorPlan
 
+COARSE = Detail(texture_step=8)  # where it is asked what stands and hangs where, not how it looks
 SINGLE = (".",)
 ELL = (
     "..####",

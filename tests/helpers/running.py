@@ -16,11 +16,12 @@ PATIENT_S = 60  # for what must happen, on a busy machine
 PROGRAM = """
 import json, sys
 from pathlib import Path
+from clearway.serve.hangup import rotating
 from clearway.serve.limits import Limits
 from functools import partial
 from clearway.serve.access_log import to_stderr
 from clearway.serve.replicas import run_replicas
-from clearway.serve.run import Network, rotating, run_service
+from clearway.serve.run import Network, run_service
 from clearway.serve.tokens import read_tokens
 from clearway.web.local import listening, port_of
 from helpers.serving import TOKENS

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from clearway.evaluation.runs import evaluate_runs
+from clearway.examples.contrast import FILE
 from clearway.scenes.scene import Scene
+from clearway.viz.page import Picture
 from helpers.made import grid_scene
+from helpers.small_pictures import shrink_pictures
 from helpers.small_runs import FEATURES, small_learner
 
 ROOM_CELLS = (4, 3)
@@ -19,6 +24,13 @@ def small_bathroom() -> Scene:
     """What stands in for the bathroom; its features are there already."""
     width, depth = ROOM_CELLS
     return grid_scene(1, width=width, depth=depth, obstacle_share=0.1, feature_count=FEATURES, name="bathroom")
+
+
+def still(out: Path) -> Picture:
+    """A picture in place of the film that a page begins with."""
+    (out / FILE).parent.mkdir()
+    Image.new("RGB", (8, 6)).save(out / FILE)
+    return Picture(FILE, "The example", "an agent")
 
 
 def shrink_demo(patch: pytest.MonkeyPatch) -> None:
@@ -31,7 +43,9 @@ def shrink_demo(patch: pytest.MonkeyPatch) -> None:
     def encode(scenes: Sequence[Scene], encoder: str, *, progress: bool) -> list[Scene]:
         return list(scenes)
 
-    patch.setattr("clearway.viz.figures.DPI", 50)
+    shrink_pictures(patch)
+    patch.setattr("clearway.examples.contrast.contrast", still)
+    patch.setattr("clearway.experiments.demo_generalist.STEP_LIMIT", 40)
     patch.setattr("clearway.experiments.demo.cached_room_scene", room)
     patch.setattr("clearway.experiments.demo.encode_scenes", encode)
 

@@ -16,7 +16,8 @@ from clearway.learn.load import TrainedNetwork
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.rollout import sample_actions
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.learn.running import Learning
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from clearway.errors import RunError, SceneError
 
+WORKER = b"clearway.spread.worker"
+
 
 def died(part: object, how: str) -> RunError:
     return RunError(f"part {part}: its worker {how}")
@@ -98,6 +100,16 @@ def wait_to_be_told(folder: Path, part: int) -> None:
         signal.pause()
 
 
+def finish_when_told(folder: Path, part: int) -> int:
+    """Be under way until SIGTERM, and finish then as if nothing had been."""
+    told = []
+    signal.signal(signal.SIGTERM, lambda number, frame: told.append(number))
+    (folder / f"under-way-{part}").touch()
+    while not told:
+        time.sleep(0.01)
+    return part
+
+
 def wait_to_be_interrupted(folder: Path, part: int) -> None:
     """Be under way until Ctrl+C, and leave a file then."""
     (folder / "under-way").touch()
@@ -121,7 +133,7 @@ def wait_for(path: Path) -> None:
 def workers_of(process: int) -> list[int]:
     """Running workers that a process has started."""
     found = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
-    return [pid for pid in found if parent_of(pid) == process and is_worker(pid)]
+    return [pid for pid in found if parent_of(pid) == process and runs(pid, WORKER)]
 
 
 def parent_of(pid: int) -> int | None:
@@ -132,10 +144,10 @@ def parent_of(pid: int) -> int | None:
         return None
 
 
-def is_worker(pid: int) -> bool:
-    """It runs, and is a worker."""
+def runs(pid: int, module: bytes) -> bool:
+    """It has not ended, and its command names a module."""
     try:
-        return b"clearway.spread.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()  # empty for one that has ended
+        return module in Path(f"/proc/{pid}/cmdline").read_bytes()  # empty for one that has ended
     except (FileNotFoundError, ProcessLookupError):
         return False
 

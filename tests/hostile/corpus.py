@@ -11,5 +11,5 @@ from hostile.cases import Case
 def cases(flips: int) -> Iterator[Case]:
     """Every case; `flips` is the number of bits flipped in a scene file of ours, one a file."""
     yield from scene_files.cases(flips)
-    yield from other_files.cases()
+    yield from other_files.cases(flips)
     yield from odd_files.cases()

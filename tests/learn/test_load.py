@@ -11,7 +11,8 @@ import torch
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_network, run_scenes, run_world
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.learn.running import save
 from clearway.learn.train import RunRequest, train
 from clearway.scenes.scene import Scene

@@ -16,7 +16,8 @@ from clearway.learn.learner import Learner
 from clearway.learn.load import load_agent, run_world
 from clearway.learn.old_runs import without_later
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes

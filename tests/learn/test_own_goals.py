@@ -25,7 +25,6 @@ from clearway.model.feature_map import prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.floor_plans import GENERATED
-from clearway.scenes.held_out import held_out
 from clearway.world.navigation import TargetChoice
 from clearway.world.world import World, make_world
 from helpers.made import grid_scene
@@ -68,7 +67,7 @@ def test_every_pose_may_become_a_goal_and_the_given_ones_come_first() -> None:
 def test_held_out_poses_of_a_generated_room_are_no_goals() -> None:
     made = grid_scene(1, width=6, depth=5, feature_count=FEATURES)
     scene = replace(made, made_by=replace(made.made_by, source=GENERATED))
-    held = held_out(scene)
+    held = scene.held_out
     assert 0 < held.sum() < len(held)
     target = int(np.flatnonzero(~held & (scene.components == 0))[0])
     goals = goal_world(make_world([scene], {scene.name: [target]})).target_state.numpy()

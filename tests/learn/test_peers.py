@@ -1,13 +1,10 @@
 """Several workers train one agent: the same losses and parameters as one worker's, up to rounding."""
 
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import pytest
 import torch
-import torch.distributed as dist
 from torch import Tensor
 
 from clearway.learn import trainer as trainer_module
@@ -18,10 +15,11 @@ from clearway.learn.peers import LostPeer, Peers, divided
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.train import RunRequest
 from clearway.reward import COLLISION_AWARE
+from helpers.by_workers import by_workers
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, GRID_TARGETS, small_learner
 
-UPDATES = 20
+UPDATES = 10
 Told = list[dict[str, float]]
 
 
@@ -32,27 +30,6 @@ def four_scenes(learner: Learner) -> RunRequest:
     scenes = sorted(scenes, key=lambda scene: len(scene.name))
     targets = {s.name: CORRIDOR_TARGETS if "corridor" in s.name else GRID_TARGETS for s in scenes}
     return RunRequest(scenes, targets, learner, COLLISION_AWARE, seed=3)
-
-
-def by_workers(count: int, work: Callable[[Peers], Any]) -> list[Any]:
-    """What `work` gives at each of so many workers, threads here."""
-    store, results, errors = dist.HashStore(), [None] * count, []
-
-    def run(rank: int) -> None:
-        try:
-            results[rank] = work(Peers(dist.ProcessGroupGloo(store, rank, count)))
-        except Exception as error:
-            errors.append(error)
-
-    threads = [threading.Thread(target=run, args=(rank,), daemon=True) for rank in range(count)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60)
-    if errors:
-        raise errors[0]
-    assert not any(thread.is_alive() for thread in threads)
-    return results
 
 
 @pytest.fixture

@@ -14,6 +14,11 @@ from clearway.learn import ray_workers
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_training
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
+from clearway.perception.eyes import read_card
+from clearway.pretraining.eyes_folder import EyesFolder
+from clearway.pretraining.trainer import PretrainRequest
+from clearway.pretraining.workers import pretrain_by_workers
+from helpers.killed_pretraining import SETTINGS, made
 from helpers.on_ray import MARKS, cluster_here
 from helpers.small_runs import equal_bits, small_learner, small_request
 
@@ -64,6 +69,16 @@ def test_a_worker_that_is_killed_on_ray_changes_no_bit(tmp_path: Path) -> None:
     ends = [newest_checkpoint(folder.checkpoints) for folder in (here, there)]
     assert equal_bits(*map(read_network, ends)) and equal_bits(*map(read_training, ends))
     assert [row["frames"] for row in here.metrics()] == [row["frames"] for row in there.metrics()]
+
+
+def test_eyes_that_ray_trains_are_those_of_one_machine(tmp_path: Path) -> None:
+    request = PretrainRequest(made(tmp_path / "views"), SETTINGS, seed=3)
+    folders = {where: EyesFolder(tmp_path / str(where)) for where in (None, "local")}
+    for where, folder in folders.items():
+        pretrain_by_workers(request, folder.path, 2, threads=1, ray=where)
+    here, there = (newest_checkpoint(folder.checkpoints) for folder in folders.values())
+    assert equal_bits(read_network(here), read_network(there))
+    assert read_card(folders["local"].path).trained["pictures"] == SETTINGS.pictures
 
 
 def test_what_ray_cannot_run_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,8 +35,8 @@ def _every_update(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
 
 
-def cut_off(folder: Path, monkeypatch: pytest.MonkeyPatch, updates: int) -> None:
-    """Train, copied, until the power goes before this update."""
+def cut_off(folder: Path, monkeypatch: pytest.MonkeyPatch, updates: int, copy_to: str | None = ADDRESS) -> None:
+    """Train until the power goes before this update."""
     whole = Trainer.update
 
     def update(trainer: Trainer) -> dict[str, float]:
@@ -45,7 +46,7 @@ def cut_off(folder: Path, monkeypatch: pytest.MonkeyPatch, updates: int) -> None
 
     with monkeypatch.context() as patch, pytest.raises(_PowerCut):
         patch.setattr(Trainer, "update", update)
-        training.train(REQUEST, folder, copy_to=ADDRESS)
+        training.train(REQUEST, folder, copy_to=copy_to)
 
 
 def without_times(folder: Path) -> list[dict[str, float]]:
@@ -77,15 +78,31 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def two_moments(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The run after two updates and, with two checkpoints more, at its end."""
+    earlier, later = tmp_path_factory.mktemp("earlier") / "run", tmp_path_factory.mktemp("later") / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+        cut_off(earlier, patch, updates=2, copy_to=None)
+        shutil.copytree(earlier, later)
+        training.train(REQUEST, later, resume=True)
+    return earlier, later
+
+
 @pytest.mark.parametrize(
     "fails_at", [1, 2, 4, 5, 7, 8, 9, 10, 12]
 )  # before, within and between what is put and removed
 def test_whatever_is_cut_off_leaves_a_whole_copy(
-    s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: Path, fails_at: int
+    s3: S3,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    undisturbed: Path,
+    two_moments: tuple[Path, Path],
+    fails_at: int,
 ) -> None:
-    cut_off(tmp_path / "lost", monkeypatch, updates=2)
-    RunCopy(ADDRESS).update(tmp_path / "lost")
-    training.train(REQUEST, tmp_path / "lost", resume=True)  # two checkpoints more, not copied yet
+    earlier, later = two_moments
+    RunCopy(ADDRESS).update(earlier)
     done, upload, remove = 0, Store.upload, Store.remove
 
     def counted(*arguments: object) -> None:
@@ -98,7 +115,7 @@ def test_whatever_is_cut_off_leaves_a_whole_copy(
     with monkeypatch.context() as patch, pytest.raises(_PowerCut):
         patch.setattr(Store, "upload", counted)
         patch.setattr(Store, "remove", counted)
-        RunCopy(ADDRESS).update(tmp_path / "lost")
+        RunCopy(ADDRESS).update(later)
     found = tmp_path / "found"
     assert RunCopy(ADDRESS).restore(found)
     training.train(REQUEST, found, resume=True)

@@ -9,7 +9,8 @@ import pytest
 
 from clearway.errors import RunError
 from clearway.learn.presets import PAPER_A2C
-from clearway.learn.run_folder import RunFolder, RunRecord, record_of
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import RunRecord, record_of
 from clearway.reward import BUMP
 from clearway.scenes.digest import scene_digest
 from helpers.made import corridor_scene

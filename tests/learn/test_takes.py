@@ -7,7 +7,7 @@ from torch import Tensor
 
 from clearway.errors import RunError
 from clearway.learn.bc import BC
-from clearway.learn.run_folder import record_of
+from clearway.learn.run_record import record_of
 from clearway.learn.train import train
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE

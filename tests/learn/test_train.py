@@ -21,7 +21,8 @@ from clearway.learn import checkpoint, running, train
 from clearway.learn.checkpoint import Progress, newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.figures import Figures
 from clearway.learn.presets import PAPER_A2C
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.learn.trainer import Trainer
 from clearway.reward import SHORTEST
 from clearway.scenes.features import FileFeatures

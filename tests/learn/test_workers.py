@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,34 +21,17 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
 from clearway.scenes.thor_v1 import write_scene
 from helpers import killed_workers
+from helpers.crew_processes import PATIENCE_S, wait_until, workers_of
 from helpers.made import corridor_scene
 from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 KILLS = int(os.environ.get("CLEARWAY_KILLS", "5"))
-PATIENCE_S = 60.0
 
 
 def started(folder: Path, *scenes: Path) -> subprocess.Popen[str]:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-m", "helpers.killed_workers", str(folder), *map(str, scenes)]
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
-
-
-def workers_of(parent: int) -> list[int]:
-    """Process ids of a training's workers."""
-    try:
-        children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-        return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-    except FileNotFoundError:
-        return []
-
-
-def wait_until(condition: object, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():  # type: ignore[operator]
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def all_workers_of(process: subprocess.Popen[str]) -> list[int]:
@@ -183,25 +167,31 @@ def test_an_error_of_one_worker_ends_all_with_its_words(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_a_run_that_one_worker_ends(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["ctrl_c", "timeout"])
+def test_a_signal_to_all_leaves_a_run_that_one_worker_ends(tmp_path: Path, number: signal.Signals) -> None:
     scenes, out = [tmp_path / f"{name}.h5" for name in ("one", "two")], tmp_path / "run"
     for scene in scenes:
         write_scene(corridor_scene(5), scene)
-    small = ["--frames", "120000", "--set", "envs=20", "rollout_steps=8", "width=16", "--threads", "1", "--resume"]
+    small = ["--frames", "40000", "--set", "envs=20", "rollout_steps=8", "width=16", "--threads", "1", "--resume"]
     command = [sys.executable, "-m", "clearway", "train", *map(str, scenes), "--out", str(out), *small]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen([*command, "--workers", "2"], stderr=subprocess.PIPE, text=True, env=environment) as process:
-        wait_until((out / "metrics.jsonl").exists, process)
+        wait_until(lambda: (out / "metrics.jsonl").exists() and RunFolder(out).metrics(), process)  # an update is done
         workers = workers_of(process.pid)
         with pytest.raises(RunError, match="another process trains here"), RunFolder(out).held():
             pass
-        for pid in (*workers, process.pid):  # as a terminal does
-            os.kill(pid, signal.SIGINT)
+        told = time.monotonic()
+        for _ in range(2 if number == signal.SIGINT else 1):  # by somebody impatient
+            for pid in (*workers, process.pid):  # as a terminal does, or a program that ends a process group
+                with suppress(ProcessLookupError):  # it has ended
+                    os.kill(pid, number)
+            time.sleep(0.02)
         _, errors = process.communicate(timeout=PATIENCE_S)
+    assert time.monotonic() - told < 20
     assert process.returncode == 130, errors
     assert errors.rstrip().endswith("interrupted") and "Traceback" not in errors
     assert len(workers) == 2 and all(map(gone, workers))
-    assert 0 < frames_of(RunFolder(out)) < 120_000
+    assert 0 < frames_of(RunFolder(out)) < 40_000
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S)
     assert done.returncode == 0, done.stderr
-    assert frames_of(RunFolder(out)) == 120_000
+    assert frames_of(RunFolder(out)) == 40_000

@@ -12,7 +12,7 @@ from clearway.agents.agent import FEATURES, Decisions
 from clearway.agents.by_features import FeatureAgent
 from clearway.errors import RunError
 from clearway.learn.load import TrainedNetwork
-from clearway.learn.run_folder import record_of
+from clearway.learn.run_record import record_of
 from clearway.live.conditions import Condition, Perturbations
 from clearway.live.episodes import LiveProtocol
 from clearway.live.live_room import LiveRoom

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,20 @@ def make(live) -> Iterator[Make]:
             return env
 
         yield made
+
+
+@pytest.fixture(scope="module")
+def plain(live) -> Iterator[LiveImageGoalEnv]:
+    """One for tests that begin an episode of their own, or cannot."""
+    with closing(LiveImageGoalEnv(live, **SMALL)) as env:
+        yield env
+
+
+@pytest.fixture(scope="module")
+def driven(live) -> Iterator[LiveImageGoalEnv]:
+    """The same with continuous actions."""
+    with closing(LiveImageGoalEnv(live, continuous=True, **SMALL)) as env:
+        yield env
 
 
 @pytest.mark.parametrize(
@@ -117,8 +131,8 @@ def test_depth_and_clearance_are_metres(make: Make) -> None:
     assert seen["clearance"][0] == pytest.approx(0.001, abs=5e-4)
 
 
-def test_a_history_holds_the_last_poses(make: Make) -> None:
-    short, long = make(), make(history_length=3)
+def test_a_history_holds_the_last_poses(plain: LiveImageGoalEnv, make: Make) -> None:
+    short, long = plain, make(history_length=3)
     ends = {"start": (0.25, 0.25, 0.0), "target": (1.75, 0.25, 0.0)}
     seen = [short.reset(options=ends)[0]["observation"]]
     history = long.reset(options=ends)[0]
@@ -147,18 +161,18 @@ def test_a_seed_repeats_pictures_and_all(make: Make) -> None:
     assert walked(env, 3) != walked(env, 4)
 
 
-def test_perturbations_change_what_is_seen_and_not_the_target(live, make: Make) -> None:
+def test_perturbations_change_what_is_seen_and_not_the_target(plain: LiveImageGoalEnv, make: Make) -> None:
     ends = {"start": (0.25, 0.25, 0.0), "target": (0.25, 2.25, 180.0)}  # from where furniture is seen
-    plain, _ = make().reset(seed=0, options=ends)
+    unchanged, _ = plain.reset(seed=0, options=ends)
     for changed in ({"light": 0.9}, {"pixel_noise": 20.0}, {"camera_pitch_jitter": 9.0}):
         seen, _ = make(perturbations=changed).reset(seed=1, options=ends)
-        assert (seen["observation"] != plain["observation"]).any(), changed
-        np.testing.assert_array_equal(seen["target"], plain["target"])
+        assert (seen["observation"] != unchanged["observation"]).any(), changed
+        np.testing.assert_array_equal(seen["target"], unchanged["target"])
     for changed in ({"new_obstacle": True}, {"move_furniture": 0.3}):
         env = make(perturbations=changed)
         rearranged = [env.reset(seed=seed, options={**ends, "start": (1.25, 0.25, 0.0)})[0] for seed in range(6)]
         assert len({seen["observation"].tobytes() for seen in rearranged}) > 1, changed
-        assert {seen["target"].tobytes() for seen in rearranged} == {plain["target"].tobytes()}
+        assert {seen["target"].tobytes() for seen in rearranged} == {unchanged["target"].tobytes()}
 
 
 def test_step_and_turn_can_be_set(make: Make) -> None:
@@ -239,21 +253,22 @@ def test_scenes_without_a_room_are_refused(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("action", [4, -1, 1.0, None, "forward", [0]])
-def test_actions_that_do_not_fit(make: Make, action: Any) -> None:
-    env = make()
-    with pytest.raises(ResetNeeded):
-        env.step(0)
-    env.reset(seed=0)
+def test_actions_that_do_not_fit(plain: LiveImageGoalEnv, action: Any) -> None:
+    plain.reset(seed=0)
     with pytest.raises(EnvError, match="action"):
-        env.step(action)
+        plain.step(action)
+
+
+def test_no_step_comes_before_the_first_reset(make: Make) -> None:
+    with pytest.raises(ResetNeeded):
+        make().step(0)
 
 
 @pytest.mark.parametrize("action", [0, [0.5], [0.5, np.nan], ["fast", "left"]])
-def test_drives_that_do_not_fit(make: Make, action: Any) -> None:
-    env = make(continuous=True)
-    env.reset(seed=0)
+def test_drives_that_do_not_fit(driven: LiveImageGoalEnv, action: Any) -> None:
+    driven.reset(seed=0)
     with pytest.raises(EnvError, match="actions: expected"):
-        env.step(action)
+        driven.step(action)
 
 
 @pytest.mark.parametrize(
@@ -267,12 +282,12 @@ def test_drives_that_do_not_fit(make: Make, action: Any) -> None:
         ({"reset_mask": np.array([True])}, "is for vector environments"),
     ],
 )
-def test_options_that_do_not_fit(make: Make, options: dict, problem: str) -> None:
+def test_options_that_do_not_fit(plain: LiveImageGoalEnv, options: dict, problem: str) -> None:
     with pytest.raises(EnvError, match=problem):
-        make().reset(options=options)
+        plain.reset(options=options)
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5])
-def test_seeds_that_do_not_fit(make: Make, seed: Any) -> None:
+def test_seeds_that_do_not_fit(plain: LiveImageGoalEnv, seed: Any) -> None:
     with pytest.raises(EnvError, match="seed"):
-        make().reset(seed=seed)
+        plain.reset(seed=seed)

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 
 from clearway.mapping.again import ALWAYS, NEVER, marks_of
-from clearway.mapping.following import STAYED, Follower
+from clearway.mapping.following import Follower
+from clearway.mapping.moves import STAYED
 from clearway.mapping.settings import MappingSettings
 from clearway.scenes.actions import Action
 from helpers.made import corridor_scene

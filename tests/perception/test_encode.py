@@ -172,7 +172,7 @@ def test_the_calibration_takes_one_thread_whatever_torch_has(own_cache: Path, mo
 @needs_proc
 def test_an_encoding_process_that_is_killed_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = rooms()
-    record = encode_scenes(scenes[:1], "random-resnet50", workers=1)[0].encoder
+    record = encode_scenes(scenes[:1])[0].encoder
     open_batches = encode._batches
 
     def kill_first(*arguments: object) -> Iterator[object]:

@@ -10,8 +10,9 @@ import torch
 from clearway.perception.eyes import find_record, from_record, read_card
 from clearway.perception.eyes_network import EyesShape
 from clearway.pretraining import pretrain as pretrain_module
-from clearway.pretraining.pretrain import Pretrainer, PretrainRequest, pretrain
+from clearway.pretraining.pretrain import pretrain
 from clearway.pretraining.settings import PretrainSettings
+from clearway.pretraining.trainer import Pretrainer, PretrainRequest
 from clearway.views.settings import ViewSettings
 from clearway.views.stream import Views, views_in
 from helpers.made_views import write_made

@@ -21,8 +21,9 @@ from clearway.perception.eyes import from_record, read_card, read_eyes
 from clearway.perception.eyes_network import EyesShape
 from clearway.pretraining.judge import judge, recognition
 from clearway.pretraining.losses import drawn_pairs
-from clearway.pretraining.pretrain import Pretrainer, PretrainRequest, pretrain
+from clearway.pretraining.pretrain import pretrain
 from clearway.pretraining.settings import PretrainSettings
+from clearway.pretraining.trainer import Pretrainer, PretrainRequest
 from clearway.views.settings import ViewSettings
 from clearway.views.stream import Views, views_in
 from helpers.made_views import write_made

@@ -13,7 +13,9 @@ from clearway.learn.run_folder import RunFolder
 from clearway.remote.address import fetched_folder
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.thor_v1 import write_scene
+from clearway.views.stream import views_in
 from helpers.made import corridor_scene
+from helpers.made_views import write_made
 from helpers.servers_of_files import files_of, web_server
 from helpers.small_runs import small_learner
 
@@ -39,6 +41,15 @@ def test_scenes_elsewhere_are_those_here(
         main(["scenes", "inspect", "s3://rooms/set/one.h5"])
     assert ended.value.code == 0
     assert "states 20 cells 5" in " ".join(capsys.readouterr().out.split())
+
+
+def test_views_elsewhere_are_those_here(s3: Callable[[str, bytes], None], tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        s3(f"views/{name}.h5", write_made(tmp_path / "views", name).read_bytes())
+    here, there = (views_in([Path(where)]) for where in (tmp_path / "views", "s3://rooms/views"))
+    assert there.rooms == here.rooms == ("one", "two")
+    for ours, theirs in zip(here.batches(4), there.batches(4), strict=True):
+        assert all((theirs.seen[name] == ours.seen[name]).all() for name in ("rgb", "depth"))
 
 
 def test_a_run_finds_its_scenes_again(s3: Callable[[str, bytes], None], files: Path, tmp_path: Path) -> None:

@@ -79,3 +79,22 @@ def test_cells_are_circles_of_turns_wherever_states_are_said_to_lie() -> None:
     assert moved.cells.dtype == np.int64
     one_point = replace(scene, locations_m=np.zeros_like(scene.locations_m))
     assert one_point.cells.tolist() == [state // 4 for state in range(scene.state_count)]
+
+
+@pytest.mark.parametrize("headings", [3, 7, 360])
+def test_circles_of_any_number_of_turns_are_found(headings: int) -> None:
+    cells, rng = 5, np.random.default_rng(headings)
+    number = rng.permutation(cells * headings).reshape(cells, headings)
+    graph = np.full((cells * headings, 4), BLOCKED, np.int32)
+    graph[number, Action.TURN_RIGHT] = np.roll(number, -1, axis=1)
+    found = graphs.turn_circles(graph)
+    assert [len(set(found[circle].tolist())) for circle in number] == [1] * cells
+    _, first = np.unique(found, return_index=True)
+    assert (len(first), np.all(np.diff(first) > 0), found.dtype) == (cells, True, np.int64)
+
+
+def test_two_actions_may_lead_to_one_state() -> None:
+    graph = np.array([[1, 1, 1, 1], [0, 0, 0, BLOCKED], [0, 1, 2, 2]], np.int32)
+    assert graphs.adjacency(graph).toarray().tolist() == [[0, 1, 0], [1, 0, 0], [1, 1, 1]]
+    assert graphs.components(graph).tolist() == [0, 0, 1]
+    assert graphs.distances_to(graph, np.array([0, 2])).tolist() == [[0, 1, 1], [-1, -1, 0]]

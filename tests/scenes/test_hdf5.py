@@ -1,5 +1,6 @@
 """Arrays of our files stand under a checksum, whatever their size."""
 
+import sys
 import zlib
 from pathlib import Path
 
@@ -84,3 +85,20 @@ def test_what_is_packed_twice_is_refused_unread(tmp_path: Path, filters: tuple[s
         file["a"][...] = np.arange(400, dtype=np.int32).reshape(100, 4)
     with hdf5.opened(path) as file, pytest.raises(SceneError, match="packed in an odd order, or twice"):
         hdf5.read_values(hdf5.need_dataset(file, "a", path), path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there alone an open file has a name of its own")
+def test_a_file_that_is_replaced_after_the_look_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, open_file = tmp_path / "scene.h5", h5py.File
+    with open_file(path, "w") as file:
+        file["x"] = 1
+
+    def replaced(name: Path, mode: str) -> h5py.File:
+        path.unlink()
+        with open_file(path, "w") as file:
+            file["x"] = 2
+        return open_file(name, mode)
+
+    monkeypatch.setattr(h5py, "File", replaced)
+    with pytest.raises(SceneError, match=r"scene\.h5: cannot be opened as HDF5"), hdf5.opened(path):
+        pass

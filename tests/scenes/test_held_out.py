@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
-from clearway.scenes.held_out import held_out, held_out_cells
+from clearway.scenes.held_out import held_out_cells
 from helpers.made import scene_of_cells
 
 CELLS = np.argwhere(np.ones((8, 5), bool))
@@ -25,7 +25,7 @@ def test_name_and_cell_choose_and_order_does_not() -> None:
 def test_all_headings_of_a_cell_are_held_out_together() -> None:
     plan = FloorPlan("hall", CELLS + np.array([-3, 9]), cell_size_m=0.5)
     scene = floor_plan_scene(plan, 4)
-    poses = held_out(scene)
+    poses = scene.held_out
     assert poses.shape == (160,) and poses.dtype == np.bool_
     np.testing.assert_array_equal(poses.reshape(-1, 4), np.repeat(held_out_cells("hall", plan.cells)[:, None], 4, 1))
     shuffled = np.random.default_rng(0).permutation(160)
@@ -38,7 +38,7 @@ def test_all_headings_of_a_cell_are_held_out_together() -> None:
         headings_deg=scene.headings_deg[shuffled],
         features=None,
     )
-    np.testing.assert_array_equal(held_out(other), poses[shuffled])
+    np.testing.assert_array_equal(other.held_out, poses[shuffled])
 
 
 def test_cells_halfway_between_whole_numbers_are_told_apart() -> None:
@@ -47,6 +47,6 @@ def test_cells_halfway_between_whole_numbers_are_told_apart() -> None:
     for name in names:
         scene = scene_of_cells(cells, name=name)
         halfway = replace(scene, locations_m=scene.locations_m + 0.25)
-        np.testing.assert_array_equal(held_out(halfway), held_out(scene))
-        chosen.append(int(np.flatnonzero(held_out(halfway))[0]))
+        np.testing.assert_array_equal(halfway.held_out, scene.held_out)
+        chosen.append(int(np.flatnonzero(halfway.held_out)[0]))
     assert len(set(chosen)) > 7

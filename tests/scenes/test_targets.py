@@ -5,7 +5,6 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.floor_plans import GENERATED
-from clearway.scenes.held_out import held_out
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.targets import ZHU_TARGETS, default_held_out_targets, default_targets, seeded_targets, target_order
 from helpers.made import grid_scene, scene_of_cells
@@ -67,7 +66,7 @@ def generated(name: str = "room-train-000003-bathroom") -> Scene:
 
 def test_in_generated_rooms_none_that_is_held_out_is_drawn() -> None:
     scene = generated()
-    held = set(np.flatnonzero(held_out(scene)).tolist())
+    held = set(np.flatnonzero(scene.held_out).tolist())
     assert len(held) == 12 and set(target_order(scene)) == set(range(120)) - held
     for seed in range(40):
         assert not set(default_targets(scene, seed)) & held

@@ -1,7 +1,12 @@
 """The client in the package."""
 
+import json
+import os
+import shutil
 import socket
+import subprocess
 import threading
+import time
 from collections import Counter
 
 import httpx
@@ -13,7 +18,9 @@ import clearway
 from clearway.errors import ClearwayError, DeployError
 from clearway.serve import connections
 from clearway.serve.client import KEEP_ALIVE_S, Client, ClientSession, ServiceError, picture_file
+from helpers.documents import ROOT, code_blocks, shortened
 from helpers.imported import imported_by
+from helpers.running import PATIENT_S, running
 from helpers.serving import TOKEN, grey, picture_bytes
 from helpers.sums import Sums, plain
 
@@ -55,6 +62,22 @@ def test_a_wrong_token_and_an_address_where_nobody_answers(called, service) -> N
     with Client("http://127.0.0.1:9", TOKEN) as nobody, pytest.raises(ServiceError, match=r"unreachable: .*:9"):
         nobody.agent()
     assert issubclass(ServiceError, ClearwayError)
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="needs curl")
+def test_an_episode_by_curl_as_the_page_shows_it(tmp_path) -> None:
+    (commands,) = (block.text for block in code_blocks(ROOT / "docs/deploy.md") if "curl" in block.text)
+    for name, level in (("target", 1), ("camera", 2)):
+        (tmp_path / f"{name}.jpg").write_bytes(picture_bytes(plain(level), "JPEG"))
+    with running() as service:
+        script = shortened(commands, {"http://127.0.0.1:8000": service.url})
+        told = {"PATH": os.environ["PATH"], "TOKEN": TOKEN, "no_proxy": "*"}
+        done = subprocess.run(["sh", "-euc", script], cwd=tmp_path, env=told, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        answer = json.loads(done.stdout)
+        assert answer["action"] == "move backward" and answer["step"] == 1 and answer["value"] // 1000 == 1
+        left = httpx.get(f"{service.url}/metrics", headers={"authorization": f"Bearer {TOKEN}"}, timeout=PATIENT_S)
+        assert "clearway_sessions 0.0" in left.text
 
 
 @pytest.mark.parametrize("url", ["http://127.0.0.1:notaport", "http://[::1", "http://a\nb"])
@@ -112,10 +135,13 @@ def test_a_service_that_says_no_more_is_told_in_one_sentence(monkeypatch) -> Non
 
 
 class Flaky(httpx.BaseTransport):
-    """A way to a service on which answers are lost: `lost` of each, before it is asked for or after."""
+    """A way to a service on which answers are lost: `lost` of each, before it is asked for or after.
 
-    def __init__(self, way: httpx.Client, lost: int, asked_before: bool) -> None:
-        self.way, self.lost, self.asked_before, self.seen = way, lost, asked_before, Counter[str]()
+    Where a proxy `tells`, it answers instead of a connection that breaks.
+    """
+
+    def __init__(self, way: httpx.Client, lost: int, asked_before: bool, tells: bool = False) -> None:
+        self.way, self.lost, self.asked_before, self.tells, self.seen = way, lost, asked_before, tells, Counter[str]()
 
     def handle_request(self, request: httpx.Request) -> httpx.Response:
         line = f"{request.method} {request.url.raw_path.decode()}"
@@ -125,15 +151,21 @@ class Flaky(httpx.BaseTransport):
             raise httpx.WriteError("cut off")
         path, headers = request.url.raw_path.decode(), dict(request.headers)
         answer = self.way.request(request.method, path, content=request.read(), headers=headers)
+        if lose and self.tells:
+            return httpx.Response(500, text="the replica has died")
         if lose:
             raise httpx.ReadError("cut off")
         return httpx.Response(answer.status_code, content=answer.content)
 
 
-@pytest.mark.parametrize("asked_before", [False, True], ids=["request lost", "answer lost"])
-def test_lost_answers_are_asked_for_again_and_no_step_is_walked_twice(client, monkeypatch, asked_before) -> None:
+@pytest.mark.parametrize(
+    ("asked_before", "tells"),
+    [(False, False), (True, False), (True, True)],
+    ids=["request lost", "answer lost", "a proxy says so"],
+)
+def test_lost_answers_are_asked_for_again_and_no_step_is_walked_twice(client, monkeypatch, asked_before, tells) -> None:
     monkeypatch.setattr("clearway.serve.client.FIRST_PAUSE_S", 0.001)
-    way, navigator = Flaky(client, 2, asked_before), clearway.Navigator(Sums(), seed=3)
+    way, navigator = Flaky(client, 2, asked_before, tells), clearway.Navigator(Sums(), seed=3)
     http = httpx.Client(base_url="http://testserver", transport=way, headers=client.headers)
     with with_service(http, Client("http://testserver", TOKEN)).session(seed=3) as session:
         for target in (2, 3):
@@ -163,6 +195,22 @@ def test_a_session_goes_on_uncounted_once_an_answer_is_lost_for_good(client, ser
         with pytest.raises(ServiceError, match="unreachable"):
             lost(plain(4))
     assert set(way.seen.values()) == {1}  # without a number, it is not sent again and walked twice
+
+
+def test_a_request_that_breaks_after_the_time_for_asking_again_is_asked_once(monkeypatch) -> None:
+    monkeypatch.setattr("clearway.serve.client.FIRST_PAUSE_S", 0.001)
+    monkeypatch.setattr("clearway.serve.client.AGAIN_S", 0.1)
+    seen = []
+
+    def hang(request: httpx.Request) -> httpx.Response:
+        seen.append(request)
+        time.sleep(0.15)
+        raise httpx.ReadError("cut off")
+
+    http = httpx.Client(base_url="http://hanging", transport=httpx.MockTransport(hang))
+    with pytest.raises(ServiceError, match="unreachable"):
+        with_service(http, Client("http://hanging", TOKEN)).agent()
+    assert len(seen) == 1
 
 
 def test_how_pictures_are_sent(tmp_path) -> None:

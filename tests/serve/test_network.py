@@ -19,7 +19,7 @@ from clearway.serve.limits import Limits
 from clearway.serve.run import check_tls
 from clearway.serve.service import Service
 from helpers.certificates import certified
-from helpers.running import PATIENT_S, running
+from helpers.running import PATIENT_S, Running, running
 from helpers.serving import OWNER, TOKEN, TOKENS, grey, until_closed
 from helpers.sums import Sums, plain
 
@@ -198,6 +198,33 @@ def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_pat
             assert "tokens were read again" in err and "the tokens stay as they were" in err and new not in err
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("replicas", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_hangup_reads_the_certificate_again_and_keeps_the_old_where_it_cannot(replicas: int, tmp_path: Path) -> None:
+    """The new one has a key of another kind."""
+    certificate, key = certified(tmp_path)
+
+    def seen(service: Running) -> set[str]:
+        """Of whichever replicas answer: of so many connections none meets one of two in 1 of 10 million cases."""
+        looks = 24 * (replicas - 1) + 1
+        return {ssl.get_server_certificate(("127.0.0.1", service.port), timeout=PATIENT_S) for _ in range(looks)}
+
+    with running(tls=(str(certificate), str(key)), replicas=replicas) as service:
+        first = seen(service)
+        certified(tmp_path, ("rsa:2048",))
+        service.process.send_signal(signal.SIGHUP)
+        until = time.monotonic() + PATIENT_S
+        while (second := seen(service)) & first and time.monotonic() < until:
+            time.sleep(0.05)
+        assert len(second) == 1 and second != first
+        certificate.write_text("nothing")
+        service.process.send_signal(signal.SIGHUP)
+        time.sleep(0.2)
+        assert seen(service) == second
+        service.process.send_signal(signal.SIGTERM)
+        _, err = service.process.communicate(timeout=PATIENT_S)
+        assert "the certificate was read again" in err and "the one before is used on" in err
 
 
 def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:

@@ -12,26 +12,25 @@ from functools import partial
 from pathlib import Path
 
 import httpx
-import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-import clearway
 from clearway.children import ChildProcess
 from clearway.deploy.navigator import open_agent
 from clearway.errors import DeployError
 from clearway.serve import replicas
+from clearway.serve.hangup import on_hangup, rotating
 from clearway.serve.limits import Limits
 from clearway.serve.replica import Beats
-from clearway.serve.run import Network, rotating
+from clearway.serve.run import Network
 from clearway.serve.tokens import ALONE, Tokens, read_tokens
 from clearway.web.local import listening
 from helpers.running import PATIENT_S, Running, running
 from helpers.serving import TOKEN, grey
 from helpers.sums import Sums, plain
+from helpers.walking import LEAST_STEPS, until, walk
 
-LEAST_STEPS = 8
 AUTHORISED = {"authorization": f"Bearer {TOKEN}"}
 
 
@@ -42,36 +41,12 @@ def _own_folder(tmp_path, monkeypatch) -> Iterator[None]:
     assert not list(tmp_path.glob("replicas/*"))  # nothing is left of the sessions
 
 
-def until(holds, seconds: float = PATIENT_S) -> None:
-    deadline = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-def walk(service: Running, number: int, opened: threading.Barrier, ends: threading.Event, told: list[object]) -> None:
-    """Episodes of one session, each answer held against a navigator's own; adds how many steps, or what went wrong."""
-    try:
-        navigator, rng, steps = clearway.Navigator(Sums(), seed=number), np.random.default_rng(number), 0
-        with service.client() as client, client.session(seed=number) as session:
-            opened.wait(PATIENT_S)
-            while steps < LEAST_STEPS or not ends.is_set():
-                if steps % 7 == 0:
-                    for walker in (session, navigator):
-                        walker.set_target(plain(number))
-                level = int(rng.integers(256))
-                expected, found = navigator.act(plain(level)), session.act(plain(level))
-                assert found[::2] == expected[::2]
-                steps += 1
-        told.append(steps)
-    except BaseException as fault:
-        told.append(fault)
-
-
 def walk_while_replicas_die(service: Running, sessions: int, kills: int, pause_s: float) -> int:
     told: list[object] = []
     opened, ends, dice = threading.Barrier(sessions + 1), threading.Event(), random.Random(5)
-    walkers = [threading.Thread(target=walk, args=(service, number, opened, ends, told)) for number in range(sessions)]
+    walkers = [
+        threading.Thread(target=walk, args=(service.client, number, opened, ends, told)) for number in range(sessions)
+    ]
     for walker in walkers:
         walker.start()
     opened.wait(PATIENT_S)  # a session whose opening is cut off is opened twice, and one of the two is left
@@ -92,7 +67,7 @@ def test_replicas_die_under_load_and_no_session_is_lost_nor_a_step_walked_twice(
         assert steps >= 6 * LEAST_STEPS
         until(lambda: len(service.replicas()) == 2)
         own = f"http://127.0.0.1:{service.health_port}"
-        assert httpx.get(f"{own}/ready", timeout=PATIENT_S).status_code == 200
+        until(lambda: httpx.get(f"{own}/ready", timeout=PATIENT_S).status_code == 200)  # both may just have begun
         until(lambda: "clearway_sessions 0.0" in httpx.get(f"{own}/metrics", timeout=PATIENT_S).text)
         lines = httpx.get(f"{own}/metrics", timeout=PATIENT_S).text.splitlines()
         route = 'clearway_requests_total{route="/sessions/{session_id}/steps",status="200"} '
@@ -196,7 +171,7 @@ def test_tokens_that_change_while_a_replica_starts_reach_it(tmp_path: Path, monk
     monkeypatch.setattr(replicas, "serve_replica", _sleep)
     with listening(0) as listener:
         place = replicas._Place(common_of(tmp_path, Network(listener), tokens), 0)
-        with rotating(tokens, path, lambda: place.tell(signal.SIGHUP)):
+        with on_hangup(lambda: place.tell(signal.SIGHUP)), rotating(tokens, path):
             place.look()
         assert tokens.owner_of(TOKEN) is None and place._process is not None
         place._process.join(PATIENT_S)  # it takes no SIGHUP yet: another one starts with the new tokens

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import socket
 import ssl
 import threading
@@ -113,6 +115,14 @@ def test_a_certificate_that_was_renewed_is_used_and_one_that_is_damaged_is_not(
     assert seen[0] != seen[1] == seen[2]
     assert [record.levelname for record in caplog.records] == ["ERROR"]
     assert "cert.pem" in caplog.text and "the one before is used on" in caplog.text
+
+
+def test_hangup_reads_the_certificate_again_while_it_stands_in(tmp_path: Path) -> None:
+    with nobody_answers(certified(tmp_path)) as address:
+        first = ssl.get_server_certificate(address, timeout=PATIENT_S)
+        certified(tmp_path)
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert ssl.get_server_certificate(address, timeout=PATIENT_S) != first
 
 
 def test_waiting_takes_no_processor() -> None:

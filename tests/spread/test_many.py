@@ -34,5 +34,18 @@ def test_processes_give_results_warnings_and_errors_as_this_one_does() -> None:
         list(many.of_each(halved, range(90, 110)))
 
 
+def fetched(numbers: range) -> None:
+    warnings.warn(f"next are {list(numbers)}", stacklevel=1)
+
+
+@pytest.mark.usefixtures("processes")
+def test_processes_are_told_what_they_do_next() -> None:
+    with pytest.warns(UserWarning) as told:
+        list(many.of_each(halved, range(14, 24), fetched))
+    assert [str(one.message) for one in told] == [
+        f"next are {part}" for part in ([*range(14, 18)], [*range(18, 22)], [22, 23])
+    ]
+
+
 def test_few_things_start_no_process() -> None:
     assert {pid for _, pid in many.of_each(halved, range(9))} == {os.getpid()}

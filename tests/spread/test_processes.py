@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import wait
 from functools import partial
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import RunError, SceneError
+from clearway.spread.processes import GRACE_S
 from clearway.spread.workers import Work, workers_for
 from helpers import spread_parts as parts
 from helpers.spread_parts import died, no_tool, noted, workers_of
@@ -115,6 +117,17 @@ def test_what_is_under_way_when_the_block_ends_is_told_and_may_finish(tmp_path: 
     assert workers_of(os.getpid()) == []
 
 
+@needs_proc
+def test_who_finishes_its_part_when_it_is_told_to_end_is_not_waited_for(tmp_path: Path) -> None:
+    begun = time.monotonic()
+    with workers_for(Work(partial(noted, tmp_path), parts.finish_when_told, died), workers=1) as crew:
+        task = crew.submit(3)
+        parts.wait_for(tmp_path / "under-way-3")
+    assert task.result(timeout=0) == 3
+    assert workers_of(os.getpid()) == []
+    assert time.monotonic() - begun < GRACE_S / 2
+
+
 SCRIPT = """
 import sys
 from functools import partial
@@ -154,7 +167,7 @@ def test_ctrl_c_is_heard_by_the_parent_alone_and_ends_all(tmp_path: Path) -> Non
     process, workers = started_script(tmp_path)
     os.killpg(process.pid, signal.SIGINT)
     assert process.communicate(timeout=60) == ("interrupted\n", "")
-    assert not any(map(parts.is_worker, workers))
+    assert not any(parts.runs(worker, parts.WORKER) for worker in workers)
     assert (tmp_path / "saved-0").exists() and (tmp_path / "saved-1").exists()
 
 
@@ -163,5 +176,5 @@ def test_no_worker_outlives_a_killed_parent(tmp_path: Path) -> None:
     process, workers = started_script(tmp_path)
     process.kill()
     process.communicate(timeout=60)  # until nobody has its standard error open any more
-    assert not any(map(parts.is_worker, workers))
+    assert not any(parts.runs(worker, parts.WORKER) for worker in workers)
     assert not (tmp_path / "saved-0").exists()  # nobody told them

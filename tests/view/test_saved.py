@@ -96,6 +96,7 @@ def test_the_page_plays(browser: Browser, addresses: dict[str, str], how: str) -
     page = browser.new_page(reduced_motion="reduce", viewport={"width": 1280, "height": 800})
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda message: wrong.append(message.text) if message.type in ("error", "warning") else None)
+    page.clock.install()
     page.goto(addresses[how])
     expect(page.locator("h1")).to_contain_text("(recorded)")
     expect(page.locator("#position")).to_have_text("0 / 0")
@@ -118,6 +119,7 @@ def test_the_page_plays(browser: Browser, addresses: dict[str, str], how: str) -
     page.get_by_role("button", name="New start").click()
     expect(page).not_to_have_url(before)
     expect(page.locator("#goal-where")).to_contain_text("pose 16,")
+    page.clock.run_for(10_000)  # what was said for a while is forgotten
     page.locator("#map").click(position={"x": 5, "y": 5})
     expect(page.locator("#status")).to_have_text("")
     page.close()

@@ -13,7 +13,6 @@ from clearway.live.live_room import LiveRoom
 from clearway.live.words import GEOMETRY
 from clearway.perception.around import PLACES_M
 from clearway.rooms.camera import first_person_shot
-from clearway.scenes.held_out import held_out
 from clearway.views import placing, poses
 from clearway.views.poses import REACH_M, Taken, draw_takes
 from clearway.views.settings import ViewSettings
@@ -25,7 +24,7 @@ RADIUS_M = 0.2
 
 
 def drawn(live: LiveRoom, settings: ViewSettings) -> Taken:
-    return draw_takes(live, held_out(live.scene), settings)
+    return draw_takes(live, live.scene.held_out, settings)
 
 
 def nearest_states(live: LiveRoom, taken: Taken) -> np.ndarray:
@@ -41,7 +40,7 @@ def test_poses_are_free_and_keep_to_their_cells(live, settings, monkeypatch):
     found = placing.layouts
     monkeypatch.setattr(placing, "layouts", lambda *given: layouts.extend(found(*given)) or list(layouts))
     taken = drawn(live, settings)
-    assert (held_out(live.scene)[nearest_states(live, taken)] == settings.held_out).all()
+    assert (live.scene.held_out[nearest_states(live, taken)] == settings.held_out).all()
     bodies = [live.body(layout) for layout in layouts]
     table = taken.table
     for row, shot in enumerate(taken.shots):
@@ -81,7 +80,7 @@ def test_a_pose_follows_from_the_seed_the_room_and_its_number(live):
     np.testing.assert_array_equal(columns(drawn(live, replace(MOVING, poses=4))), one[:8])
     assert (columns(drawn(live, replace(MOVING, seed=1)))[:, 3:6] != one[:, 3:6]).all()
     renamed = replace(live, scene=replace(live.scene, name="other"))
-    assert (columns(draw_takes(renamed, held_out(live.scene), MOVING))[:, 3:6] != one[:, 3:6]).all()
+    assert (columns(draw_takes(renamed, live.scene.held_out, MOVING))[:, 3:6] != one[:, 3:6]).all()
 
 
 @pytest.mark.parametrize(
@@ -161,7 +160,7 @@ def test_parts_that_cannot_be_reached_have_no_poses(live):
 def test_nothing_is_moved_where_nothing_can_be(live):
     """A MuJoCo model of others."""
     with pytest.raises(SceneError, match="nothing can be moved in a MuJoCo model, and move_furniture is asked for"):
-        draw_takes(replace(live, room=None), held_out(live.scene), MOVING)
+        draw_takes(replace(live, room=None), live.scene.held_out, MOVING)
 
 
 def test_a_room_without_such_cells_is_told(live):

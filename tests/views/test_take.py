@@ -11,7 +11,6 @@ from clearway.live.conditions import Perturbations
 from clearway.rooms.camera import eye_view, first_person_shot
 from clearway.rooms.render import render
 from clearway.rooms.sense import sense
-from clearway.scenes.held_out import held_out
 from clearway.views import take
 from clearway.views.poses import draw_takes
 from clearway.views.settings import ViewSettings
@@ -57,7 +56,7 @@ def test_light_and_noise_are_those_of_the_draws(live) -> None:
     views = room_views(live.scene, perturbed)
     np.testing.assert_array_equal(views.table.to_array(), clean.table.to_array())
     np.testing.assert_array_equal(views.further[0].raw, clean.further[0].raw)
-    draws = draw_takes(live, held_out(live.scene), perturbed).draws
+    draws = draw_takes(live, live.scene.held_out, perturbed).draws
     assert len({one.brightness for one in draws}) == 6
     for seen, plain, own in zip(views.rgb, clean.rgb, draws, strict=True):
         np.testing.assert_array_equal(seen, own.seen(plain))

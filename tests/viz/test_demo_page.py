@@ -13,6 +13,7 @@ from PIL import Image
 from clearway.experiments.demo import DemoRequest, DemoResult, run_demo
 from clearway.viz import demo_page
 from clearway.viz.demo_page import VIEWS, make_demo_page
+from clearway.viz.page import Picture
 from clearway.zones import scene_zones
 from helpers.small_demo import shrink_demo
 
@@ -58,6 +59,12 @@ def test_every_link_leads_to_a_picture_beside_the_page(result, shown):
         with Image.open(result.out / link) as picture:
             picture.verify()
     assert all(shown.pictures.values())  # what those hear who do not see
+
+
+def test_it_opens_with_the_pictures_that_are_given(result):
+    opening = Picture("pictures/map.png", "Both & each", "both")
+    page = make_demo_page(result, COMMAND, [opening]).read_text(encoding="utf-8")
+    assert page.index("Both &amp; each") < page.index("shortest: collisions")
 
 
 def test_all_pictures_are_shown(shown):

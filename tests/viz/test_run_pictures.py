@@ -10,9 +10,10 @@ from PIL import Image
 
 from clearway.learn.load import load_agent
 from clearway.learn.train import train
-from clearway.viz import figures, run_pictures
+from clearway.viz import run_pictures
 from clearway.viz.run_pictures import draw_run_pictures
 from clearway.zones import scene_zones
+from helpers.small_pictures import shrink_pictures
 from helpers.small_runs import small_learner, small_request, small_scenes, small_targets
 
 
@@ -22,6 +23,11 @@ def run(tmp_path_factory):
     request = small_request(learner=small_learner(frames=160), zone_level="cell")
     path = train(request, tmp_path_factory.mktemp("run") / "run").path
     return path, load_agent(path)
+
+
+@pytest.fixture(autouse=True)
+def _small_pictures(monkeypatch):
+    shrink_pictures(monkeypatch)
 
 
 def is_png(path) -> bool:
@@ -63,8 +69,7 @@ def test_maps_and_sheets_show_one_walk_in_the_zones_of_the_run(run, tmp_path, mo
     assert rows["collision-aware"][-1]["frames"] == 160
 
 
-def test_the_seed_chooses_the_episode(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(figures, "DPI", 50)
+def test_the_seed_chooses_the_episode(run, tmp_path):
     pictures = [
         {path.name: path.read_bytes() for path in draw_run_pictures(*run, small_scenes(), tmp_path / name, seed=seed)}
         for name, seed in (("a", 0), ("b", 0), ("c", 1))

@@ -4,13 +4,14 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from clearway.choices import FeatureStore
 from clearway.errors import RunError, SceneError
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.world.feature_store import empty_store
+from clearway.world.feature_store import empty_store, mapped_store
 from clearway.world.world import World, make_world
 from helpers.made import corridor_scene, grid_scene
 
@@ -61,10 +62,29 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path, monkeypatch) -> None:
 
     monkeypatch.setattr(os, "posix_fallocate", full, raising=False)
     with pytest.raises(RunError, match=r"cache: 10 features of 100 states need 0\.0 GiB.*No space.*CLEARWAY_CACHE"):
-        empty_store(100, 10, "mapped")
+        mapped_store((), 100, 10)
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
+def test_blocks_lie_one_after_the_other_in_a_file_without_a_name(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    rows = np.arange(15, dtype=np.float64).reshape(5, 3)
+    kept = mapped_store((rows[:2], rows[2:2], rows[2:]), 5, 3)
+    assert torch.equal(kept, torch.from_numpy(rows).float())
     assert list((tmp_path / "cache").iterdir()) == []
 
 
 def test_memory_that_cannot_be_had_is_one_clear_error() -> None:
     with pytest.raises(RunError, match=r"need 8388608\.0 GiB of memory.*--feature-store mapped"):
         empty_store(2**31, 2**20, "memory")
+
+
+def test_a_gpu_without_room_is_named_not_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise torch.OutOfMemoryError("CUDA out of memory")
+
+    monkeypatch.setattr(torch, "empty", full)
+    with pytest.raises(
+        RunError, match=r"on cuda, which cannot be had \(CUDA out of memory\)\. Give fewer scenes, or --device cpu"
+    ):
+        empty_store(2, 3, "mapped", "cuda")

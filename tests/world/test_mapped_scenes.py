@@ -122,8 +122,16 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_what_was_found_of_a_graph_goes_along_without_pictures() -> None:
     scene = grid_scene(2)
-    found = scene.cells, scene.components
+    found = scene.cells, scene.components, scene.held_out
     bare = replace(scene, observations=np.zeros((scene.state_count, 2, 2, 3), np.uint8)).without_pictures()
     assert bare.observations is None
     bare = scene.without_pictures()
-    assert (bare.cells is found[0], bare.components is found[1]) == (True, True)
+    assert (bare.cells is found[0], bare.components is found[1], bare.held_out is found[2]) == (True, True, True)
+
+
+def test_what_was_found_of_a_graph_goes_along_with_mapped_features(tmp_path: Path) -> None:
+    scenes = in_files(tmp_path)
+    found = [(scene.cells, scene.components) for scene in scenes]
+    with mapped_scenes(scenes) as (mapped, _):
+        for scene, (cells, components) in zip(mapped, found, strict=True):
+            assert (scene.cells is cells, scene.components is components) == (True, True)

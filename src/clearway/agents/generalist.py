@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from clearway.agents.agent import State
-from clearway.agents.exploring import Explorer, map_of
+from clearway.agents.exploring import Explorer
 from clearway.agents.mapping import MappingAgent
+from clearway.agents.tour_map import map_of
 from clearway.choices import GENERALIST
 from clearway.errors import SceneError
 from clearway.mapping.lattice import HEADINGS
@@ -117,8 +118,8 @@ class Generalist:
 
     def after(self, state: State, *, camera: bool = False) -> MappingAgent:
         """The agent that knows a room by an explorer's state at the end of its tour; where, as of `explorer`."""
-        encoder = self.encoder if camera else None
-        return MappingAgent(self.sight, encoder, known=map_of(state), settings=self.settings)
+        known = map_of(state, self.sight, self.settings)
+        return MappingAgent(self.sight, self.encoder if camera else None, known, self.settings)
 
     def seen(self, scenes: Sequence[Scene]) -> list[Scene]:
         """Any scenes with pictures as its own eyes see them.

@@ -34,6 +34,14 @@ def as_whole(name: str, value: object, lowest: int = 0, highest: int | None = No
     return number
 
 
+def as_workers(workers: object, ray: str | None) -> int:
+    """How many processes train together; `ray` says where several do. Raises ArgumentError."""
+    count = as_whole("workers", workers, 1)
+    if ray is not None and count == 1:
+        raise ArgumentError(f"ray={ray!r:.80}: says where several workers run. Give workers, 2 or more")
+    return count
+
+
 def as_seed(name: str, value: object) -> int:
     """A seed. Raises ArgumentError."""
     return as_whole(name, value, 0, SEED_LIMIT - 1)

@@ -74,11 +74,8 @@ def evaluate_goals(
     from clearway.live.live_room import check_is_room
     from clearway.torch_threads import torch_threads
 
-    settings = {
-        "goals": as_whole("goals", goals, 1),
-        "step_limit": as_whole("step_limit", step_limit, 1),
-        "seed": as_seed("seed", seed),
-    }
+    goals, step_limit = as_whole("goals", goals, 1), as_whole("step_limit", step_limit, 1)
+    seed = as_seed("seed", seed)
     perturbations, takes = perturbations_asked(perturb), as_whole("takes", takes, 1)
     tour_steps = as_whole("tour", tour, 0, MOST_TOUR_STEPS)
     found = load_scenes(scenes)
@@ -92,7 +89,7 @@ def evaluate_goals(
         _check_sees(agent)
         for scene in found:  # before what takes long
             check_is_room(scene)
-            walked.drawn_goals(scene, settings["goals"], settings["seed"])
+            walked.drawn_goals(scene, goals, seed)
     if isinstance(agent, TrainedRecurrent | Generalist):
         found = agent.seen(found)
     elif isinstance(agent, TrainedAgent):
@@ -102,8 +99,8 @@ def evaluate_goals(
     if tour_steps and isinstance(agent, Generalist):
         make = Touring(agent.explorer, agent.after, tour_steps)
     with torch_threads(1):
-        seen = _takes(agent, found, perturbations, takes, settings["seed"], show_progress) if perturbed else None
-        return walked.evaluate_goals({name: make}, found, takes=seen, **settings)
+        seen = _takes(agent, found, perturbations, takes, seed, show_progress) if perturbed else None
+        return walked.evaluate_goals({name: make}, found, goals=goals, step_limit=step_limit, seed=seed, takes=seen)
 
 
 def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Generalist:

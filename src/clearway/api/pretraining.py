@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from clearway.api.arguments import as_path, as_whole, as_word
+from clearway.api.arguments import as_path, as_whole, as_word, as_workers
 
 if TYPE_CHECKING:
     from clearway.choices import TrackerName
@@ -26,6 +26,8 @@ def pretrain(
     keeping: str | None = None,
     try_on: Sequence[PathLike] = (),
     threads: int | None = None,
+    workers: int = 1,
+    ray: str | None = None,
     device: str = "cpu",
     resume: bool = False,
     track: TrackerName | None = None,
@@ -43,7 +45,10 @@ def pretrain(
         try_on: views of other rooms, to try the eyes on once they are trained.
         threads: of torch; None leaves its own choice. Results repeat bit for bit at one number. On a GPU so many
             threads make ready what it learns from.
-        device: of torch, "cpu" or "cuda".
+        workers: processes that train together, each on its part of every batch; the eyes are those of
+            one, up to rounding. A script that starts some keeps what it runs under `if __name__ == "__main__":`.
+        ray: a Ray cluster that runs them: "local", "auto" or an address; None: this machine does.
+        device: of torch, "cpu" or "cuda"; each worker has a GPU of its own.
         resume: go on from the newest checkpoint in `out`.
         track: where figures are shown as they come, "tensorboard" or "wandb", beside `metrics.jsonl`.
         show_progress: draw a progress bar, if standard error is a terminal.
@@ -58,13 +63,15 @@ def pretrain(
     from clearway.perception.eyes import find_record, from_record, read_eyes
     from clearway.perception.eyes_network import EyesShape
     from clearway.pretraining.judge import judge
-    from clearway.pretraining.pretrain import PretrainRequest
     from clearway.pretraining.pretrain import pretrain as train_eyes
     from clearway.pretraining.settings import PretrainSettings
+    from clearway.pretraining.trainer import PretrainRequest
+    from clearway.pretraining.workers import pretrain_by_workers
     from clearway.progress import picture_progress
     from clearway.torch_threads import torch_threads
     from clearway.views.stream import views_in
 
+    processes = as_workers(workers, ray)
     kept = None if keeping is None else from_record(find_record(keeping))
     shape = EyesShape() if kept is None else kept.eyes.shape
     settings = PretrainSettings(pictures=as_whole("pictures", pictures, 1, MAX_PICTURES), shape=shape)
@@ -73,6 +80,12 @@ def pretrain(
     shown = views_in([as_path("views", path) for path in views])
     request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept, as_word("device", device))
     folder = as_path("out", out)
-    with torch_threads(count), picture_progress("learning to see", settings.pictures, show_progress) as show_done:
-        train_eyes(request, folder, resume=resume, track=track, done=show_done)
+    if processes > 1:
+        pretrain_by_workers(
+            request, folder, processes, resume=resume, track=track, show_progress=show_progress, threads=count, ray=ray
+        )
+    with torch_threads(count):
+        if processes == 1:
+            with picture_progress("learning to see", settings.pictures, show_progress) as show_done:
+                train_eyes(request, folder, resume=resume, track=track, done=show_done)
         return None if tried is None else judge(read_eyes(folder), tried)

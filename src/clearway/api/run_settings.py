@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import ClearwayError
-from clearway.learn.run_folder import SETTINGS_FILE, RunFolder, RunRecord
+from clearway.learn.run_folder import SETTINGS_FILE, RunFolder
+from clearway.learn.run_record import RunRecord
 from clearway.reward import REWARDS, Reward
 from clearway.settings_file import write_settings
 

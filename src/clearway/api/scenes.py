@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
@@ -14,10 +13,12 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.errors import ArgumentError
 from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.plugged import own_encoder
+from clearway.regular_files import read_ahead
 from clearway.rooms import ROOM_NAMES
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
 from clearway.scenes.sensors import RGB, check_names
+from clearway.scenes.targets import possible_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.spread.many import of_each
 
@@ -73,18 +74,25 @@ def load_scenes(sources: Scenes) -> list[Scene]:
 
 def scenes_and_files(sources: Scenes, *, features_in_file: bool = False) -> list[tuple[Scene, Path | None]]:
     """As `load_scenes`, each with its file, None of a scene in memory; `features_in_file` as of `read_scene`."""
-    found: list[tuple[Scene, Path | None]] = []
+    named: list[tuple[Scene | None, Path | None]] = []
     for source in _each(sources):
         if isinstance(source, Scene):
-            found.append((source, None))
+            named.append((source, None))
         else:
-            files = scene_files([as_path("scenes", source)])
-            read = partial(read_scene, features_in_file=features_in_file)
-            loaded = of_each(read, files) if features_in_file else map(read, files)  # else they are large messages
-            found += zip(loaded, files, strict=True)
-    if not found:
+            named += [(None, file) for file in scene_files([as_path("scenes", source)])]
+    if not named:
         raise ArgumentError("scenes: none given. Give at least one scene or scene file")
-    return found
+    files = [file for _, file in named if file is not None]
+    many = features_in_file  # else they are large messages
+    loaded = iter(list(of_each(_explored, files, read_ahead) if many else map(read_scene, files)))
+    return [(next(loaded) if scene is None else scene, file) for scene, file in named]
+
+
+def _explored(file: Path) -> Scene:
+    """The scene in a file that is one of many; what choosing targets takes is found by the process that reads it."""
+    scene = read_scene(file, features_in_file=True)
+    possible_targets(scene)
+    return scene
 
 
 def _each(sources: Scenes) -> Iterator[SceneSource]:

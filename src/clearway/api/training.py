@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any, get_args
 
 from clearway.agents.agent import FEATURES
-from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word
+from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word, as_workers
 from clearway.api.run_settings import leave_settings, reward_options
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
 from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
@@ -26,7 +26,7 @@ from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
 from clearway.learn.presets import PRESETS
-from clearway.learn.run_folder import RunRecord
+from clearway.learn.run_record import RunRecord
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.learn.solved import unsolved_targets
 from clearway.learn.train import RunRequest
@@ -164,10 +164,9 @@ def train(
     if (resume or copy_to is not None) and out is None:
         asked = "resume=True" if resume else f"copy_to={copy_to!r:.80}"
         raise ArgumentError(f"{asked}: expected the run folder to go on with, or to copy. Give it as out")
-    if ray is not None and workers == 1:
-        raise ArgumentError(f"ray={ray!r:.80}: says where several workers run. Give workers, 2 or more")
+    processes = as_workers(workers, ray)
     number = as_seed("seed", seed)
-    learner, processes = chosen_learner(algorithm, frames, settings), as_whole("workers", workers, 1)
+    learner = chosen_learner(algorithm, frames, settings)
     pairs = scenes_and_files(scenes, features_in_file=store != "memory" or processes > 1)
     loaded = [scene for scene, _ in pairs]
     chosen = chosen_targets(loaded, targets, number)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from clearway.cli.arguments import check_seeds
 from clearway.cli.console import print_json, say, stdout_console
@@ -32,13 +34,17 @@ class Demo:
 
     def run(self) -> None:
         """Run the demo."""
+        from clearway.examples.contrast import contrast
         from clearway.experiments.demo import DemoRequest, run_demo
         from clearway.viz.demo_page import make_demo_page
 
         check_seeds(seed=self.seed, room_seed=self.room_seed)
         request = DemoRequest(self.out, self.seed, self.frames, self.encoder, self.room_seed)
-        result = run_demo(request, show_progress=True)
-        page = make_demo_page(result, self._command())
+        with TemporaryDirectory() as folder:
+            opening = contrast(Path(folder))  # before minutes of training, should it fail
+            result = run_demo(request, show_progress=True)
+            shutil.copytree(folder, result.out, dirs_exist_ok=True)
+        page = make_demo_page(result, self._command(), [opening])
         if self.json:
             print_json([evaluation.to_json() for evaluation in result.evaluations])
             return

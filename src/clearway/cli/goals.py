@@ -13,6 +13,8 @@ from clearway.cli.live import Live, status_line
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from clearway.agents.generalist import Generalist
     from clearway.choices import PlanKind, SplitName
     from clearway.evaluation.goals import GoalEvaluation
@@ -21,9 +23,9 @@ if TYPE_CHECKING:
 
 NUMBERS = ("collisions", "steps")  # figures that are no shares
 SETTING_WIDTH = 16
-LIVE_HEADINGS = {
+HEADINGS = {
     "success_4x": "within\n4 x",
-    "collisions": "contacts",
+    "spl": "SPL",
     "false_arrivals": "false\narrivals",
     "missed_arrivals": "missed\narrivals",
 }
@@ -105,19 +107,14 @@ def evaluate_at_goals_live(
     stdout_console().print(_live_table(found))
 
 
-def _live_table(found: Sequence[GoalEvaluation]) -> object:
+def _live_table(found: Sequence[GoalEvaluation]) -> Table:
     """A row a setting: means over scenes, and success as a share of that of the first one."""
-    from rich.table import Table
-
     average = found[0].average
-    title = f"{found[0].agent} off the grid: {average.episodes} goals in {len(found[0].scenes)} scenes"
+    title = f"{found[0].agent} off the grid: {_counted(found[0])}"
     if (tour := found[0].tour) is not None:
         title += f", after tours of {tour['steps']} steps"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("", width=SETTING_WIDTH)
     names = [name for name, value in asdict(average).items() if name != "episodes" and value is not None]
-    for name in names:
-        table.add_column(LIVE_HEADINGS.get(name, name), justify="right")
+    table = _empty(title, "", names, HEADINGS | {"collisions": "contacts"})
     if len(found) > 1:
         table.add_column("of\nfirst", justify="right")
     for one in found:
@@ -129,25 +126,35 @@ def _live_table(found: Sequence[GoalEvaluation]) -> object:
     return table
 
 
-def _table(found: Sequence[GoalEvaluation]) -> object:
+def _table(found: Sequence[GoalEvaluation]) -> Table:
     """A row an agent: means over scenes."""
-    from rich.table import Table
-
     from clearway.evaluation.goals import FIGURES
 
-    episodes = found[0].average.episodes
-    title = f"{episodes} goals in {len(found[0].scenes)} scenes"
+    title = _counted(found[0])
     if (perturbed := found[0].perturbed) is not None:
         title += f", pictures perturbed: {perturbed['label']}"
     if (tour := found[0].tour) is not None:
         title += f", after tours of {tour['steps']} steps ({tour['collisions']:.3g} collisions each)"
-    table = Table(title=title, title_justify="left")
-    table.add_column("agent")
     names = [field.name for field in FIGURES if field.name != "episodes"]
-    for name in names:
-        table.add_column(name.replace("_", " "), justify="right")
+    table = _empty(title, "agent", names, HEADINGS)
     for one in found:
         table.add_row(one.agent, *(_cell(name, value) for name, value in asdict(one.average).items() if name in names))
+    return table
+
+
+def _counted(found: GoalEvaluation) -> str:
+    scenes = len(found.scenes)
+    return f"{found.average.episodes} goals in {scenes} scene{'s' if scenes > 1 else ''}"
+
+
+def _empty(title: str, first: str, names: Sequence[str], headings: dict[str, str]) -> Table:
+    """A table without rows that fits 80 columns whole: what a row is, then figures."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column(first, min_width=SETTING_WIDTH, max_width=SETTING_WIDTH, overflow="fold")
+    for name in names:
+        table.add_column(headings.get(name, name), justify="right")
     return table
 
 

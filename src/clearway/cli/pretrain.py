@@ -37,6 +37,12 @@ class Pretrain:
     """Views of other rooms, to try the eyes on once they are trained."""
     threads: int | None = None
     """Threads of torch. Results repeat bit for bit at one number of threads."""
+    workers: int = 1
+    """Processes that train together, each on its part of every batch. The eyes are those of one, up to
+    rounding. One that dies is replaced. See docs/scale.md."""
+    ray: str | None = None
+    """Where these run: local, auto (a cluster found here) or a Ray cluster's address, whose nodes see the same files;
+    by default on this machine."""
     device: str = "cpu"
     """cpu or cuda."""
     track: TrackerName | None = None
@@ -59,6 +65,8 @@ class Pretrain:
             keeping=self.keeping,
             try_on=self.try_on,
             threads=self.threads,
+            workers=self.workers,
+            ray=self.ray,
             device=self.device,
             resume=self.resume,
             track=self.track,

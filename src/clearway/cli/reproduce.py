@@ -45,7 +45,9 @@ class Reproduce:
     seeds: int | None = None
     """Agents of each kind; by default as the budget says."""
     learners: tuple[LearnerName, ...] = ("paper", "default")
-    """paper: the paper's settings, synchronous; published-a3c: asynchronous, far slower; default: the recipe."""
+    """paper: the paper's settings, synchronous; paper-a3c: asynchronous, far slower; default: the recipe."""
+    set: tuple[str, ...] = ()
+    """Single settings of every learner, for example --set lr_start=0.002 (all: docs/learning.md)."""
     workers: int | None = None
     """Runs side by side; by default one a core, as far as memory allows. A Ray cluster has its own count."""
     threads: int = 1
@@ -80,6 +82,7 @@ class Reproduce:
             encoder=self.encoder,
             seeds=self.seeds,
             learners=list(dict.fromkeys(self.learners)),
+            changes=self.set,
             workers=self.workers,
             threads=self.threads,
             ray=self.ray,
@@ -119,6 +122,8 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     learners = (
         f"{name}: {ABOUT_LEARNERS[name]}, {learner.frames:,} frames" for name, learner in setting.learners.items()
     )
+    changed = f"Changed in every learner: {', '.join(found.changes)}." if found.changes else ""
+    warning = " ".join(filter(None, (budget.warning, changed)))
     facts = {
         "commands": "; ".join(found.commands),
         "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
@@ -128,7 +133,7 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
         "learners": "; ".join(learners),
         **made_by(out, found.jobs),
     }
-    page = write_report(out, "The paper's experiments, redone", found.sections, facts, budget.warning, setting.scenes)
+    page = write_report(out, "The paper's experiments, redone", found.sections, facts, warning, setting.scenes)
     if as_json:
         print_json(read_json(out / JSON))
     say(f"report: {page} and {out / MARKDOWN}")

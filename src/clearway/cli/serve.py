@@ -64,9 +64,10 @@ class Serve:
     def run(self) -> None:
         """Load the agent, then answer until interrupted."""
         from clearway.serve.access_log import to_stderr
+        from clearway.serve.hangup import rotating
         from clearway.serve.limits import MOST_REPLICAS, Limits
         from clearway.serve.replicas import run_replicas
-        from clearway.serve.run import Network, check_tls, rotating, run_service, servable_agent
+        from clearway.serve.run import Network, check_tls, run_service, servable_agent
         from clearway.serve.sessions import state_bytes
         from clearway.serve.tokens import ALONE, Tokens, checked_token, read_tokens
         from clearway.web.guard import new_token
@@ -112,6 +113,7 @@ class Serve:
             network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy, log)
             if self.replicas > 1:
                 threads = max((os.cpu_count() or 1) // self.replicas, 1)
+                del agent  # the replicas open it for themselves
                 opened = functools.partial(servable_agent, self.agent, self.scene, to_stderr, threads)
                 return run_replicas(opened, network, tokens, self.tokens, limits, self.replicas)
             with rotating(tokens, self.tokens):

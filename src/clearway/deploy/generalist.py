@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from clearway.agents.agent import Agent, Decisions, Observation, State
-from clearway.agents.exploring import Explorer, map_of
+from clearway.agents.exploring import Explorer
 from clearway.agents.generalist import Generalist
+from clearway.agents.tour_map import map_of
 from clearway.choices import GENERALIST
 from clearway.deploy.card import ANY_ROOM, EXPORT_AGAIN, Card
 from clearway.deploy.onnx_eyes import OnnxEyes
@@ -57,7 +58,7 @@ class GeneralistAgent:
 
     def map_of(self, state: State) -> RoomMap:
         """What a tour has found, by the explorer's state."""
-        return map_of(state)
+        return map_of(state, self.generalist.sight, self.generalist.settings)
 
     def knowing(self, known: RoomMap) -> Agent:
         """The agent in the room of a map."""

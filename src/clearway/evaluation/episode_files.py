@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from clearway.errors import RunError, reason_of
+from clearway.errors import RunError
 from clearway.evaluation.episodes import EpisodeTable
-from clearway.files import read_json, written_whole
+from clearway.files import read_kept, written_whole
 
 FORMAT_VERSION = 1
 _FLAGS = ("reached", "looped")
@@ -33,14 +33,12 @@ def read_episodes(path: Path) -> tuple[EpisodeTable, dict[str, Any]]:
     Raises:
         RunError: the file is missing, damaged or of a newer version.
     """
-    try:
-        content = read_json(path)
-        if int(content["format_version"]) > FORMAT_VERSION:
-            raise RunError(f"{path}: written by a newer clearway. Upgrade clearway")
+
+    def taken(content: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         columns = {name: np.array(content["episodes"][name], np.int64) for name in _COLUMNS}
-        about = dict(content["about"])
-    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
-        raise RunError(f"{path}: not readable ({reason_of(error)}). Remove it, and it is made again") from error
+        return columns, dict(content["about"])
+
+    columns, about = read_kept(path, FORMAT_VERSION, taken)
     for name in _FLAGS:
         columns[name] = columns[name].astype(bool)
     if len({len(column) for column in columns.values()}) != 1:

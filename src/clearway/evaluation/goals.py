@@ -101,6 +101,7 @@ def evaluate_goals(
     step_limit: int = GOAL_STEPS,
     seed: int = 0,
     takes: Takes | None = None,
+    among: Mapping[str, np.ndarray] | None = None,
 ) -> list[GoalEvaluation]:
     """Walk to goals drawn in some scenes; every agent, then a random walk and shortest paths.
 
@@ -111,12 +112,14 @@ def evaluate_goals(
         step_limit: steps after which an episode has failed.
         seed: of goals, starts and chances.
         takes: what is seen on the way instead of the scenes' own pictures; goals are seen as they are.
+        among: by scene, states of its largest part from which goals are drawn; of others from all.
 
     Raises:
-        SceneError: a scene has fewer poses than goals.
+        SceneError: a scene has fewer such poses than goals.
         AgentError: an agent cannot walk here; it is named.
     """
-    wanted = {scene.name: drawn_goals(scene, goals, seed) for scene in scenes}
+    places = among or {}
+    wanted = {scene.name: drawn_goals(scene, goals, seed, places.get(scene.name)) for scene in scenes}
     world = make_world(scenes, wanted)
     makers = {**agents, RANDOM: lambda _: RandomWalk(), SHORTEST_PATH: shortest_paths}
     perturbed = None if takes is None else takes.made
@@ -164,16 +167,17 @@ def _walked(
     )
 
 
-def drawn_goals(scene: Scene, count: int, seed: int) -> list[int]:
-    """So many distinct poses of a scene's largest part, ascending, in its own numbering.
+def drawn_goals(scene: Scene, count: int, seed: int, among: np.ndarray | None = None) -> list[int]:
+    """So many distinct poses of a scene's largest part, or `among` some of it, ascending, in its own numbering.
 
     Raises:
-        SceneError: it has no more poses than that.
+        SceneError: its largest part has no more poses than that, or there are fewer among which they are drawn.
     """
-    states = np.flatnonzero(scene.components == 0)
-    if count >= len(states):
+    states = np.flatnonzero(scene.components == 0) if among is None else among
+    most = len(states) - (among is None)  # one is left to begin in
+    if count > most:
         problem = f"{count} goals asked for, the largest part has {len(states)} poses"
-        raise SceneError(scene.name, problem, f"Ask for 1 to {len(states) - 1} goals")
+        raise SceneError(scene.name, problem if among is None else f"{problem} for them", f"Ask for {most} at most")
     rng = np.random.default_rng([seed, zlib.crc32(scene.name.encode())])
     return sorted(rng.choice(states, count, replace=False).tolist())
 

@@ -19,14 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
 from clearway.errors import SceneError
 from clearway.reward import Moves, Reward
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED
 from clearway.scenes.graph import distances_to, next_states
-from clearway.world.targets import Starts
+from clearway.world.targets import is_start
 from clearway.zones import Zone
 
 DISCOUNT = 0.99
@@ -109,7 +109,7 @@ def make_task(
     blocked = graph == BLOCKED
     clearance_m = np.full(len(graph), np.inf) if clearance_m is None else clearance_m
     steps = distances_to(graph, np.array([target]))[0]
-    starts = Starts.of(steps).state
+    starts = np.flatnonzero(is_start(steps))
     if not len(starts):
         raise SceneError("graph", f"no state leads to target {target}", "Choose a target in the largest component")
     step, arrival = reward.table(Moves(after, blocked, zone, clearance_m))
@@ -220,10 +220,10 @@ def expected(task: Task, policy: np.ndarray, starts: np.ndarray | None = None) -
     lost = ~inside[onward] & (onward != task.target)
     if (mass[lost] > 0).any() or not _arrives(task, policy):
         return NEVER
-    walked = _transitions(task, policy)[walking][:, walking]
+    zone = np.where(onward == task.target, Zone.FREE, task.zone[onward])
 
-    def arrivals(zone: Zone) -> np.ndarray:
-        return walked @ (task.zone[walking] == zone).astype(float)
+    def arrivals(at: Zone) -> np.ndarray:
+        return (mass * (zone == at)).sum(1)
 
     per_step = np.stack(
         [
@@ -235,7 +235,8 @@ def expected(task: Task, policy: np.ndarray, starts: np.ndarray | None = None) -
         1,
     )
     try:
-        per_episode = _solve(eye_array(len(walking)) - walked, per_step)
+        place = np.where(inside, np.cumsum(inside) - 1, 0)  # of a state among those that walk
+        per_episode = _solve(place[onward], np.where(inside[onward], mass, 0.0), per_step)
     except RuntimeError:  # singular: from some pose the chance to arrive is lost in rounding
         return NEVER
     lengths = per_episode[:, 0]
@@ -253,13 +254,6 @@ def _arrives(task: Task, policy: np.ndarray) -> bool:
     return bool((steps[task.starts] > 0).all())
 
 
-def _transitions(task: Task, weights: np.ndarray) -> csr_array:
-    """(S, S): weights (S, A) of actions added up by where they lead; for a policy, transition probabilities."""
-    count = len(weights)
-    rows = np.repeat(np.arange(count), ACTION_COUNT)
-    return csr_array((weights.reshape(-1), (rows, task.next_state.reshape(-1))), shape=(count, count))
-
-
 def _policy_value(task: Task, policy: np.ndarray, discount: float) -> np.ndarray:
     """V^pi (S,), the target's own value counted as 0."""
     return _discounted_solve(task, policy, discount, (policy * task.reward).sum(1))
@@ -267,11 +261,20 @@ def _policy_value(task: Task, policy: np.ndarray, discount: float) -> np.ndarray
 
 def _discounted_solve(task: Task, weights: np.ndarray, discount: float, right: np.ndarray) -> np.ndarray:
     """X with x(s) = right(s) + discount sum_a weights(s, a) x(s'), where the target's own x counts as 0."""
-    stays = np.ones(len(weights))
-    stays[task.target] = 0.0
-    onward = _transitions(task, weights).multiply(stays[None, :])
-    return _solve(eye_array(len(weights)) - discount * onward, right)
+    onward = np.where(task.next_state == task.target, 0.0, discount * weights)
+    return _solve(task.next_state, onward, right)
 
 
-def _solve(matrix: csr_array, right: np.ndarray) -> np.ndarray:
-    return splu(matrix.tocsc()).solve(right)
+def _solve(next_state: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """X with x(s) = right(s) + sum_a weights(s, a) x(next_state(s, a)); states by actions, right (S,) or (S, K).
+
+    Raises:
+        RuntimeError: there is none, or more than one.
+    """
+    state = np.arange(len(weights))
+    rows, columns = np.repeat(state, ACTION_COUNT), next_state.reshape(-1)
+    places = np.concatenate([state, rows]), np.concatenate([state, columns])
+    values = np.concatenate([np.ones(len(state)), -weights.reshape(-1)])
+    matrix = csc_array((values, places), shape=(len(state), len(state)))  # adds up what is at one place
+    matrix.eliminate_zeros()
+    return splu(matrix).solve(right)

@@ -10,9 +10,11 @@ from torch import Tensor
 
 from clearway.agents.agent import FEATURES, POSE, Agent, Observation
 from clearway.errors import AgentError
-from clearway.evaluation.takes import Takes, take_at
+from clearway.evaluation.takes import Takes, never_again, take_at
 from clearway.scenes.scene import Observations, Scene
 from clearway.world.world import World
+
+MOST_KEPT_BYTES = 512 * 2**20  # pictures of all scenes; where they are more, files are read at every step
 
 
 class Sight:
@@ -51,8 +53,11 @@ class Sight:
         if (takes := self._takes) is None:
             return self(state)
         pose = state.cpu().numpy()
-        take = take_at(seed.cpu().numpy(), step.cpu().numpy(), takes.count)
-        seen = {name: self._gathered(takes.seen[name], pose, takes.count, take) for name in takes.seen}
+        own = seed.cpu().numpy(), step.cpu().numpy()
+        take = take_at(*own, takes.count)
+        seen = {
+            name: never_again(self._gathered(takes.seen[name], pose, takes.count, take), *own) for name in takes.seen
+        }
         return {name: pose if name == POSE else seen[name] for name in self._names}
 
     def _seen(self, name: str, state: Tensor) -> np.ndarray:
@@ -100,4 +105,23 @@ def _pictures(name: str, scenes: Sequence[Scene]) -> list[Observations]:
         if pictures.shape[1:] != found[0].shape[1:]:
             sizes = f"{pictures.shape[1:]}, those of {scenes[0].name} {found[0].shape[1:]}"
             raise AgentError(f"scene {scene.name}: its pictures have the size {sizes}. Evaluate in one scene at a time")
-    return found
+    picture_bytes = found[0][0].nbytes
+    if sum(len(scene.graph) for scene in scenes) * picture_bytes > MOST_KEPT_BYTES:
+        return found
+    return [_ReadOnce(pictures) for pictures in found]
+
+
+class _ReadOnce:
+    """Pictures (S, ...) of which each is read and unpacked when it is first looked at."""
+
+    def __init__(self, pictures: Observations) -> None:
+        self._file, self.shape = pictures, pictures.shape
+        self._values = np.empty(pictures.shape, pictures[0].dtype)  # takes memory where it is written alone
+        self._read = np.zeros(len(self._values), bool)
+
+    def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
+        wanted = np.unique(np.arange(len(self._read))[index])
+        if len(missing := wanted[~self._read[wanted]]):
+            self._values[missing] = self._file[missing]
+            self._read[missing] = True
+        return self._values[index]

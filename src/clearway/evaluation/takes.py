@@ -10,9 +10,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from clearway.world.randomness import stream_keys, stream_words
+from clearway.world.randomness import UNIT, stream_keys, stream_words
 
-TAKE_STREAM = 13
+TAKE_STREAM, BITS_STREAM = 13, 17
+SMALL, BITS = 2.0**-9, 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,24 @@ class Takes:
     def of_scene(self, number: int) -> Takes:
         """Those of one scene."""
         return replace(self, seen={name: parts[number : number + 1] for name, parts in self.seen.items()})
+
+
+def never_again(seen: np.ndarray, seed: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """What is seen (B, ...), none of it twice to the bit, by episodes' seeds and steps (B,) int64.
+
+    Takes are few, so that they come again, as a camera's pictures do not: to know them by their bits would be to know
+    more than a camera tells. Of pictures, bytes, half of the first 256 lowest bits change; of features, floats, all but
+    zeros do, by 1 in 512 at most.
+    """
+    keys = stream_keys(stream_words(stream_keys(seed, BITS_STREAM), step), BITS_STREAM)
+    bytes_, shown = seen.dtype == np.uint8, seen.reshape(len(seen), int(np.prod(seen.shape[1:]))).copy()
+    count = min(BITS, shown.shape[1]) if bytes_ else shown.shape[1]
+    words = stream_words(keys[:, None], np.arange(count, dtype=np.int64))
+    if bytes_:
+        shown[:, :count] ^= (words & 1).astype(np.uint8)
+    else:
+        shown *= 1 + SMALL * (2 * (words * UNIT) - 1)
+    return shown.reshape(seen.shape)
 
 
 def take_at(seed: np.ndarray, step: np.ndarray, count: int) -> np.ndarray:

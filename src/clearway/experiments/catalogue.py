@@ -6,7 +6,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from clearway.choices import ExperimentName
-from clearway.experiments import ablations, analysis, fig3, fig4, fig5, fig6, hard_tables, memory, table1, zones_or_step
+from clearway.experiments import (
+    ablations,
+    analysis,
+    fig3,
+    fig4,
+    fig5,
+    fig6,
+    hard_tables,
+    memory,
+    off_grid,
+    table1,
+    zone_levels,
+    zones_or_step,
+)
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
@@ -36,5 +49,7 @@ EXPERIMENTS: dict[ExperimentName, Experiment] = {
     "analysis": Experiment(analysis.jobs, analysis.section),
     "memory": Experiment(memory.jobs, memory.section),
     "zones-or-step": Experiment(zones_or_step.jobs, zones_or_step.section),
+    "zone-levels": Experiment(zone_levels.jobs, zone_levels.section),
     "ablations": Experiment(ablations.jobs, ablations.section),
+    "off-grid": Experiment(off_grid.jobs, off_grid.section),
 }

@@ -12,7 +12,8 @@ from pathlib import Path
 from clearway.errors import RunError
 from clearway.evaluation.episode_files import read_episodes, write_episodes
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
-from clearway.experiments.plan import Job, PlannedRun, Trial
+from clearway.experiments.live_trial import walk_live
+from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_agent
 from clearway.learn.run_folder import RunFolder
@@ -30,7 +31,7 @@ def run_folder(out: Path, run: PlannedRun) -> RunFolder:
     return RunFolder(out / RUNS / run.name)
 
 
-def trial_path(out: Path, run: PlannedRun, trial: Trial) -> Path:
+def trial_path(out: Path, run: PlannedRun, trial: Trial | LiveTrial) -> Path:
     """Where a trial's episodes are."""
     return run_folder(out, run).path / TRIALS / f"{trial.name}.json"
 
@@ -52,16 +53,12 @@ def do(out: Path, job: Job, threads: int) -> None:
     folder = train(request, run_folder(out, run).path, resume=True, milestones=(run.halfway,))
     for trial in job.trials:
         path = trial_path(out, run, trial)
-        if not path.exists():
-            targets = {scene.name: list(own) for scene, own in zip(run.scenes, trial.targets, strict=True)}
-            about = {
-                "run": run.name,
-                "targets": targets,
-                "halfway": trial.halfway,
-                "seed": trial.seed,
-                "step_limit": trial.step_limit,
-            }
-            write_episodes(path, _walk(folder, request.scenes, run, trial), about)
+        if path.exists():
+            continue
+        if isinstance(trial, LiveTrial):
+            walk_live(path, folder.path, request.scenes, trial)
+        else:
+            _walk_on_grid(path, folder, request.scenes, run, trial)
 
 
 def request_of(run: PlannedRun) -> RunRequest:
@@ -76,6 +73,7 @@ def request_of(run: PlannedRun) -> RunRequest:
         learner=run.learner,
         reward=run.reward,
         seed=run.seed,
+        zone_level=run.zone_level,
         paths={scene.name: scene.path for scene in run.scenes},
     )
 
@@ -96,14 +94,23 @@ def _scenes(run: PlannedRun) -> list[Scene]:
     return scenes
 
 
-def _walk(folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Trial) -> EpisodeTable:
+def _walk_on_grid(path: Path, folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Trial) -> None:
     kept = newest_checkpoint(folder.milestone(run.halfway)) if trial.halfway else None
     agent = load_agent(folder.path, kept)
-    world = make_world(scenes, {scene.name: own for scene, own in zip(scenes, trial.targets, strict=True)})
-    return run_episodes(
+    targets = {scene.name: list(own) for scene, own in zip(scenes, trial.targets, strict=True)}
+    world = make_world(scenes, targets)
+    table = run_episodes(
         world,
         agent.on_poses(world),
         episodes_per_target=trial.episodes_per_target,
         step_limit=trial.step_limit,
         seed=trial.seed,
     )
+    about = {
+        "run": run.name,
+        "targets": targets,
+        "halfway": trial.halfway,
+        "seed": trial.seed,
+        "step_limit": trial.step_limit,
+    }
+    write_episodes(path, table, about)

@@ -8,9 +8,11 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from clearway.choices import ZoneLevel
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import without_later
+from clearway.live.conditions import Condition
 from clearway.reward import Reward
 
 TargetSets = tuple[tuple[int, ...], ...]
@@ -35,7 +37,7 @@ class PlannedRun:
     Attributes:
         scenes: all of them train one agent.
         targets: of each scene.
-        reward, learner, seed: see there.
+        reward, learner, seed, zone_level: see there.
     """
 
     scenes: tuple[SceneFile, ...]
@@ -43,6 +45,7 @@ class PlannedRun:
     reward: Reward
     learner: Learner
     seed: int
+    zone_level: ZoneLevel = "pose"
 
     @property
     def halfway(self) -> int:
@@ -55,10 +58,11 @@ class PlannedRun:
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
         settings = {"algorithm": self.learner.algorithm, **without_later(asdict(self.learner))}
         content = [scenes, self.targets, asdict(self.reward), settings, self.seed]
-        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+        if self.zone_level != "pose":  # runs planned before keep their names
+            content.append(self.zone_level)
         targets = sum(len(own) for own in self.targets)
         frames = f"{self.learner.frames / 1e6:g}M"
-        return f"{self.learner.algorithm}-{self.reward.name}-{targets}t-{frames}-s{self.seed}-{digest}"
+        return f"{self.learner.algorithm}-{self.reward.name}-{targets}t-{frames}-s{self.seed}-{_digest(content)}"
 
 
 @dataclass(frozen=True)
@@ -81,8 +85,28 @@ class Trial:
     @property
     def name(self) -> str:
         """Name of its file in the run's folder."""
-        digest = hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
-        return f"{'halfway' if self.halfway else 'end'}-{sum(map(len, self.targets))}t-{digest}"
+        return f"{'halfway' if self.halfway else 'end'}-{sum(map(len, self.targets))}t-{_digest(asdict(self))}"
+
+
+@dataclass(frozen=True)
+class LiveTrial:
+    """Episodes to be walked in the rooms themselves: to the targets trained on, under several settings.
+
+    Attributes:
+        settings: what is changed in the room, by label; see `live.conditions`.
+        episodes_per_target, step_limit: of each setting.
+        seed: of starts, sampled actions and chances.
+    """
+
+    settings: tuple[Condition, ...]
+    episodes_per_target: int
+    step_limit: int
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name of its file in the run's folder."""
+        return f"live-{len(self.settings)}s-{_digest(asdict(self))}"
 
 
 @dataclass(frozen=True)
@@ -90,7 +114,12 @@ class Job:
     """A run with its trials: what one worker does."""
 
     run: PlannedRun
-    trials: tuple[Trial, ...]
+    trials: tuple[Trial | LiveTrial, ...]
+
+
+def _digest(content: object) -> str:
+    """Of JSON values."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def merged(jobs: Iterable[Job]) -> list[Job]:

@@ -19,7 +19,7 @@ from clearway.experiments.job import is_done
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
-from clearway.experiments.setting import Setting, prepare
+from clearway.experiments.setting import Setting, changed_learners, prepare
 from clearway.files import read_json, written_whole
 from clearway.torch_threads import torch_threads
 
@@ -38,6 +38,7 @@ class ReproduceRequest:
         encoder: for the default rooms.
         seeds: how many; None: as the budget says.
         learners: names among `setting.LEARNERS`.
+        changes: of settings of every learner, such as "lr_start=0.002".
         workers: jobs side by side; None: as many as cores and memory allow.
         threads: of each job.
         commands: that asked for it, for the report.
@@ -53,6 +54,7 @@ class ReproduceRequest:
     encoder: str = "auto"
     seeds: int | None = None
     learners: Sequence[LearnerName] = ("paper", "default")
+    changes: Sequence[str] = ()
     workers: int | None = None
     threads: int = 1
     ray: str | None = None
@@ -65,12 +67,14 @@ class Reproduction:
 
     Attributes:
         commands: that asked for the experiments.
+        changes: of settings of every learner.
         setting: that they share.
         jobs: all that they need.
         sections: one for each.
     """
 
     commands: tuple[str, ...]
+    changes: tuple[str, ...]
     setting: Setting
     jobs: list[Job]
     sections: list[Section]
@@ -151,8 +155,8 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
     for count in (request.frames, request.seeds):
         if count is not None and (type(count) is not int or count < 1):
             raise ValueError(f"{count!r:.40} where a number of at least 1 is expected")
-    if not all(isinstance(text, str) for text in (request.encoder, *request.commands)):
-        raise ValueError("the encoder or a command is no text")
+    if not all(isinstance(text, str) for text in (request.encoder, *request.changes, *request.commands)):
+        raise ValueError("the encoder, a change or a command is no text")
     return request
 
 
@@ -160,9 +164,10 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     """The request, and the experiments that the folder's last one asked for where all else is alike."""
     try:
         earlier = _read_request(request.out)
+        same = _question(request) == _question(earlier)
     except RunError:  # there is none, or none that could be gone on with: this one takes its place
         return request
-    if _question(request) != _question(earlier):
+    if not same:
         return request
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
@@ -171,21 +176,25 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
 
 def _question(request: ReproduceRequest) -> str:
     """All of a request that must agree for its experiments to stand in one report, defaults filled in."""
-    budget = BUDGETS[request.budget]
+    budget = BUDGETS[request.budget].changed(request.rooms, request.frames)
+    learners = changed_learners(request.learners, budget, request.changes)
     content = _request_json(request) | {
-        "budget": asdict(budget.changed(request.rooms, request.frames)),
+        "budget": asdict(budget),
         "rooms": None,
         "frames": None,
         "seeds": request.seeds or budget.seeds,
-        "learners": sorted(request.learners),
+        "learners": {name: asdict(learner) for name, learner in learners.items()},
+        "changes": None,
     }
-    return json.dumps({name: value for name, value in content.items() if name not in WHO_ASKED})
+    return json.dumps({name: value for name, value in content.items() if name not in WHO_ASKED}, sort_keys=True)
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
         sections = [corrected(EXPERIMENTS[name].section(setting)) for name in request.names]
-    return Reproduction(tuple(request.commands), setting, planned(setting, request.names), sections)
+    return Reproduction(
+        tuple(request.commands), tuple(request.changes), setting, planned(setting, request.names), sections
+    )
 
 
 def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
@@ -196,6 +205,7 @@ def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
         encoder=request.encoder,
         seeds=request.seeds,
         learners=request.learners,
+        changes=request.changes,
         show_progress=show_progress,
     )
 

@@ -8,11 +8,12 @@ from pathlib import Path
 from urllib.parse import quote
 
 from clearway.choices import LearnerName, ZoneLevel
-from clearway.errors import SceneError
+from clearway.errors import RunError, SceneError
 from clearway.experiments.budget import Budget
 from clearway.experiments.plan import PlannedRun, SceneFile, TargetSets, Trial
 from clearway.learn.learner import Learner
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
+from clearway.learn.settings import with_settings
 from clearway.perception import encode_scenes
 from clearway.reward import Reward
 from clearway.rooms.library import cached_room_scene
@@ -103,6 +104,7 @@ def prepare(
     encoder: str,
     seeds: int | None = None,
     learners: Sequence[LearnerName],
+    changes: Sequence[str] = (),
     show_progress: bool = False,
 ) -> Setting:
     """The setting of a reproduction; default rooms are built, encoded and written to `out` the first time.
@@ -114,11 +116,14 @@ def prepare(
         encoder: for the default rooms.
         seeds: how many; None: as the budget says.
         learners: names among `LEARNERS`.
+        changes: of settings of every learner, such as "lr_start=0.002".
         show_progress: draw progress bars.
 
     Raises:
         SceneError: a dump cannot be read or has no features.
+        RunError: as of `changed_learners`.
     """
+    own = changed_learners(learners, budget, changes)
     paths = list(dumps)[: budget.most_scenes] if dumps else _room_files(out, budget, encoder, show_progress)
     scenes = tuple(read_scene(path) for path in paths)
     for scene, path in zip(scenes, paths, strict=True):
@@ -134,8 +139,20 @@ def prepare(
         targets=tuple(default_targets(scene) for scene in scenes),
         budget=budget,
         seeds=tuple(range(budget.seeds if seeds is None else seeds)),
-        learners={name: _budgeted(name, budget) for name in learners},
+        learners=own,
     )
+
+
+def changed_learners(names: Sequence[LearnerName], budget: Budget, changes: Sequence[str]) -> dict[str, Learner]:
+    """The named learners, with the budget's frames and changed settings.
+
+    Raises:
+        RunError: a change is none that every learner could make, or is one of frames, which are the budget's.
+    """
+    for change in changes:
+        if change.partition("=")[0] == "frames":
+            raise RunError(f"--set {change}: frames are the budget's. Give --frames")
+    return {name: with_settings(_budgeted(name, budget), changes) for name in names}
 
 
 def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) -> list[Path]:

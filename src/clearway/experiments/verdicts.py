@@ -17,7 +17,7 @@ from clearway.evaluation.across_seeds import (
 from clearway.experiments.section import Claim, Verdict
 
 SAME = 0.02  # means within this share of each other count as equal
-LOST = 0.01  # share of episodes by which one kind may arrive less often and still be told better
+LOST = 0.01
 LEAST_RUNS = 4
 """Fewer of either kind decide nothing. Of two kinds that are alike, 31 % of all sets of 2 runs and 11 % of 3 would be
 told apart, 4 % of 4 and of 5 (simulated, normal scores)."""
@@ -48,7 +48,7 @@ def judged_no_more(text: str, what: str, first: np.ndarray, second: np.ndarray, 
     return _judged(text, what, first, second, target_scene, allowed=allowed)
 
 
-def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray) -> Claim:
+def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray, *, lost: float = LOST) -> Claim:
     """The claim, its evidence saying on how many targets some episode failed, which may be all that a mean tells of.
 
     Undecided where those whom the verdict favours arrive less often: who stands still does not collide.
@@ -56,6 +56,7 @@ def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray) -> Claim:
     Args:
         claim: of two kinds of agents.
         first, second: (R, M) their success, 1 where every episode reached the target.
+        lost: share of episodes by which one kind may arrive less often and still be told better.
     """
     if not first.size or not second.size:
         return claim
@@ -65,7 +66,7 @@ def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray) -> Claim:
         told += f"; episodes that arrived: {arrived:.2%}, {other:.2%}"
     favours = {"holds": arrived - other, "does not hold": other - arrived}
     verdict = claim.verdict
-    if favours.get(verdict, 0.0) < -LOST:
+    if favours.get(verdict, 0.0) < -lost:
         verdict = "undecided"
         told += ", so that the figures compare different episodes"
     return replace(claim, verdict=verdict, evidence=f"{claim.evidence} {told}.")

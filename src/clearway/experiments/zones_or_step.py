@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from clearway.experiments.convergence import frames_until_settled, mark_steps, settling
+from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settling
 from clearway.experiments.groups import Group, all_jobs, all_missing, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.paper_numbers import TABLE_1
@@ -24,7 +24,6 @@ from clearway.reward import COLLISION_AWARE, SHORTEST, Moves, Reward, Zones
 NAME = "zones-or-step"
 DEARER, SHUFFLED = "dearer", "shuffled"
 SHUFFLE_SEED = 0
-ONE_TARGET = np.zeros(1, dtype=np.int64)
 
 
 @dataclass(frozen=True)

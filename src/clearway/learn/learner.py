@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from clearway.learn.load import TrainedAgent
-    from clearway.learn.run_folder import RunRecord
+    from clearway.learn.run_record import RunRecord
     from clearway.learn.running import Learning
     from clearway.learn.share import Share
     from clearway.reward import Reward

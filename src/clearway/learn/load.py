@@ -16,7 +16,8 @@ from clearway.learn.checkpoint import newest_checkpoint, read_network, read_prog
 from clearway.learn.described import described
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
-from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder, RunRecord
+from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder
+from clearway.learn.run_record import RunRecord
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic

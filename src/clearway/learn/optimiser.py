@@ -8,9 +8,11 @@ from typing import Literal, Protocol
 import torch
 from torch import Tensor
 from torch.nn import Parameter
+from torch.optim.adam import adam
 
 from clearway.model.network import SiameseActorCritic
 
+BETAS = 0.9, 0.999  # of Adam's two moments
 ALPHA, EPSILON = 0.99, 0.1  # of the published RMSProp
 
 
@@ -28,35 +30,52 @@ class Optimiser(Protocol):
 
 
 class Adam:
-    """PyTorch's fused Adam (Kingma & Ba, 2015)."""
+    """PyTorch's fused Adam (Kingma & Ba, 2015).
+
+    By its functional form: to make a `torch.optim.Adam` imports PyTorch's compiler, which takes a second.
+    """
 
     def __init__(self, named: Mapping[str, Parameter], epsilon: float = 1e-8) -> None:
-        self.named = named
-        self.adam = torch.optim.Adam(list(self.named.values()), lr=0.0, eps=epsilon, fused=True)
-        for parameter in self.named.values():
-            self.adam.state[parameter] = {
+        self.named, self.epsilon = named, epsilon
+        self.state = {
+            name: {
                 "step": torch.zeros((), dtype=torch.float32, device=parameter.device),
-                "exp_avg": torch.zeros_like(parameter),
-                "exp_avg_sq": torch.zeros_like(parameter),
+                "exp_avg": torch.zeros_like(parameter, requires_grad=False),
+                "exp_avg_sq": torch.zeros_like(parameter, requires_grad=False),
             }
+            for name, parameter in named.items()
+        }
 
+    @torch.no_grad()
     def step(self, lr: float) -> None:
-        """One step with the given learning rate."""
-        self.adam.param_groups[0]["lr"] = lr
-        self.adam.step()
+        """One step with the given learning rate; parameters without a gradient stay as they are."""
+        moved = {name: value.grad for name, value in self.named.items() if value.grad is not None}
+        states = [self.state[name] for name in moved]
+        adam(
+            [self.named[name] for name in moved],
+            list(moved.values()),
+            [state["exp_avg"] for state in states],
+            [state["exp_avg_sq"] for state in states],
+            max_exp_avg_sqs=[],  # of AMSGrad, which this is not
+            state_steps=[state["step"] for state in states],
+            fused=True,
+            amsgrad=False,
+            beta1=BETAS[0],
+            beta2=BETAS[1],
+            lr=lr,
+            weight_decay=0.0,
+            eps=self.epsilon,
+            maximize=False,
+        )
 
     def tensors(self) -> dict[str, Tensor]:
         """Moments and step counts by parameter."""
-        return {
-            f"{key}.{name}": value
-            for name, parameter in self.named.items()
-            for key, value in self.adam.state[parameter].items()
-        }
+        return {f"{key}.{name}": value for name, state in self.state.items() for key, value in state.items()}
 
     def load_tensors(self, tensors: dict[str, Tensor]) -> None:
         """Set moments and step counts."""
-        for name, parameter in self.named.items():
-            for key, value in self.adam.state[parameter].items():
+        for name, state in self.state.items():
+            for key, value in state.items():
                 value.copy_(tensors[f"{key}.{name}"])
 
 

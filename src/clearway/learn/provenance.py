@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,16 @@ CPU_INFO = Path("/proc/cpuinfo")
 def package_versions() -> dict[str, str]:
     """Versions of Python, clearway and the packages that shape results."""
     found = {"python": platform.python_version(), "clearway": __version__}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+    return found | {name: _installed_version(name) for name in PACKAGES}
+
+
+@cache
+def _installed_version(package: str) -> str:
+    """As its metadata says, which takes milliseconds to read."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
 
 
 def hardware(device: str | None = None) -> dict[str, Any]:

@@ -36,7 +36,7 @@ from clearway.world.streams import Streams
 from clearway.world.world import World
 
 if TYPE_CHECKING:
-    from clearway.learn.run_folder import RunRecord
+    from clearway.learn.run_record import RunRecord
 
 
 @dataclass(frozen=True)

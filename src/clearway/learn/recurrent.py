@@ -32,7 +32,7 @@ from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.world.world import World
 
 if TYPE_CHECKING:
-    from clearway.learn.run_folder import RunRecord
+    from clearway.learn.run_record import RunRecord
 
 
 @dataclass(frozen=True)

@@ -11,142 +11,26 @@ milestones/N/    the agent after N frames, where it was asked for: a checkpoint 
 from __future__ import annotations
 
 import json
-import math
 import shutil
-import sys
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
-from types import UnionType
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
-from clearway.choices import ZoneLevel
 from clearway.errors import ClearwayError, RunError, reason_of
 from clearway.files import parse_json, read_json, written_whole
-from clearway.learn.algorithms import algorithm
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
-from clearway.learn.learner import Learner
-from clearway.learn.old_runs import clipped_once, own_settings, with_later
-from clearway.learn.provenance import hardware, package_versions
+from clearway.learn.run_record import RunRecord, fits, maker, record_from
 from clearway.regular_files import read_bytes, read_text
-from clearway.remote.address import origin
-from clearway.reward import Reward, reward_from_json
-from clearway.scenes.digest import scene_digest
-from clearway.scenes.features import FileFeatures
-from clearway.scenes.scene import Scene
-from clearway.spread.many import of_each
 from clearway.version import __version__
 
-if TYPE_CHECKING:
-    from clearway.learn.train import RunRequest
-
 FORMAT_VERSION = 2
-SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
 MAX_METRICS_BYTES = 1024**3
 RUN_FILE, METRICS_FILE, CHECKPOINTS, MILESTONES = "run.json", "metrics.jsonl", "checkpoints", "milestones"
 LOCK_FILE = ".lock"
 COPIED = ".copied-"  # begins the name of what is being copied elsewhere
 SETTINGS_FILE = "run.yaml"  # what repeats the run
-
-
-@dataclass(frozen=True)
-class SceneRecord:
-    """A scene as a run used it.
-
-    Attributes:
-        name: of the scene.
-        path: of its file, or its address elsewhere; None for a scene made in memory.
-        digest: of its graph, poses and features (`scene_digest`).
-        encoder: name of what made the features.
-        targets: state ids.
-    """
-
-    name: str
-    path: str | None
-    digest: str
-    encoder: str
-    targets: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class RunRecord:
-    """Everything that determines a run, and where it was made. The reward is as training paid it.
-
-    takes: how the perturbed pictures were made that were seen beside the scenes' own; None: there were none.
-    """
-
-    learner: Learner
-    reward: Reward
-    seed: int
-    zone_level: ZoneLevel
-    scenes: tuple[SceneRecord, ...]
-    versions: Mapping[str, str]
-    hardware: Mapping[str, Any]
-    command: tuple[str, ...]
-    takes: Mapping[str, Any] | None = None
-
-    @property
-    def targets(self) -> dict[str, tuple[int, ...]]:
-        """Targets by scene name."""
-        return {scene.name: scene.targets for scene in self.scenes}
-
-    def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
-        learner = {"algorithm": self.learner.algorithm, **asdict(self.learner)}
-        return {**asdict(self), "learner": learner, "reward": self.reward.to_json()}
-
-    def other_bits(self, now: RunRecord) -> list[str]:
-        """Where a run goes on in another way than this one began, so that its bits are not an uninterrupted one's."""
-        then, here = ({**record.versions, **record.hardware} for record in (self, now))
-        return [
-            f"{name} {here.get(name)} instead of {then[name]}"
-            for name in SHAPES_BITS
-            if name in then and then[name] != here.get(name)
-        ]
-
-    def same_experiment(self, other: RunRecord) -> bool:
-        """Both would give the same agent: all but versions, hardware, paths and command agree."""
-
-        def essence(run: RunRecord) -> tuple:
-            scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
-            return run.learner, run.reward.to_json(), run.seed, run.zone_level, scenes, run.takes
-
-        return essence(self) == essence(other)
-
-
-def record_of(request: RunRequest) -> RunRecord:
-    """The record of a run that is about to start."""
-    paths = request.paths or {}
-    digests = request.digests or _digests(request.scenes)
-    return RunRecord(
-        learner=request.learner,
-        reward=request.paid,
-        seed=request.seed,
-        zone_level=request.zone_level,
-        scenes=tuple(
-            SceneRecord(
-                name=scene.name,
-                path=origin(paths[scene.name]) if scene.name in paths else None,
-                digest=digest,
-                encoder=scene.encoder_name,
-                targets=tuple(int(target) for target in request.targets[scene.name]),
-            )
-            for scene, digest in zip(request.scenes, digests, strict=True)
-        ),
-        versions=package_versions(),
-        hardware=hardware(request.device) | {"feature_store": request.feature_store},
-        command=tuple(sys.argv),
-        takes=request.takes_made,
-    )
-
-
-def _digests(scenes: Sequence[Scene]) -> Iterable[str]:
-    """Of each scene."""
-    if all(isinstance(scene.features, FileFeatures) for scene in scenes):
-        return of_each(scene_digest, [scene.without_pictures() for scene in scenes])
-    return map(scene_digest, scenes)
 
 
 class RunFolder:
@@ -210,12 +94,12 @@ class RunFolder:
             yield other_bits
         except Exception:
             if fresh and not any(self.checkpoints.glob("frames-*")):
-                self._forget(before)
+                self.forget(before, RUN_FILE)
             raise
 
-    def _forget(self, before: Collection[str]) -> None:
-        """Remove the run but for what was there before it, and the folder where it holds nothing else."""
-        for name in {RUN_FILE, METRICS_FILE, SETTINGS_FILE}.difference(before):
+    def forget(self, before: Collection[str], record: str) -> None:
+        """Remove a training and its record, of that name, but for what was there before; the folder, if it is empty."""
+        for name in {record, METRICS_FILE, SETTINGS_FILE}.difference(before):
             (self.path / name).unlink(missing_ok=True)
         for name in {CHECKPOINTS, MILESTONES}.difference(before):
             shutil.rmtree(self.path / name, ignore_errors=True)
@@ -303,10 +187,10 @@ class RunFolder:
         if found > FORMAT_VERSION:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
-            return _record_from(content, found)
+            return record_from(content, found)
         except (KeyError, TypeError, AttributeError, OverflowError, ClearwayError) as error:
             reason, remedy = str(error).rstrip(".")[:300], "Restore it or train again"
-            by = _maker(content)
+            by = maker(content)
             if by != __version__:
                 remedy = f"clearway {by} wrote it, this is {__version__}: use that one, or train again"
             raise RunError(f"{path}: a setting is missing or unknown ({reason}). {remedy}") from error
@@ -336,7 +220,7 @@ class RunFolder:
         if not isinstance(row, dict) or not isinstance(row.get("frames"), int) or "seconds" not in row:
             raise RunError(f"{where}: no row of figures with its frames and seconds. Remove the line")
         for name, value in row.items():
-            if not _fits(value, float):
+            if not fits(value, float):
                 raise RunError(f"{where}: {name} is {value!r:.40}, expected a finite number. Remove the line")
         return row
 
@@ -347,67 +231,3 @@ class RunFolder:
         if not self.metrics_path.exists() or read_text(self.metrics_path, MAX_METRICS_BYTES) != text:
             with written_whole(self.metrics_path) as part:
                 part.write_text(text)
-
-
-def _record_from(content: Mapping[str, Any], version: int) -> RunRecord:
-    wanted = {"seed": int, "zone_level": ZoneLevel, "versions": dict, "hardware": dict, "command": list}
-    for name, kind in wanted.items():
-        if not _fits(content[name], kind):
-            raise TypeError(f"{name} is {content[name]!r:.40}")
-    learner, reward = clipped_once(_learner(content["learner"], version), reward_from_json(content["reward"]))
-    return RunRecord(
-        learner=learner,
-        reward=reward,
-        seed=content["seed"],
-        zone_level=content["zone_level"],
-        scenes=tuple(_scene_record(scene) for scene in content["scenes"]),
-        versions=content["versions"],
-        hardware=content["hardware"],
-        command=tuple(content["command"]),
-        takes=content.get("takes"),
-    )
-
-
-def _learner(content: Mapping[str, Any], version: int) -> Learner:
-    kind = algorithm(content["algorithm"])
-    settings = {name: value for name, value in content.items() if name != "algorithm"}
-    return _settings(kind, with_later(kind, own_settings(kind, settings) if version == 1 else settings))
-
-
-def _maker(content: Mapping[str, Any]) -> str:
-    """The version of clearway that a run.json names; this one where it names none."""
-    versions = content.get("versions")
-    return str(versions.get("clearway", __version__))[:40] if isinstance(versions, dict) else __version__
-
-
-def _settings(kind: type[Learner], content: Mapping[str, Any]) -> Learner:
-    """A settings object from JSON that has exactly its fields."""
-    expected = {field.name for field in fields(kind)}
-    if set(content) != expected:
-        raise KeyError(", ".join(sorted(set(content) ^ expected)))
-    types = get_type_hints(kind)
-    for name in expected:
-        if not _fits(content[name], types[name]):
-            raise TypeError(f"{name} is {content[name]!r:.40}")
-    return kind(**content)
-
-
-def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
-    scene = SceneRecord(**{**content, "targets": tuple(content["targets"])})
-    texts = all(_fits(text, str) for text in (scene.name, scene.digest, scene.encoder))
-    if not texts or not _fits(scene.path, str | None) or not all(_fits(target, int) for target in scene.targets):
-        raise TypeError(f"scene {scene.name!r:.40}")
-    if scene.name in ("", ".", "..") or any(letter in scene.name for letter in "/\\\0"):
-        raise RunError(f"scene {scene.name!r:.40} cannot be part of a file's name")
-    return scene
-
-
-def _fits(value: object, wanted: Any) -> bool:
-    """Whether a JSON value is of a setting's type: bool, int, str, float (any finite number), a choice or a union."""
-    if get_origin(wanted) is Literal:
-        return value in get_args(wanted)
-    if get_origin(wanted) is UnionType:
-        return any(_fits(value, one) for one in get_args(wanted))
-    if wanted is float:
-        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    return isinstance(value, wanted) and (wanted is bool or not isinstance(value, bool))

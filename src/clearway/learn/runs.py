@@ -9,7 +9,8 @@ from typing import Any
 
 from clearway.errors import RunError
 from clearway.learn.checkpoint import checkpoints, newest_checkpoint
-from clearway.learn.run_folder import RUN_FILE, RunFolder, RunRecord
+from clearway.learn.run_folder import RUN_FILE, RunFolder
+from clearway.learn.run_record import RunRecord
 
 FIGURES = ("success", "steps", "collisions")  # of the latest row of metrics
 

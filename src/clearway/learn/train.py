@@ -20,7 +20,8 @@ from clearway.learn.learner import Learner
 from clearway.learn.peers import ALONE, Peers
 from clearway.learn.progress import progress_view
 from clearway.learn.run_copy import RunCopy
-from clearway.learn.run_folder import RunFolder, record_of
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.learn.running import Learning, Running
 from clearway.learn.seeds import check_seed
 from clearway.learn.share import Share, check_scenes
@@ -220,7 +221,7 @@ def train_part(
         raise RunError(f"{problem}. Give a folder that all machines share as --out")
     with (
         progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
-        interruption() as interrupted,
+        interruption(of_several=True) as interrupted,
     ):
         copy = RunCopy(copy_to) if copy_to and peers.leads else None
         run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s, copy)

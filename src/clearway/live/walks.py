@@ -29,8 +29,8 @@ from clearway.torch_threads import torch_threads
 from clearway.world.world import World, make_world
 
 LIVE = "live"
-MAX_PART_BYTES = 1024**3
 """Name of the files in the run folder."""
+MAX_PART_BYTES = 1024**3
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,9 @@ def stages(
     with ExitStack() as opened:
         found = []
         for scene in scenes:
-            record_of_encoder = _encoder_record(scene)  # before the seconds that the room takes
+            made_by = _encoder_record(scene)  # before the seconds that the room takes
             live = live_room(scene)
-            encoder = encoder_from_record(record_of_encoder)
+            encoder = encoder_from_record(made_by)
             world = make_world([scene], {scene.name: targets[scene.name]}, record.zone_level)
             lens = live.lens(*_size_px(scene), fast=taken_fast(scene.made_by.notes))
             found.append(LiveScene(live, world, encoder, opened.enter_context(studio(live.model, lens))))
@@ -102,6 +102,16 @@ def _size_px(scene: Scene) -> tuple[int, int]:
         return PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
     height_px, width_px = scene.observations.shape[1:3]
     return height_px, width_px
+
+
+def encoder_of(scene: Scene) -> Encoder:
+    """What made the scene's features of colour pictures.
+
+    Raises:
+        RunError: it is unknown, or takes others.
+        EncoderError: it cannot be had again.
+    """
+    return encoder_from_record(_encoder_record(scene))
 
 
 def _encoder_record(scene: Scene) -> EncoderRecord:

@@ -12,26 +12,18 @@ import numpy as np
 from clearway.mapping import beliefs
 from clearway.mapping.again import ALWAYS, NEVER, UNKNOWN, marks_of
 from clearway.mapping.beliefs import LatticePose, add_standing, likeliest
-from clearway.mapping.lattice import AHEAD, HEADINGS, nearest_bins
+from clearway.mapping.lattice import AHEAD, HEADINGS
+from clearway.mapping.moves import SAME, SURE_OF_MOVES, evidence_for_move, moved_bins
 from clearway.mapping.pictures import Pictures, add_places
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.routes import shifted
 from clearway.mapping.settings import MappingSettings
 from clearway.mapping.sight import Sight
+from clearway.mapping.walk import QUARTERS, STEPS
 from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
-SURE_OF_MOVES = 1.5  # log-odds of a move, at most, before its outcome is seen
-SAME, IF_SAME = 0.985, -7.0
-"""Cosine of descriptions above which two pictures are the same, and evidence for a move where they are."""
-IF_NOT_SAME = {NEVER: -1.0, UNKNOWN: 4.0, ALWAYS: 16.0}
-"""Evidence for a move where they are not: where pictures repeat, a blocked move shows the same one again."""
-EACH_AGAIN = 4.0
-"""Further evidence likewise for every picture that came again, before it is held that all do."""
-EYES_WEIGHT = 1.8
-"""Of what eyes tell of a move. This, and what is evidence at `NEVER`, fits moves in perturbed rooms of `validation`."""
-LEAST_OF_EYES = -3.0
-"""Evidence for a move, at least, of eyes: of 15 moves in flats of `validation` they hold one for blocked."""
+BUMPED = SURE / 2  # log-odds that a blocked move takes from the cell before it
 KEPT, LATEST = 64, 2
 """Pictures that are kept of a walk, and how many of the last ones say nothing of the pose: they share its errors."""
 RECOGNISED = 20.0
@@ -40,15 +32,6 @@ CERTAIN = 100.0
 """Evidence for a pose of which a tour has taken the very picture: more than eyes could bring together."""
 CHANGED = ("here", "room", "shut", "been", "mark", "repeats", "count", "taken", "features")
 KEPT_AT = ("mark", "taken", "count")
-STEPS = {Action.MOVE_FORWARD: 1, Action.MOVE_BACKWARD: -1}
-QUARTERS = {Action.TURN_RIGHT: 1, Action.TURN_LEFT: -1}
-
-
-def _bins_ahead(ahead_m: float) -> np.ndarray:
-    return nearest_bins(np.array(ahead_m), np.zeros(()), np.zeros(()))
-
-
-(STAYED,) = _bins_ahead(0.0).tolist()
 
 
 class Follower:
@@ -65,7 +48,7 @@ class Follower:
         self, sight: Sight, settings: MappingSettings, known: RoomMap | None = None, pictures: int = KEPT
     ) -> None:
         self._sight, self._settings, self._known = sight, settings, known
-        self._moved_bins = {action: _bins_ahead(steps * settings.step_m) for action, steps in STEPS.items()}
+        self._moved_bins = moved_bins(settings)
         self._pictures = pictures if known is None else 0
         if known is not None:
             self._toured = Pictures.of(known.taken, known.features, sight)
@@ -142,6 +125,26 @@ class Follower:
         np.clip(room, -SURE, SURE, out=room)
         return poses, {**after, "begun": np.ones_like(state["begun"]), "seen": seen}
 
+    def go_by(self, known: RoomMap, after: dict[str, np.ndarray], row: int) -> LatticePose:
+        """Change the beliefs of an episode to what a map of its walk tells, whose last picture is the one seen now.
+
+        Returns:
+            The pose of that picture.
+        """
+        taken, here = known.taken, after["here"][row]
+        after["room"][row], after["shut"][row] = known.room, known.shut
+        now = LatticePose(*taken[-1].tolist())
+        here[:] = beliefs.IMPOSSIBLE
+        here[now.index] = 0
+        been, mark = after["been"][row], after["mark"][row]
+        been[:], mark[:] = False, 0
+        been[*taken.T], mark[*taken.T] = True, marks_of(known.features)
+        _, first = np.unique(taken, axis=0, return_index=True)
+        kept = np.sort(first)[: self._pictures]
+        after["count"][row] = len(kept)
+        after["taken"][row, : len(kept)], after["features"][row, : len(kept)] = taken[kept], known.features[kept]
+        return now
+
     def sight_in_map(self, belief: np.ndarray, seen: np.ndarray, weight: float) -> None:
         """Add to beliefs (B, 4, G, G) where pictures with features (B, F) were taken, by those of the tour."""
         assert self._known is not None, "there was a tour"
@@ -178,8 +181,7 @@ class Follower:
             moving.tolist(), self._sight.whereabouts(before, now), same.tolist(), strict=True
         ):
             done = Action(int(action[row]))
-            told = EYES_WEIGHT * float(evidence[self._moved_bins[done]].mean() - evidence[STAYED])
-            moved = max(told, LEAST_OF_EYES) + (IF_SAME if stayed else _if_not_same(int(after["repeats"][row])))
+            moved = evidence_for_move(evidence, self._moved_bins[done], stayed, int(after["repeats"][row]))
             self._moved(done, moved, {name: values[row] for name, values in after.items()})
         for row in np.flatnonzero(np.isin(action, list(QUARTERS))).tolist():
             after["here"][row] = np.roll(after["here"][row], QUARTERS[Action(int(action[row]))], axis=0)
@@ -197,7 +199,7 @@ class Follower:
             direction = before.heading if steps > 0 else before.turned(2).heading
             belief["shut"][direction, before.row, before.column] = True
             if room[beyond.cell] < SURE:
-                room[beyond.cell] -= SURE / 2
+                room[beyond.cell] -= BUMPED
 
 
 def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mapping[str, np.ndarray]) -> None:
@@ -219,13 +221,6 @@ def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mappi
     mark[origin.index], mark[before.index] = mark[before.index], 0
     if count and tuple(kept["taken"][count - 1]) == before.index:
         kept["taken"][count - 1] = origin.index
-
-
-def _if_not_same(repeats: int) -> float:
-    """Evidence for a move after which the picture is another one."""
-    if repeats < UNKNOWN:
-        return IF_NOT_SAME[NEVER]
-    return IF_NOT_SAME[ALWAYS] if repeats == ALWAYS else IF_NOT_SAME[UNKNOWN] + EACH_AGAIN * repeats
 
 
 def been_now(been: np.ndarray, poses: Sequence[LatticePose]) -> np.ndarray:

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from clearway.errors import RunError
-from clearway.world.feature_store import BLOCK_ROWS, FEW_STATES, empty_store
+from clearway.world.feature_store import BLOCK_ROWS, FEW_STATES, empty_store, mapped_store
 from clearway.world.world import World
 
 FITTED_STATES = 32_768  # states that a feature map is fitted to: evenly spaced ones, where there are more
@@ -134,9 +134,13 @@ def prepared_features(world: World, feature_map: FeatureMap) -> Tensor:
     assert features is not None
     if len(features) <= FEW_STATES:
         return feature_map(features.float())
-    prepared = empty_store(len(features), feature_map.input_count, world.feature_store).to(world.device)
-    for rows, block in zip(prepared.split(BLOCK_ROWS), features.split(BLOCK_ROWS), strict=True):
-        rows.copy_(feature_map(block.float()))
+    blocks = (feature_map(block.float()) for block in features.split(BLOCK_ROWS))
+    size = len(features), feature_map.input_count
+    if world.feature_store == "mapped" and world.device.type == "cpu":
+        return mapped_store((block.numpy() for block in blocks), *size)
+    prepared = empty_store(*size, world.feature_store, world.device)
+    for rows, block in zip(prepared.split(BLOCK_ROWS), blocks, strict=True):
+        rows.copy_(block)
     return prepared
 
 

@@ -24,7 +24,7 @@ from clearway.perception.eyes import EyesCard, card_of, is_eyes, write_eyes
 from clearway.perception.eyes_network import Eyes
 
 if TYPE_CHECKING:
-    from clearway.pretraining.pretrain import PretrainRequest
+    from clearway.pretraining.trainer import PretrainRequest
 
 RECORD_FILE = "pretraining.json"
 DECIDES = ("settings", "seed", "keeping", "views")  # what the eyes will be
@@ -62,6 +62,7 @@ class EyesFolder:
         self._files = RunFolder(path)
         self.checkpoints, self.metrics_path = self._files.checkpoints, self._files.metrics_path
         self.metrics, self.forget_metrics_after = self._files.metrics, self._files.forget_metrics_after
+        self.clear_parts = self._files.clear_parts
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -69,8 +70,20 @@ class EyesFolder:
         with self._files.held():
             yield
 
-    def begin(self, record: Mapping[str, Any], resume: bool) -> bool:
-        """Begin here, or find what to go on with; whether there is a checkpoint of it.
+    @contextmanager
+    def begun(self, record: Mapping[str, Any], resume: bool) -> Iterator[None]:
+        """As `begin`; where it begins, and fails before its first checkpoint, what it wrote is removed again."""
+        fresh, before = not (self.path / RECORD_FILE).exists(), {path.name for path in self.path.iterdir()}
+        self.begin(record, resume)
+        try:
+            yield
+        except Exception:
+            if fresh and not any(self.checkpoints.glob("frames-*")):
+                self._files.forget(before, RECORD_FILE)
+            raise
+
+    def begin(self, record: Mapping[str, Any], resume: bool) -> None:
+        """Begin here, or find what to go on with.
 
         Raises:
             RunError: the folder holds something else, or a training and `resume` is off.
@@ -87,12 +100,9 @@ class EyesFolder:
             if other := [key for key in DECIDES if before.get(key) != json.loads(json_text(record[key]))]:
                 problem = f"{self.path}: holds a pretraining with other {' and '.join(other)}"
                 raise RunError(f"{problem}. Give the same, or another --out")
-        if any(self.checkpoints.glob("frames-*")):
-            return True
-        with written_whole(path) as part:
-            part.write_text(json_text(record))
-        self.forget_metrics_after(-1)
-        return False
+        if not any(self.checkpoints.glob("frames-*")):
+            with written_whole(path) as part:
+                part.write_text(json_text(record))
 
     def write_eyes(self, eyes: Eyes, pictures: int) -> None:
         """Write what was trained, with how."""

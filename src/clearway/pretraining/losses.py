@@ -6,15 +6,17 @@ paired with some others of its group.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
+from clearway.learn.peers import ALONE, Peers
 from clearway.perception.eyes_network import NEAREST_M, Comparison, Eyes, Glance
 from clearway.pretraining.labels import PairLabels, token_depth_m
+from clearway.pretraining.together import all_rows
 from clearway.views.stream import ViewBatch
 
 FREE, STANDS, DEPTH, POSE, OVERLAP, MATCH, PLACE, WHERE = 1.0, 1.0, 1.0, 3.0, 0.5, 0.5, 0.3, 0.2
@@ -23,12 +25,13 @@ BEND = 0.1  # where errors begin to count as they are, not squared
 SHALLOWEST_M = 0.05
 WITHOUT_OVERLAP = 0.15  # weight of a pair whose cameras see nothing alike, beside that of one that sees all alike
 OVERLAPPING = 0.25
+TOLD_OF_ALL = "place"  # part of the loss that every worker computes of the whole batch
 SHARPNESS = 12.0  # of descriptions: how much likelier a picture is the same place for each unit of cosine
 
 
 @dataclass(frozen=True)
 class Parts:
-    """The parts of the loss, each a mean.
+    """The parts of the loss, each a mean over the batch, to which a worker's own pictures give their part.
 
     Attributes:
         free: of free ways, log metres.
@@ -37,7 +40,7 @@ class Parts:
         pose: of relative poses.
         overlap: of whether two pictures see the same.
         match: of which tokens do, nats.
-        place: of telling the other take of a pose among all pictures of the batch, nats.
+        place: of telling the other take of a pose among all pictures of the batch, nats; that of the whole batch.
         where: of bins of relative poses, nats.
     """
 
@@ -56,6 +59,15 @@ class Parts:
         glance = FREE * self.free + STANDS * self.stands + DEPTH * self.depth + PLACE * self.place
         return glance + POSE * self.pose + OVERLAP * self.overlap + MATCH * self.match + WHERE * self.where
 
+    def of_all(self, peers: Peers) -> Parts:
+        """Those of the whole batch, of which this worker has a part."""
+        if peers.count == 1:
+            return self
+        own = {name: part.detach() for name, part in vars(self).items() if name != TOLD_OF_ALL}
+        summed = torch.stack(list(own.values()))
+        peers.add_up(summed)
+        return replace(self, **dict(zip(own, summed.unbind(), strict=True)))
+
     def figures(self) -> dict[str, float]:
         """For metrics.jsonl."""
         return {f"loss_{name}": part.item() for name, part in vars(self).items()} | {"loss": self.total.item()}
@@ -63,13 +75,15 @@ class Parts:
 
 @dataclass(frozen=True, eq=False)
 class Lesson:
-    """A batch with all that an update needs.
+    """A worker's pictures of a batch with all that an update needs.
 
     Attributes:
         batch: what is known of its B pictures, with depth.
         pixels: (B, 3, height, width), its pictures, relit.
         first, second: (P,) numbers of the pictures that are compared.
         labels: what is true of these pairs.
+        part: which pictures of the whole batch these are.
+        whole: pictures of the whole batch.
     """
 
     batch: ViewBatch
@@ -77,10 +91,24 @@ class Lesson:
     first: np.ndarray
     second: np.ndarray
     labels: PairLabels
+    part: slice
+    whole: int
+
+    @property
+    def share(self) -> float:
+        """Of the whole batch; pairs are as many for each picture."""
+        return len(self.batch) / self.whole
 
 
-def losses(eyes: Eyes, lesson: Lesson, bfloat16: bool) -> Parts:
-    """The loss of a batch, on the device of the eyes; `bfloat16`: the trunk multiplies in it."""
+def losses(eyes: Eyes, lesson: Lesson, bfloat16: bool, peers: Peers = ALONE) -> Parts:
+    """The loss of a batch, on the device of the eyes.
+
+    Args:
+        eyes: the network.
+        lesson: what this worker learns from.
+        bfloat16: the trunk multiplies in it.
+        peers: who else has a part of the batch.
+    """
     device = eyes.slopes.device
     with torch.autocast(device.type, torch.bfloat16, enabled=bfloat16):
         tokens = eyes(lesson.pixels.to(device))
@@ -88,8 +116,9 @@ def losses(eyes: Eyes, lesson: Lesson, bfloat16: bool) -> Parts:
     first, second = (torch.from_numpy(numbers).to(device) for numbers in (lesson.first, lesson.second))
     tokens = tokens.float()
     comparison = eyes.compare(tokens[first], tokens[second], glance.depth[first], glance.depth[second])
-    free, stands, depth, place = _of_glance(glance, lesson.batch, eyes)
-    pose, overlap, match, where = _of_comparison(comparison, lesson.labels)
+    free, stands, depth = (lesson.share * part for part in _of_glance(glance, lesson.batch, eyes))
+    pose, overlap, match, where = (lesson.share * part for part in _of_comparison(comparison, lesson.labels))
+    place = _of_descriptions(all_rows(glance.description, lesson.part, lesson.whole, peers))
     return Parts(free, stands, depth, pose, overlap, match, place, where)
 
 
@@ -99,18 +128,22 @@ def drawn_pairs(count: int, partners: int, group: int, rng: np.random.Generator)
     return first, np.minimum(first // group * group + rng.integers(group, size=len(first)), count - 1)
 
 
-def _of_glance(glance: Glance, batch: ViewBatch, eyes: Eyes) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Losses of free ways, of places to stand at, of depth, and of descriptions."""
+def _of_glance(glance: Glance, batch: ViewBatch, eyes: Eyes) -> tuple[Tensor, Tensor, Tensor]:
+    """Losses of free ways, of places to stand at, and of depth."""
     device = glance.free.device
     free = torch.from_numpy(np.log(batch.table.free_m + NEAREST_M).astype(np.float32)).to(device)
     deep_m = np.maximum(token_depth_m(batch.seen["depth"], eyes.shape.grid), SHALLOWEST_M)
     deep = torch.from_numpy(np.log(deep_m)).to(device)
-    alike = glance.description[0::2] @ glance.description[1::2].T * SHARPNESS
-    same = torch.arange(len(alike), device=device)
-    place = (functional.cross_entropy(alike, same) + functional.cross_entropy(alike.T, same)) / 2
-    stands = torch.from_numpy(batch.table.stands.astype(np.float32)).to(device)
+    stands = torch.from_numpy(batch.table.stands).to(glance.stands)
     standing = functional.binary_cross_entropy_with_logits(glance.stands, stands)
-    return _bent(glance.free, free).mean(), standing, _bent(glance.depth, deep).mean(), place
+    return _bent(glance.free, free).mean(), standing, _bent(glance.depth, deep).mean()
+
+
+def _of_descriptions(description: Tensor) -> Tensor:
+    """Loss of telling the other take of a pose by descriptions of all pictures of a batch."""
+    alike = description[0::2] @ description[1::2].T * SHARPNESS
+    same = torch.arange(len(alike), device=description.device)
+    return (functional.cross_entropy(alike, same) + functional.cross_entropy(alike.T, same)) / 2
 
 
 def _of_comparison(comparison: Comparison, labels: PairLabels) -> tuple[Tensor, Tensor, Tensor, Tensor]:

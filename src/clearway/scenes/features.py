@@ -72,6 +72,10 @@ def find_features(file: h5py.File, path: Path, count: int) -> h5py.Dataset | Non
 
 def read_features(dataset: h5py.Dataset, path: Path) -> np.ndarray:
     """Features (S, F) float32, index 0 of the second axis where there are three. Raises SceneError for damage."""
-    values = hdf5.read_values(dataset, path, ... if len(dataset.shape) == 2 else np.s_[:, 0])
+    count, *takes, width = dataset.shape
+    if takes in ([], [1]):
+        values = hdf5.read_values(dataset, path).reshape(count, width)
+    else:
+        values = hdf5.read_values(dataset, path, np.s_[:, 0])
     with np.errstate(over="ignore"):  # a float64 beyond float32 becomes Inf, which `check_features` names
         return np.ascontiguousarray(values, dtype=np.float32)

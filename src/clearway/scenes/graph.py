@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, shortest_path
+from scipy.sparse.csgraph import breadth_first_order, connected_components, shortest_path
 
 from clearway.scenes.actions import BLOCKED, Action
 
@@ -21,10 +21,13 @@ def next_states(graph: np.ndarray) -> np.ndarray:
 
 
 def adjacency(graph: np.ndarray) -> csr_array:
-    """Sparse (S, S) float matrix with a 1 at (s, s') for every action that leads from s to s'."""
-    state, action = np.nonzero(graph != BLOCKED)
-    count = len(graph)
-    return csr_array((np.ones(len(state)), (state, graph[state, action])), shape=(count, count))
+    """Sparse (S, S) float matrix with a 1 at (s, s') for every state s' that an action leads to from s."""
+    ahead = np.sort(graph, axis=1)
+    is_open = ahead != BLOCKED
+    is_open[:, 1:] &= ahead[:, 1:] != ahead[:, :-1]  # each once: SciPy's search for components hangs on two
+    first = np.concatenate([[0], np.cumsum(np.count_nonzero(is_open, axis=1))])
+    leads_to = ahead[is_open]  # in the order of rows, as compressed ones are kept
+    return csr_array((np.ones(len(leads_to)), leads_to, first), shape=(len(graph), len(graph)))
 
 
 def distances(graph: np.ndarray) -> np.ndarray:
@@ -38,8 +41,26 @@ def distances_to(graph: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
     Costs one breadth-first search a target, so that large scenes need no (S, S) table.
     """
-    steps = shortest_path(adjacency(graph).T.tocsr(), unweighted=True, indices=np.asarray(targets))
-    return np.where(np.isfinite(steps), steps, UNREACHABLE).astype(np.int32)
+    backwards = adjacency(graph).T.tocsr()
+    steps = [_depths(breadth_first_order(backwards, int(target))[1], int(target)) for target in np.asarray(targets)]
+    return np.array(steps, np.int32).reshape(-1, len(graph))
+
+
+def _depths(before: np.ndarray, root: int) -> np.ndarray:
+    """Depth of each node in a tree, (S,) int32, from the node before it, (S,) int; -1 where that is negative.
+
+    Every round each node looks twice as far up.
+    """
+    outside = before < 0
+    outside[root] = False
+    above = np.where(before < 0, root, before).astype(np.int64)
+    depth = np.ones(len(before), np.int32)
+    depth[root] = 0
+    while (further := depth[above]).any():
+        depth += further
+        above = above[above]
+    depth[outside] = UNREACHABLE
+    return depth
 
 
 def turn_circles(graph: np.ndarray) -> np.ndarray:
@@ -47,13 +68,11 @@ def turn_circles(graph: np.ndarray) -> np.ndarray:
 
     Right turns must be a permutation of the states.
     """
-    count = len(graph)
-    turned = csr_array((np.ones(count), (np.arange(count), graph[:, Action.TURN_RIGHT])), shape=(count, count))
-    _, label = connected_components(turned, directed=False)
-    _, first, circle = np.unique(label, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[circle]
+    states = np.arange(len(graph))
+    least, onward = states, graph[:, Action.TURN_RIGHT]  # least state within 1, 2, 4, ... turns, and where those lead
+    while (less := np.minimum(least, least[onward])).tobytes() != least.tobytes():
+        least, onward = less, onward[onward]
+    return (np.cumsum(least == states) - 1)[least]
 
 
 def components(graph: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 
 from clearway.errors import SceneError, reason_of
 from clearway.files import parse_json, written_whole
-from clearway.regular_files import check_regular
+from clearway.regular_files import name_of_opened
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
@@ -60,11 +60,14 @@ def opened(path: Path) -> Iterator[h5py.File]:
         raise SceneError(path, "is a folder", "Name a scene file in it")
     if not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
-    with faults_named(path, problem="cannot be opened as HDF5"):
-        check_regular(path)
-        if not h5py.is_hdf5(path):
-            raise SceneError(path, "is not an HDF5 file", "Give a scene file in the thor_v1 format")
-        file = h5py.File(path, "r")
+    with faults_named(path, problem="cannot be opened as HDF5"), name_of_opened(path) as name:
+        try:
+            file = h5py.File(name, "r")
+        except OSError as fault:
+            if not h5py.is_hdf5(name):
+                problem = "is not an HDF5 file"
+                raise SceneError(path, problem, "Give a scene file in the thor_v1 format") from fault
+            raise
     try:
         yield file
     finally:
@@ -94,9 +97,10 @@ def find_dataset(parent: h5py.Group, name: str, source: Path) -> h5py.Dataset | 
             return None
         if parent.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
             raise SceneError(source, "is a link, which is not followed", "Copy the data into the file", name)
-        found = parent[name]
-        if not isinstance(found, h5py.Dataset):
+        opened_id = h5py.h5o.open(parent.id, name.encode())
+        if not isinstance(opened_id, h5py.h5d.DatasetID):
             raise SceneError(source, "is not a dataset", MAKE_AGAIN, name)
+        found = h5py.Dataset(opened_id, readonly=True)
         check_storage(found, source, name)
         return found
 
@@ -160,8 +164,11 @@ def read_values(dataset: h5py.Dataset, source: Path, selection: Selection = ...)
             raise SceneError(source, problem, "Give a smaller scene", name)
         check_written(dataset)
         check_unpacking(dataset, rows)
-        values = dataset[selection]
-    return np.asarray(values)
+        if selection is not ... or not dataset.shape:
+            return np.asarray(dataset[selection])
+        values = np.empty(dataset.shape, dataset.dtype)
+        dataset.id.read(h5py.h5s.ALL, h5py.h5s.ALL, values)  # as h5py does, which looks at the selection at length
+    return values
 
 
 def _selected(shape: tuple[int, ...], selection: Selection) -> tuple[np.ndarray, int]:
@@ -179,20 +186,27 @@ def _selected(shape: tuple[int, ...], selection: Selection) -> tuple[np.ndarray,
 def read_attribute(item: h5py.Group | h5py.Dataset, name: str, source: Path) -> str | int | float | None:
     """A small attribute as a Python number or text, None where there is none."""
     with faults_named(source, problem=f"attribute '{name}' cannot be read"):
-        attributes = item.attrs
-        if name not in attributes:
+        if not h5py.h5a.exists(item.id, name.encode()):
             return None
-        kept = attributes.get_id(name)
-        if kept.shape != () or kept.dtype.kind not in "iufbSO":
+        kept = h5py.h5a.open(item.id, name.encode())
+        dtype = kept.dtype
+        if kept.shape != () or dtype.kind not in "iufbSO":
             raise SceneError(source, f"attribute '{name}' is neither a number nor a text", MAKE_AGAIN)
         if kept.get_storage_size() > MAX_JSON_BYTES:
             raise SceneError(source, f"attribute '{name}' is too large", MAKE_AGAIN)
-        value = attributes[name]
+        value = item.attrs[name] if dtype.kind == "O" else _read_scalar(kept, dtype)
         value = value.item() if isinstance(value, np.generic) else value
         value = value.decode() if isinstance(value, bytes) else value
     if not isinstance(value, str | int | float) or (isinstance(value, str) and len(value) > MAX_JSON_BYTES):
         raise SceneError(source, f"attribute '{name}' is neither a number nor a text", MAKE_AGAIN)
     return value
+
+
+def _read_scalar(kept: h5py.h5a.AttrID, dtype: np.dtype) -> int | float | bytes:
+    """The value of an attribute of fixed size."""
+    value = np.zeros((), dtype)
+    kept.read(value)
+    return value.item()
 
 
 def read_number(item: h5py.Group | h5py.Dataset, name: str, source: Path, low: float, high: float) -> float | None:

@@ -10,8 +10,6 @@ import hashlib
 
 import numpy as np
 
-from clearway.scenes.scene import Scene
-
 SHARE = 0.1
 ROUNDING = 1e-6  # of places, in cells
 
@@ -30,12 +28,18 @@ def held_out_cells(name: str, cells: np.ndarray) -> np.ndarray:
     return chosen
 
 
-def held_out(scene: Scene) -> np.ndarray:
+def held_out_poses(name: str, cells: np.ndarray, locations_m: np.ndarray, cell_size_m: float) -> np.ndarray:
     """Which poses of a scene are held out, (S,) bool: all headings of the held-out cells.
 
     A scene that is renamed has others, so keep the names of generated files.
+
+    Args:
+        name: of the scene.
+        cells: (S,) int64, cell of each state, see `Scene.cells`.
+        locations_m: (S, 2), x and z.
+        cell_size_m: length of a move.
     """
-    _, first = np.unique(scene.cells, return_index=True)
-    steps = scene.locations_m[first] / scene.cell_size_m
+    _, first = np.unique(cells, return_index=True)
+    steps = locations_m[first] / cell_size_m
     grid = np.ceil(steps - 0.5 - ROUNDING).astype(np.int64)  # cells may lie halfway
-    return held_out_cells(scene.name, grid)[scene.cells]
+    return held_out_cells(name, grid)[cells]

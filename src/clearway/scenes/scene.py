@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from clearway.errors import SceneError, printable
 from clearway.scenes import graph as graphs
+from clearway.scenes.held_out import held_out_poses
 from clearway.scenes.sensors import RGB, SENSORS, Readings, Sensor, rgb
 
 
@@ -192,20 +193,31 @@ class Scene:
         """(S,) int, strongly connected component of each state; 0 is the largest."""
         return graphs.components(self.graph)
 
+    @cached_property
+    def held_out(self) -> np.ndarray:
+        """Which poses are held out of training where that is asked for, (S,) bool, see the module `held_out`."""
+        return held_out_poses(self.name, self.cells, self.locations_m, self.cell_size_m)
+
     @property
     def encoder_name(self) -> str:
         """Name of what made the features."""
         return self.encoder.name if self.encoder else "unknown"
 
     def without_pictures(self) -> Scene:
-        """The same scene with what training sees of it alone, and what was found of its graph so far."""
-        bare = replace(self, observations=None, top_view=None, further=())
-        bare.__dict__.update({name: self.__dict__[name] for name in ("cells", "components") if name in self.__dict__})
-        return bare
+        """The same scene with what training sees of it alone."""
+        return self._of_same_graph(observations=None, top_view=None, further=())
 
-    def with_features(self, features: np.ndarray, encoder: EncoderRecord) -> Scene:
+    def with_features(self, features: Features, encoder: EncoderRecord | None) -> Scene:
         """The same scene with other features, (S, F) float32, and the record of what made them."""
-        return replace(self, features=features, encoder=encoder)
+        return self._of_same_graph(features=features, encoder=encoder)
+
+    def _of_same_graph(self, **changes: Any) -> Scene:
+        """The same scene with other parts, and what was found of its graph so far."""
+        changed = replace(self, **changes)
+        for name in ("cells", "components", "held_out"):
+            if name in self.__dict__:
+                changed.__dict__[name] = self.__dict__[name]
+        return changed
 
 
 def encoder_names(scenes: Iterable[Scene]) -> str:

@@ -37,15 +37,17 @@ def check_storage(dataset: h5py.Dataset, source: Path, name: str) -> None:
     Raises:
         SceneError: it does not.
     """
-    if dataset.is_virtual or dataset.external:
+    plan = dataset.id.get_create_plist()
+    layout = plan.get_layout()
+    if layout == h5py.h5d.VIRTUAL or plan.get_external_count() > 0:
         raise SceneError(source, "keeps its values in another file", "Copy the data into the file", name)
-    chunks = dataset.chunks
-    if not chunks:
+    if layout != h5py.h5d.CHUNKED:
         return
+    chunks = plan.get_chunk()
     if math.prod(chunks) * dataset.dtype.itemsize > MAX_CHUNK_BYTES:
         problem = f"its chunks {chunks} hold more than {MAX_CHUNK_BYTES >> 20} MiB each"
         raise SceneError(source, problem, "Store the file again with smaller chunks", name)
-    codes = _filters(dataset)
+    codes = _filters(plan)
     unknown = [code for code in codes if code not in FILTERS]
     if unknown:
         problem = f"is packed with the filter {unknown[0]}, expected {', '.join(FILTERS.values())}"
@@ -77,12 +79,13 @@ def check_unpacking(dataset: h5py.Dataset, rows: np.ndarray) -> None:
     Raises:
         ValueError: one does.
     """
-    codes = _filters(dataset) if dataset.chunks else []
+    plan = dataset.id.get_create_plist()
+    codes = _filters(plan) if plan.get_layout() == h5py.h5d.CHUNKED else []
     if h5py.h5z.FILTER_DEFLATE not in codes:
         return
-    skipped = 1 << codes.index(h5py.h5z.FILTER_DEFLATE)
-    most = math.prod(dataset.chunks) * dataset.dtype.itemsize + CHECKSUM_BYTES
-    for offset in _offsets(dataset, rows):
+    skipped, chunks = 1 << codes.index(h5py.h5z.FILTER_DEFLATE), plan.get_chunk()
+    most = math.prod(chunks) * dataset.dtype.itemsize + CHECKSUM_BYTES
+    for offset in _offsets(dataset.shape, chunks, rows):
         if dataset.id.get_chunk_info_by_coord(offset).size * MOST_DEFLATED <= MAX_CHUNK_BYTES:
             continue
         mask, packed = dataset.id.read_direct_chunk(offset)
@@ -90,15 +93,14 @@ def check_unpacking(dataset: h5py.Dataset, rows: np.ndarray) -> None:
             raise ValueError(f"the chunk at {offset} unpacks to more than its {most - CHECKSUM_BYTES:,} bytes")
 
 
-def _filters(dataset: h5py.Dataset) -> list[int]:
+def _filters(plan: h5py.h5p.PropDCID) -> list[int]:
     """The codes of a dataset's filters, in the order of writing."""
-    plan = dataset.id.get_create_plist()
     return [plan.get_filter(index)[0] for index in range(plan.get_nfilters())]
 
 
-def _offsets(dataset: h5py.Dataset, rows: np.ndarray) -> Iterator[tuple[int, ...]]:
+def _offsets(shape: tuple[int, ...], chunks: tuple[int, ...], rows: np.ndarray) -> Iterator[tuple[int, ...]]:
     """Where the chunks that hold some rows begin."""
-    first, *others = dataset.chunks
+    first, *others = chunks
     starts = np.flatnonzero(np.bincount(rows // first)) * first
-    ranges = (range(0, length, step) for length, step in zip(dataset.shape[1:], others, strict=True))
+    ranges = (range(0, length, step) for length, step in zip(shape[1:], others, strict=True))
     return itertools.product(starts.tolist(), *ranges)

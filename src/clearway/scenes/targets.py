@@ -5,13 +5,10 @@ In generated rooms and flats the choice leaves out the poses that are held out (
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.floor_plans import GENERATED
-from clearway.scenes.held_out import held_out as held_out_poses
 from clearway.scenes.scene import Scene
 
 ZHU_TARGETS: dict[str, tuple[int, ...]] = {
@@ -33,7 +30,7 @@ def held_out_targets(scene: Scene) -> np.ndarray:
     """Which states are held out as targets, (S,) bool: in generated rooms and flats a tenth, elsewhere none."""
     if scene.made_by.source != GENERATED:
         return np.zeros(scene.state_count, bool)
-    return held_out_poses(scene)
+    return scene.held_out
 
 
 def possible_targets(scene: Scene, held_out: bool = False) -> np.ndarray:
@@ -65,27 +62,28 @@ def seeded_targets(
     Raises:
         SceneError: there are fewer, or nothing is held out in the scene.
     """
-    order = target_order(scene, seed, held_out)
-    most = _most_targets(scene, order)
+    order = _ordered(scene, seed, held_out)
+    most = _most_targets(scene, len(order))
     if count < 1 or count > most:
         raise SceneError(
             scene.name,
             f"{count} targets asked for, the largest component has {len(order)} states{HELD if held_out else ''}",
             f"Ask for 1 to {most} targets",
         )
-    return tuple(sorted(order[:count]))
+    return tuple(sorted(order[:count].tolist()))
 
 
 def _few_targets(scene: Scene, seed: int, held_out: bool) -> tuple[int, ...]:
     """Five seeded targets, fewer where there are no more to draw; one at least, or SceneError."""
-    order = target_order(scene, seed, held_out)
-    most = _most_targets(scene, order)
-    return tuple(sorted(order[: min(TARGETS_PER_SCENE, most)])) or seeded_targets(scene, most, seed, held_out)
+    order = _ordered(scene, seed, held_out)
+    most = _most_targets(scene, len(order))
+    few = order[: min(TARGETS_PER_SCENE, most)].tolist()
+    return tuple(sorted(few)) or seeded_targets(scene, most, seed, held_out)
 
 
-def _most_targets(scene: Scene, possible: Sequence[int]) -> int:
-    """Of a scene's possible ones: a target needs a start beside it."""
-    return min(len(possible), int((scene.components == 0).sum()) - 1)
+def _most_targets(scene: Scene, possible: int) -> int:
+    """Of so many possible ones of a scene: a target needs a start beside it."""
+    return min(possible, int(np.count_nonzero(scene.components == 0)) - 1)
 
 
 def target_order(scene: Scene, seed: int = 0, held_out: bool = False) -> tuple[int, ...]:
@@ -93,12 +91,17 @@ def target_order(scene: Scene, seed: int = 0, held_out: bool = False) -> tuple[i
 
     One state of every cell comes before the others.
     """
+    return tuple(_ordered(scene, seed, held_out).tolist())
+
+
+def _ordered(scene: Scene, seed: int, held_out: bool) -> np.ndarray:
+    """As `target_order`, (N,) int64."""
     states = possible_targets(scene, held_out)
     order = np.random.default_rng([seed, scene.state_count]).permutation(states)
     _, first_of_cell = np.unique(scene.cells[order], return_index=True)
-    one_a_cell = order[np.sort(first_of_cell)]
-    others = np.delete(order, np.sort(first_of_cell))
-    return tuple(np.concatenate([one_a_cell, others]).tolist())
+    comes_first = np.zeros(len(order), bool)
+    comes_first[first_of_cell] = True
+    return np.concatenate([order[comes_first], order[~comes_first]])
 
 
 def default_targets(scene: Scene, seed: int = 0) -> tuple[int, ...]:

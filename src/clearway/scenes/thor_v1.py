@@ -126,7 +126,8 @@ def _read_graph(file: h5py.File, path: Path) -> np.ndarray:
     limit = MAX_STATES * ACTION_COUNT * 8
     hdf5.check_layout(dataset, path, shape=(None, ACTION_COUNT), kinds="iuf", limit=limit)
     values = hdf5.read_values(dataset, path)
-    if not np.all((values >= BLOCKED) & (values < len(values)) & (values == np.floor(values))):
+    whole = values.dtype.kind != "f" or bool(np.all(values == np.floor(values)))
+    if not whole or not np.all((values >= BLOCKED) & (values < len(values))):
         problem = f"holds something else than whole numbers from {BLOCKED} to {len(values) - 1}"
         raise SceneError(path, problem, hdf5.MAKE_AGAIN, "graph")
     graph = values.astype(np.int32)

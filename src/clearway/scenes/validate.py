@@ -198,20 +198,21 @@ def pose_quirks(scene: Scene) -> list[str]:
     for turn, right_deg in zip(TURNS, (turn_deg, -turn_deg), strict=True):
         off_deg = (scene.headings_deg[turned[turn]] - scene.headings_deg - right_deg + 180) % 360 - 180
         found += _quirk(np.abs(off_deg) > 2 * rounded_deg, f"a {_words(turn)} changes the heading by {right_deg:g}")
-        far_m = np.abs(scene.locations_m[turned[turn]] - scene.locations_m).max(axis=1)
-        found += _quirk(far_m > 0.1 * scene.cell_size_m, f"a {_words(turn)} keeps the location")
+        moves = _ends_astray(scene, turned[turn], np.zeros(2))
+        found += _quirk(moves, f"a {_words(turn)} keeps the location")
+    facing = np.deg2rad(scene.headings_deg)
+    forward_m = scene.cell_size_m * np.stack([np.sin(facing), np.cos(facing)], axis=1)
     for move, sign in zip(MOVES, (1, -1), strict=True):
-        found += _quirk(_moves_astray(scene, move, sign), f"a {_words(move)} leads one cell along the heading")
+        ahead = scene.graph[:, move]
+        astray = (ahead != BLOCKED) & _ends_astray(scene, ahead, sign * forward_m)
+        found += _quirk(astray, f"a {_words(move)} leads one cell along the heading")
     return found
 
 
-def _moves_astray(scene: Scene, move: Action, sign: int) -> np.ndarray:
-    """Whether the open move of each state ends elsewhere than one cell along its heading, (S,) bool."""
-    ahead = scene.graph[:, move]
-    turn = np.deg2rad(scene.headings_deg)
-    expected_m = sign * scene.cell_size_m * np.stack([np.sin(turn), np.cos(turn)], axis=1)
-    moved_m = scene.locations_m[ahead] - scene.locations_m
-    return (ahead != BLOCKED) & (np.abs(moved_m - expected_m).max(axis=1) > 0.1 * scene.cell_size_m)
+def _ends_astray(scene: Scene, end: np.ndarray, expected_m: np.ndarray) -> np.ndarray:
+    """Whether the state (S,) that each leads to lies elsewhere than so many metres further, (S, 2), (S,) bool."""
+    off_m = np.abs(scene.locations_m[end] - scene.locations_m - expected_m)
+    return np.maximum(off_m[:, 0], off_m[:, 1]) > 0.1 * scene.cell_size_m
 
 
 def _quirk(broken: np.ndarray, rule: str) -> list[str]:

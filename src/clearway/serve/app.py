@@ -319,6 +319,8 @@ async def _answer_message(
         session = await service.sessions.get(session_id, owner)
         if content is None:
             raise Fault("invalid_request", "send pictures as binary messages")
+        if len(content) > service.limits.body_bytes:  # of a server that bounds messages by itself, none comes here
+            raise Fault("body_too_large", f"at most {service.limits.body_bytes} bytes are taken")
         return _answer(service, await service.step(session, content, step)).model_dump_json()
 
 

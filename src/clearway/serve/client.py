@@ -22,8 +22,9 @@ from clearway.regular_files import read_bytes
 from clearway.scenes.actions import Action
 
 TIMEOUT_S = 30.0
-AGAIN_S, FIRST_PAUSE_S = 10.0, 0.05  # for which a request is sent again whose connection broke; the pauses double
+AGAIN_S, FIRST_PAUSE_S = 10.0, 0.05  # after its begin, a request is sent again whose connection broke; pauses double
 UNSURE = ("unreachable", "deadline_passed", "internal")  # whether a request with such an end has changed the session
+BROKEN = (500, 502, 503, 504)  # status of a proxy's own answer whose replica has died meanwhile
 GONE = 404  # status of what is not there: ended by a request whose answer was lost
 MAX_PICTURE_BYTES = 64 * 1024**2  # of a file; the service takes less
 KEEP_ALIVE_S = 3.0  # of an idle connection; the service's is longer, so that it never closes one that is used
@@ -111,17 +112,27 @@ class Client:
     def _answered(self, method: str, path: str, content: dict[str, Any]) -> tuple[Any, int]:
         """An answer, and how often it was asked for: again where the connection broke, as when a replica dies.
 
+        So is it where a proxy before the replicas says so, as that of Ray Serve does.
+
         A step or target without a number is asked for once: whether it was walked, nobody could tell.
         """
         give_up, pause_s = time.monotonic() + AGAIN_S, FIRST_PAUSE_S
+        may_come_twice = _may_come_twice(method, path, content)
+
+        def may_wait() -> bool:
+            return may_come_twice and time.monotonic() + pause_s <= give_up
+
         for times in count(1):
             try:
-                return self._http.request(method, path, **content), times
+                answer = self._http.request(method, path, **content)
             except self._broken:
-                if time.monotonic() + pause_s > give_up or not _may_come_twice(method, path, content):
+                if not may_wait():
                     raise
-                time.sleep(pause_s)
-                pause_s *= 2
+            else:
+                if not _is_proxy_s(answer) or not may_wait():
+                    return answer, times
+            time.sleep(pause_s)
+            pause_s *= 2
         raise AssertionError("it counts without an end")
 
     def ask_json(self, method: str, path: str, *names: str, **content: Any) -> dict[str, Any]:
@@ -215,6 +226,12 @@ class ClientSession:
         except ServiceError:
             if fault is None:
                 raise
+
+
+def _is_proxy_s(answer: Any) -> bool:
+    """Whether a fault is told by something before the service: the service's own are JSON."""
+    kind = answer.headers.get("content-type", "")
+    return answer.status_code in BROKEN and not kind.startswith("application/json")
 
 
 def _may_come_twice(method: str, path: str, content: dict[str, Any]) -> bool:

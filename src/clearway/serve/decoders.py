@@ -10,10 +10,8 @@ import asyncio
 import errno
 import json
 import logging
-import os
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -22,6 +20,7 @@ from typing import cast
 
 import numpy as np
 
+from clearway.children import command_of
 from clearway.deploy.agent import MAX_PICTURE_SIDE
 from clearway.serve.decoder import ANSWER, ASKED, BUFFER_BYTES, REFUSED
 from clearway.serve.decoding import Bounds
@@ -29,10 +28,6 @@ from clearway.serve.faults import Code, Fault
 from clearway.serve.limits import Limits
 from clearway.serve.shares import FairTurns, Shares
 
-COMMAND = (
-    "import sys; sys.path[:] = {path!r}; from clearway.children import end_with_parent; end_with_parent({parent}); "
-    "from clearway.serve.decoder import main; main()"
-)
 NICENESS, SLOW_NICENESS = 5, 19  # yields to the agent; to all others
 SUSPECT_S = 60.0  # for which the pictures of a session are decoded slowly, one of which has overrun
 MOST_OVERRUNS_S = 1.0  # of decoding lately in vain for a token, beyond which its new sessions are decoded slowly
@@ -78,8 +73,7 @@ class Decoder:
         if self._process is not None and self._process.poll() is None:
             return
         self.end()
-        path = [folder or os.getcwd() for folder in sys.path]
-        words = [sys.executable, "-S", "-c", COMMAND.format(path=path, parent=os.getpid()), self._job]
+        words = [*command_of("clearway.serve.decoder"), self._job]
         ours, theirs = socket.socketpair()
         with theirs:
             try:

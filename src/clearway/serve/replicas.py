@@ -14,24 +14,23 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from pathlib import Path
 from types import FrameType
 
 from clearway import files
-from clearway.children import ChildProcess, signals_held
+from clearway.children import ChildProcess
 from clearway.deploy.agent import DeployedAgent
 from clearway.errors import ClearwayError, DeployError
+from clearway.serve.hangup import on_hangup, rotating
 from clearway.serve.limits import Limits
 from clearway.serve.metrics import count_no_more, count_together
 from clearway.serve.replica import Beats, Replica
-from clearway.serve.run import Network, rotating, run_service
-from clearway.serve.session_record import KEY_BYTES, most_record_bytes, shapes_of
-from clearway.serve.session_table import SessionTable
-from clearway.serve.sessions import begun_state
-from clearway.serve.shared_sessions import SharedSessions
+from clearway.serve.run import Network, run_service
+from clearway.serve.session_record import KEY_BYTES
+from clearway.serve.shared_sessions import sessions_in
 from clearway.serve.stand_in import standing_in
 from clearway.serve.tokens import Tokens
 
@@ -80,9 +79,7 @@ def serve_replica(common: Common, number: int) -> None:
         agent = common.opened()
     except ClearwayError as fault:
         sys.exit(f"replica {number + 1}: {fault}")
-    shapes = shapes_of(begun_state(agent))
-    table = SessionTable(common.folder / "sessions", limits.sessions, most_record_bytes(shapes), limits.idle_s)
-    sessions = SharedSessions(table, limits.sessions, lambda: tokens.owners, common.key, shapes)
+    sessions = sessions_in(common.folder, agent, limits, tokens, common.key)
     replica = Replica(number, sessions, common.beats, common.folder)
     with rotating(tokens, common.tokens_file):
         run_service(agent, common.network, tokens, limits.divided(common.count), replica)
@@ -102,7 +99,7 @@ def run_replicas(
         opened: opens the agent; a function that can be pickled.
         network: how the service is reached; its `log` can be pickled too.
         tokens: one of which every request must hold.
-        tokens_file: which SIGHUP reads again; None: none.
+        tokens_file: which SIGHUP reads again, in all replicas, as it does the certificate; None: none.
         limits: of the whole service.
         count: of replicas.
 
@@ -116,8 +113,9 @@ def run_replicas(
         common = Common(opened, network, tokens, tokens_file, limits, count, folder, key, beats)
         places = [_Place(common, number) for number in range(count)]
         try:
-            further = rotating(tokens, tokens_file, lambda: _tell(places, signal.SIGHUP))
-            with further, standing_in(network, beats.any_fresh):
+            renewing = tokens_file is not None or network.certificate is not None
+            told = on_hangup(lambda: _tell(places, signal.SIGHUP)) if renewing else nullcontext()
+            with told, rotating(tokens, tokens_file), standing_in(network, beats.any_fresh):
                 while not ending:
                     for place in places:
                         place.look()
@@ -185,8 +183,7 @@ class _Place:
         process = ChildProcess(target=serve_replica, args=(self._common, self._number), name=name)
         self._begun_s, self._told_before = now, self._told
         try:
-            with signals_held(signal.SIGINT):  # the terminal's: the parent tells its replicas by SIGTERM
-                process.start()
+            process.start()
         except OSError as fault:  # it was killed before it had read what it is to do, or no process can be started
             self._pause(now, fault.strerror)
         else:

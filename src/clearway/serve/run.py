@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-import signal
 import socket
 import ssl
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import FrameType
 
 from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import open_agent
@@ -19,12 +18,13 @@ from clearway.serve.access_log import AccessLog, Sparing
 from clearway.serve.app import make_app
 from clearway.serve.connections import Strangers
 from clearway.serve.handshakes import Door, Handshakes
+from clearway.serve.hangup import on_hangup, renew_certificate, tls_of
 from clearway.serve.limits import Limits
 from clearway.serve.messages import impatient
 from clearway.serve.protection import protected
 from clearway.serve.replica import Replica
 from clearway.serve.service import Service
-from clearway.serve.tokens import Tokens, read_tokens
+from clearway.serve.tokens import Tokens
 from clearway.web.local import port_of, serve
 
 OTHER_FILES = 200  # beside connections that a service may open
@@ -98,6 +98,10 @@ class Network:
         """Both, or the one."""
         return [self.listener, *([self.health] if self.health else [])]
 
+    def tls(self) -> ssl.SSLContext | None:
+        """By its certificate; None where it has none. Raises OSError where that cannot be read."""
+        return None if self.certificate is None else tls_of(self.certificate, self.key)
+
 
 def check_tls(certificate: Path | None, key: Path | None) -> None:
     """Raise ClearwayError where one of both is missing, cannot be read or does not belong to the other."""
@@ -109,43 +113,18 @@ def check_tls(certificate: Path | None, key: Path | None) -> None:
         for path in (certificate, key):
             if not path.is_file():
                 raise ClearwayError(f"{path}: is no regular file. Name a certificate and its key, in PEM")
-        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
+        tls_of(certificate, key)
     except OSError as fault:  # ssl.SSLError is one
         reason = fault.strerror or fault
         raise ClearwayError(f"{certificate}, {key}: {reason}. Name a certificate and its key, in PEM") from fault
-
-
-@contextmanager
-def rotating(tokens: Tokens, path: Path | None, further: Callable[[], object] = lambda: None) -> Iterator[None]:
-    """Let SIGHUP read the file of tokens again meanwhile, also where the process was started to ignore it (nohup).
-
-    Once they were read, `further` is called.
-    """
-    if path is None or not hasattr(signal, "SIGHUP"):
-        yield
-        return
-
-    def read_again(number: int, frame: FrameType | None) -> None:
-        log = logging.getLogger("clearway.serve")
-        try:
-            tokens.replace(read_tokens(path))
-        except ClearwayError as fault:
-            log.error("the tokens stay as they were: %s", fault)
-        else:
-            log.warning("tokens were read again from %s", path)
-            further()
-
-    before = signal.signal(signal.SIGHUP, read_again)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGHUP, before)
 
 
 def run_service(
     agent: DeployedAgent, network: Network, tokens: Tokens, limits: Limits, replica: Replica | None = None
 ) -> None:
     """Answer until told to end (SIGINT, SIGTERM); requests under way are answered, streams are closed.
+
+    SIGHUP reads the certificate again, where there is one.
 
     Args:
         agent: is asked.
@@ -165,24 +144,26 @@ def run_service(
     handshakes = Handshakes(limits.strangers, limits.patience_s, network.proxy)
     connections = allowed_connections(limits.connections)
     http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, handshakes, health_port)
-    tls = {"ssl_certfile": network.certificate, "ssl_keyfile": network.key} if network.certificate else {}
+    tls = network.tls()
     listeners = [Door(listener, handshakes) if tls else listener for listener in network.listeners()]
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)
     logging.getLogger("uvicorn.error").addFilter(Sparing())
-    serve(
-        protected(make_app(service), service, health_port, AccessLog(network.log) if network.log else None),
-        *listeners,
-        **tls,
-        proxy_headers=network.proxy is not None,
-        forwarded_allow_ips=network.proxy,
-        lifespan="on",
-        loop="asyncio",  # others ask no `Door`
-        log_config=None,
-        http=http,
-        ws=sockets,
-        ws_max_size=limits.body_bytes,
-        ws_per_message_deflate=False,
-        limit_concurrency=connections,
-        timeout_keep_alive=limits.patience_s,
-        timeout_graceful_shutdown=int(limits.deadline_s) + 1,
-    )
+    renew = partial(renew_certificate, tls, network.certificate, network.key) if tls and network.certificate else None
+    with on_hangup(renew) if renew else nullcontext():
+        serve(
+            protected(make_app(service), service, health_port, AccessLog(network.log) if network.log else None),
+            *listeners,
+            tls=tls,
+            proxy_headers=network.proxy is not None,
+            forwarded_allow_ips=network.proxy,
+            lifespan="on",
+            loop="asyncio",  # others ask no `Door`
+            log_config=None,
+            http=http,
+            ws=sockets,
+            ws_max_size=limits.body_bytes,
+            ws_per_message_deflate=False,
+            limit_concurrency=connections,
+            timeout_keep_alive=limits.patience_s,
+            timeout_graceful_shutdown=int(limits.deadline_s) + 1,
+        )

@@ -10,13 +10,17 @@ from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar
 
+from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import Selection
 from clearway.serve.faults import Fault
-from clearway.serve.session_record import Shapes, UnsealedError, sealed, unsealed
+from clearway.serve.limits import Limits
+from clearway.serve.session_record import Shapes, UnsealedError, most_record_bytes, sealed, shapes_of, unsealed
 from clearway.serve.session_table import SessionTable
-from clearway.serve.sessions import Progress, Session, new_session, no_such_session, too_many
+from clearway.serve.sessions import Progress, Session, begun_state, new_session, no_such_session, too_many
+from clearway.serve.tokens import Tokens
 
 Found = TypeVar("Found")
 
@@ -145,6 +149,21 @@ class SharedSessions:
                 cancelled = late
         with _table_needed():
             return answer.result(), cancelled
+
+
+def sessions_in(folder: Path, agent: DeployedAgent, limits: Limits, tokens: Tokens, key: bytes) -> SharedSessions:
+    """The sessions of an agent in the table that lies in a folder.
+
+    Args:
+        folder: that all replicas share.
+        agent: whose states the records hold.
+        limits: of the whole service.
+        tokens: whose owners share the sessions.
+        key: seals the records.
+    """
+    shapes = shapes_of(begun_state(agent))
+    table = SessionTable(folder / "sessions", limits.sessions, most_record_bytes(shapes), limits.idle_s)
+    return SharedSessions(table, limits.sessions, lambda: tokens.owners, key, shapes)
 
 
 @contextmanager

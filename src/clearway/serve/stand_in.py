@@ -8,16 +8,16 @@ from __future__ import annotations
 import logging
 import math
 import socket
-import ssl
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing.connection import wait
 
 from clearway.serve.faults import Fault
+from clearway.serve.hangup import on_hangup
 from clearway.serve.run import Network
 
 LOOKS_EVERY_S = 0.2
@@ -29,6 +29,8 @@ NOBODY = "no replica answers. They are started, or started again where they have
 @contextmanager
 def standing_in(network: Network, anyone_answers: Callable[[], bool]) -> Iterator[None]:
     """Meanwhile, answer at the port for health with a refusal whenever nobody else answers.
+
+    Its certificate is read again whenever that begins, and by SIGHUP.
 
     Args:
         network: how the service is reached; without a port for health nothing is done.
@@ -42,7 +44,8 @@ def standing_in(network: Network, anyone_answers: Callable[[], bool]) -> Iterato
         thread = threading.Thread(target=_stand_in, args=(server, anyone_answers, ended), daemon=True)
         thread.start()
         try:
-            yield
+            with nullcontext() if network.certificate is None else on_hangup(server.load_certificate):
+                yield
         finally:
             ended.set()
             thread.join()
@@ -76,14 +79,14 @@ class _Server(ThreadingHTTPServer):
             False
         )  # a replica may have taken what was to be accepted: `handle_request` waits for none
         self._network = network
-        self._tls = _tls_of(network)
+        self._tls = network.tls()
         self._open: dict[socket.socket, float] = {}  # second handles of connections, and when each is to be over
         self._held = threading.Lock()  # of what is open
 
     def load_certificate(self) -> None:
         """Read it anew: it may have been renewed since."""
         try:
-            self._tls = _tls_of(self._network)
+            self._tls = self._network.tls()
         except OSError as fault:  # ssl.SSLError is one
             log = logging.getLogger("clearway.serve")
             log.error("%s: %s; the one before is used on", self._network.certificate, fault.strerror or fault)
@@ -137,15 +140,6 @@ class _Server(ThreadingHTTPServer):
         """Whoever asks may leave, be slow, or speak another protocol; all else is told."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)  # type: ignore[arg-type]
-
-
-def _tls_of(network: Network) -> ssl.SSLContext | None:
-    """What its certificate gives; None where it has none. Raises OSError where that cannot be read."""
-    if network.certificate is None:
-        return None
-    tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    tls.load_cert_chain(network.certificate, network.key)
-    return tls
 
 
 class _Refusal(BaseHTTPRequestHandler):

@@ -16,12 +16,22 @@ AT_ONCE = 50  # things in a part
 
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
-_Part: TypeAlias = tuple[Callable[[Any], Any], Sequence[Any]]
+_Before: TypeAlias = Callable[[Sequence[Any]], None] | None
+_Part: TypeAlias = tuple[Callable[[Any], Any], _Before, Sequence[Any]]
 _Done: TypeAlias = tuple[list[Any], list[tuple[str, type[Warning]]]]  # results, and what was warned of
 
 
-def of_each(function: Callable[[Thing], Result], things: Sequence[Thing]) -> Iterator[Result]:
-    """What a function makes of each thing, in order; it stands in a module, and what it warns of is warned of here.
+def of_each(
+    function: Callable[[Thing], Result],
+    things: Sequence[Thing],
+    before: Callable[[Sequence[Thing]], None] | None = None,
+) -> Iterator[Result]:
+    """What a function makes of each thing, in order; what it warns of is warned of here.
+
+    Args:
+        function: stands in a module.
+        things: the things.
+        before: where there are processes, called in each with the things that it does next; stands in a module.
 
     Raises:
         ClearwayError: what the function raised, or a process died.
@@ -30,7 +40,7 @@ def of_each(function: Callable[[Thing], Result], things: Sequence[Thing]) -> Ite
     if len(things) < MANY or cores == 1:
         yield from map(function, things)
         return
-    parts = [(function, things[first : first + AT_ONCE]) for first in range(0, len(things), AT_ONCE)]
+    parts = [(function, before, things[first : first + AT_ONCE]) for first in range(0, len(things), AT_ONCE)]
     environment = {"OMP_NUM_THREADS": "1"}
     work: Work[None, _Part, _Done] = Work(_ready, _done, _died, environment=environment)
     with workers_for(work, workers=cores) as crew:
@@ -47,12 +57,14 @@ def _ready() -> None:
 
 def _done(_: None, part: _Part) -> _Done:
     """The results of a part, and what was warned of."""
-    function, things = part
+    function, before, things = part
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        if before is not None:
+            before(things)
         results = [function(thing) for thing in things]
     return results, [(str(one.message), one.category) for one in caught]
 
 
 def _died(part: _Part, how: str) -> ClearwayError:
-    return ClearwayError(f"a process that was to look at {len(part[1])} things {how}. Look for what ends it")
+    return ClearwayError(f"a process that was to look at {len(part[2])} things {how}. Look for what ends it")

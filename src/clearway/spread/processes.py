@@ -85,7 +85,11 @@ class _Crew:
             try:
                 if getattr(self.own, "process", None) is None:
                     self.own.process = self._start()
-                return self.own.process.done(message)
+                try:
+                    return self.own.process.done(message)
+                finally:
+                    if self.ending:  # where it finished its part instead, nobody would tell it again
+                        self.own.process.kill()
             except _Died as death:
                 self.own.process = None
                 if not death.killed or attempt >= self.work.attempts or self.ending:

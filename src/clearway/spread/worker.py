@@ -15,6 +15,7 @@ from collections.abc import Callable
 from queue import SimpleQueue
 from typing import IO, Any
 
+from clearway.children import collector_rests
 from clearway.spread.messages import from_message, to_message
 
 ORPHANED = 1  # exit codes; nobody is left to see this one
@@ -39,8 +40,9 @@ def done(key: str, work: Callable[[], bytes], part: bytes) -> Any:
     """
     if key not in _set_up:
         _set_up.clear()
-        set_up, do = from_message(work())
-        _set_up[key] = do, set_up()
+        with collector_rests():  # much may have to be imported
+            set_up, do = from_message(work())
+            _set_up[key] = do, set_up()
     do, tool = _set_up[key]
     return do(tool, from_message(part))
 

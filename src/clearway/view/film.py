@@ -36,8 +36,13 @@ def write_film(stage: Stage, episode: Episode, path: Path, frames_per_s: int) ->
         while walker.recorded:
             if walker.step() is None:
                 break
+    write_video(path, film_frames(stage, session), frames_per_s)
+
+
+def film_frames(stage: Stage, session: Viewing) -> Iterator[np.ndarray]:
+    """What all walkers of a session did up to now, (height, width, 3) uint8 each."""
     shown = [_frames(stage, session, index) for index in range(len(session.walkers))]
-    write_video(path, stacked(shown, session.names(session.episode)), frames_per_s)
+    return stacked(shown, session.names(session.episode))
 
 
 def _frames(stage: Stage, session: Viewing, index: int) -> Iterator[np.ndarray]:

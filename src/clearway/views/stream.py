@@ -46,6 +46,10 @@ class ViewBatch:
         """B."""
         return len(self.room)
 
+    def __getitem__(self, rows: np.ndarray | slice) -> ViewBatch:
+        """Some pictures, in the order asked for."""
+        return ViewBatch(self.room[rows], self.table[rows], {name: seen[rows] for name, seen in self.seen.items()})
+
 
 @dataclass(frozen=True, eq=False)
 class Views:
@@ -182,7 +186,7 @@ class Views:
             skipped = 0
             while len(order):
                 wanted = pictures - sum(len(part) for part in parts)
-                parts.append(_rows(pool, order[:wanted]))
+                parts.append(pool[order[:wanted]])
                 order = order[wanted:]
                 if sum(len(part) for part in parts) == pictures:
                     yield _joined(parts)
@@ -249,11 +253,6 @@ def _order(blocks: Sequence[_Block], takes: int, together: int, rng: np.random.G
         begin += block.poses * takes
     every = np.concatenate(groups)
     return every[rng.permutation(len(every))].reshape(-1)
-
-
-def _rows(batch: ViewBatch, rows: np.ndarray) -> ViewBatch:
-    seen = {name: pictures[rows] for name, pictures in batch.seen.items()}
-    return ViewBatch(batch.room[rows], batch.table[rows], seen)
 
 
 def _joined(batches: Sequence[ViewBatch]) -> ViewBatch:

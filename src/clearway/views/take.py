@@ -9,7 +9,6 @@ import numpy as np
 from clearway.live.live_room import live_room
 from clearway.rooms.detail import are_small
 from clearway.rooms.sense import sense
-from clearway.scenes.held_out import held_out
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import Readings
 from clearway.views.placing import rearranges
@@ -42,7 +41,7 @@ def room_views(scene: Scene, settings: ViewSettings) -> RoomViews:
     """
     small = are_small(*settings.size_px)
     live = live_room(scene, small=small, loose=rearranges(settings.perturbations))
-    taken = draw_takes(live, held_out(scene), settings)
+    taken = draw_takes(live, scene.held_out, settings)
     view = replace(live.lens(*settings.size_px, fast=small), shots=taken.shots)
     pictures, further = sense(live.model, view, settings.sensors, title=scene.name, here=True)
     for number, draws in enumerate(taken.draws):

@@ -30,15 +30,19 @@ SENTENCE = (
 )
 
 
-def make_demo_page(result: DemoResult, command: str) -> Path:
+def make_demo_page(result: DemoResult, command: str, opening: Sequence[Picture] = ()) -> Path:
     """Draw the pictures of a demo and write its index.html; returns the page's path.
 
-    command: the command line that made the demo.
+    Args:
+        result: what was trained and evaluated.
+        command: the command line that made the demo.
+        opening: pictures that are in its folder already, shown first.
     """
     first = result.evaluations[0]
     page = Page(
         title="clearway: anticipating collisions on the way to a picture",
         sentence=SENTENCE,
+        opening=opening,
         key_figures=_key_figures(result.evaluations),
         unseen=_unseen(result),
         unseen_text=_unseen_text(result.first),

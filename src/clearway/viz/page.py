@@ -44,6 +44,7 @@ class Page:
     Attributes:
         title: the headline.
         sentence: what this is, in one sentence.
+        opening: what one sees first.
         key_figures: the summary.
         unseen: the generalist's way in a room that it has never entered, and what it saw.
         unseen_text: how that went.
@@ -60,6 +61,7 @@ class Page:
     title: str
     sentence: str
     table: TableText
+    opening: Sequence[Picture] = ()
     key_figures: Sequence[KeyFigure] = ()
     unseen: Sequence[Picture] = ()
     unseen_text: str = ""

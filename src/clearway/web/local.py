@@ -6,6 +6,7 @@ import ipaddress
 import os
 import signal
 import socket
+import ssl
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -81,12 +82,13 @@ class _Server(uvicorn.Server):
         late.start()
 
 
-def serve(app: Application, *listeners: socket.socket, **settings: Any) -> None:
+def serve(app: Application, *listeners: socket.socket, tls: ssl.SSLContext | None = None, **settings: Any) -> None:
     """Answer until the process is interrupted or told to end (SIGINT, SIGTERM); what is under way gets a few seconds.
 
     Args:
         app: what answers.
         listeners: from `listening`; closed at the end.
+        tls: encrypts connections; None: nothing does.
         settings: of `uvicorn.Config`, where a service needs others.
     """
     ours: dict[str, Any] = {
@@ -98,6 +100,8 @@ def serve(app: Application, *listeners: socket.socket, **settings: Any) -> None:
         "ws_max_size": LARGEST_MESSAGE_BYTES,
     }
     config = uvicorn.Config(app, **(ours | settings))
+    config.load()
+    config.ssl = tls
     with ExitStack() as open_ones, _ending_quietly():
         for listener in listeners:
             open_ones.enter_context(listener)

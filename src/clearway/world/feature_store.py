@@ -16,9 +16,10 @@ from __future__ import annotations
 import os
 import tempfile
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import IO
 
 import numpy as np
@@ -32,8 +33,9 @@ from clearway.scenes.mapped_features import FLOAT_BYTES, MappedFeatures
 from clearway.scenes.records import FILE_ENCODER
 from clearway.scenes.scene import Features, Scene
 
+CPU = torch.device("cpu")
 FEW_STATES = 16_384  # up to so many, whatever is computed of states is computed of all of them at once
-BLOCK_ROWS = 8_192  # features that go through memory at a time
+BLOCK_ROWS = 2_048  # features that go through memory at a time: of few numbers they stay in the processor's cache
 LARGEST_FLOAT16 = 65_504.0
 
 
@@ -51,7 +53,10 @@ def joined_features(scenes: Sequence[Scene], store: FeatureStore) -> Tensor | No
     assert features[0] is not None
     if store == "mapped" and (whole := _adjoining(features)):
         return _shared(whole)
-    joined = empty_store(sum(scene.state_count for scene in scenes), features[0].shape[1], store)
+    size = sum(scene.state_count for scene in scenes), features[0].shape[1]
+    if store == "mapped":
+        return mapped_store((np.asarray(scene.features, np.float32) for scene in scenes), *size)
+    joined = empty_store(*size, store)
     for scene, rows in zip(scenes, joined.split([scene.state_count for scene in scenes]), strict=True):
         own = np.asarray(scene.features, np.float32)
         if store == "float16" and np.abs(own).max() > LARGEST_FLOAT16:
@@ -99,37 +104,56 @@ def _remedy(scene: Scene) -> str:
     return f"Encode all of them together: clearway scenes encode FILES --encoder {name} --out FOLDER"
 
 
-def empty_store(states: int, features: int, store: FeatureStore) -> Tensor:
-    """Room for features (S, F), not set yet.
+def empty_store(states: int, features: int, store: FeatureStore, device: torch.device | str = "cpu") -> Tensor:
+    """Room in memory for features (S, F), not set yet.
 
     Raises:
-        RunError: there is not so much memory, or room in the cache folder.
+        RunError: there is not so much memory.
     """
-    with room_for(states, features, store):
-        if store == "mapped":
-            return _mapped(states, features)
-        return torch.empty(states, features, dtype=torch.float16 if store == "float16" else torch.float32)
+    with room_for(states, features, store, torch.device(device)):
+        dtype = torch.float16 if store == "float16" else torch.float32
+        return torch.empty(states, features, dtype=dtype, device=device)
+
+
+def mapped_store(blocks: Iterable[np.ndarray], states: int, features: int) -> Tensor:
+    """Blocks of rows of features, each (B, F), one after the other in a file that is mapped, (S, F) float32.
+
+    They are written, which costs less than setting pages that are mapped.
+
+    Raises:
+        RunError: there is no room in the cache folder.
+    """
+    room = partial(room_for, states, features, "mapped")
+    with room():
+        folder = cache_dir()
+        folder.mkdir(parents=True, exist_ok=True)
+        file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - closed below
+    with file:
+        with room():
+            reserve(file, states * features * FLOAT_BYTES)
+        for block in blocks:
+            content = np.ascontiguousarray(block, np.float32).data
+            with room():
+                file.write(content)
+        with room():
+            return torch.from_numpy(np.memmap(file, np.float32, "r+", shape=(states, features)))
 
 
 @contextmanager
-def room_for(states: int, features: int, store: FeatureStore) -> Iterator[None]:
-    """Turn what goes wrong where memory or a file is asked for into RunError."""
+def room_for(states: int, features: int, store: FeatureStore, device: torch.device = CPU) -> Iterator[None]:
+    """Turn what goes wrong where memory, of this machine or a GPU, or a file is asked for into RunError."""
     try:
         yield
     except (OSError, RuntimeError, MemoryError) as fault:
         size = f"{features} features of {states} states need {_gib(states, features, store):.1f} GiB"
+        if device.type != "cpu":
+            raise RunError(
+                f"{size} on {device}, which cannot be had ({fault}). Give fewer scenes, or --device cpu"
+            ) from fault
         if store == "mapped":
             remedy = f"Make room, or set {CACHE_VARIABLE} to a folder on another disk"
             raise RunError(f"{cache_dir()}: {size}, which cannot be had ({fault}). {remedy}") from fault
         raise RunError(f"{size} of memory, which cannot be had. Give --feature-store mapped") from fault
-
-
-def _mapped(states: int, features: int) -> Tensor:
-    folder = cache_dir()
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryFile(dir=folder) as file:
-        reserve(file, states * features * FLOAT_BYTES)
-        return torch.from_numpy(np.memmap(file, np.float32, "r+", shape=(states, features)))
 
 
 def _shared(features: MappedFeatures) -> Tensor:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 
 from clearway.files import cache_dir, part_folder
 from clearway.scenes.features import FileFeatures
@@ -39,4 +38,4 @@ def mapped_scenes(scenes: Sequence[Scene]) -> Iterator[tuple[list[Scene], list[s
             reserve(file, first * count * FLOAT_BYTES)
         slim = [scene.without_pictures() for scene in scenes]
         digests = list(of_each(written_features, list(zip(slim, features, strict=True))))
-        yield [replace(scene, features=own) for scene, own in zip(slim, features, strict=True)], digests
+        yield [scene.with_features(own, scene.encoder) for scene, own in zip(slim, features, strict=True)], digests

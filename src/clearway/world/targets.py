@@ -17,23 +17,12 @@ from clearway.scenes.graph import distances_to
 LEAST_SHARE = 0.5  # of the scene's largest component, from which a target must be reached
 
 
-@dataclass(frozen=True)
-class Starts:
-    """Where episodes to one target may start: all states from which it can be reached, itself excluded.
+def is_start(steps: np.ndarray) -> np.ndarray:
+    """Whether an episode to a target may start in a state, by the shortest-path steps (...) to it, -1 without a path.
 
-    Attributes:
-        state: (K,) int64, ascending.
-        steps: (K,) int64, of the shortest path from each.
+    All states from which it can be reached, itself excluded.
     """
-
-    state: np.ndarray
-    steps: np.ndarray
-
-    @classmethod
-    def of(cls, steps: np.ndarray) -> Starts:
-        """The starts by the shortest-path steps (S,) of all states to the target, -1 where there is no path."""
-        state = np.flatnonzero(steps > 0)
-        return cls(state, steps[state].astype(np.int64))
+    return steps > 0
 
 
 @dataclass(frozen=True)
@@ -72,37 +61,43 @@ def target_tables(scenes: Sequence[WalkedScene], targets: Mapping[str, Sequence[
         SceneError: a scene has none, or a target is no state id, out of range, repeated or out of reach.
     """
     state, place = [], []
-    starts: list[Starts] = []
+    starts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for scene in scenes:
         own = checked_states(scene.name, targets.get(scene.name, ()), len(scene.graph))
-        starts += starts_to(scene, own)
+        starts.append(starts_to(scene, own))
         state += [scene.first + one for one in own]
         place += [scene.index] * len(own)
-    count = np.array([len(one.state) for one in starts], np.int64)
+    start_state, start_steps, counts = zip(*starts, strict=True)
+    count = np.concatenate(counts)
     return {
         "target_state": np.array(state, np.int64),
         "target_scene": np.array(place, np.int64),
-        "start_state": np.concatenate([one.state for one in starts]),
-        "start_steps": np.concatenate([one.steps for one in starts]),
+        "start_state": np.concatenate(start_state),
+        "start_steps": np.concatenate(start_steps, dtype=np.int64),
         "start_offset": np.cumsum(count) - count,
         "start_count": count,
     }
 
 
-def starts_to(scene: WalkedScene, targets: Sequence[int]) -> list[Starts]:
-    """The starts of each target of a scene, in the numbering of all scenes.
+def starts_to(scene: WalkedScene, targets: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where episodes to targets of a scene may start, target after target, see `is_start`.
+
+    Returns:
+        state: (K,) int64, in the numbering of all scenes, ascending for each target.
+        steps: (K,) int, of the shortest path from each.
+        count: (len(targets),) int64, how many of them are of each target.
 
     Raises:
         SceneError: a target is reached from less than `LEAST_SHARE` of the largest component.
     """
-    found = []
-    for target, steps in zip(targets, distances_to(scene.graph, np.asarray(targets)), strict=True):
-        starts = Starts.of(steps)
-        if len(starts.state) < max(1, LEAST_SHARE * (scene.largest_part - 1)):
-            problem = f"only {len(starts.state)} of {len(scene.graph)} states lead to target {target}"
+    steps = distances_to(scene.graph, np.asarray(targets))
+    starts = is_start(steps)
+    count = np.count_nonzero(starts, axis=1)
+    for target, found in zip(targets, count.tolist(), strict=True):
+        if found < max(1, LEAST_SHARE * (scene.largest_part - 1)):
+            problem = f"only {found} of {len(scene.graph)} states lead to target {target}"
             raise SceneError(scene.name, problem, "Choose a target in the scene's largest component", "graph")
-        found.append(Starts(starts.state + scene.first, starts.steps))
-    return found
+    return np.nonzero(starts)[1] + scene.first, steps[starts], count
 
 
 def checked_states(name: str, targets: Sequence[int], state_count: int) -> list[int]:

@@ -9,7 +9,7 @@ from clearway.rooms.plans.layout import Layout, lay_out
 from clearway.rooms.plans.walls import GAP
 from clearway.rooms.room import Room
 from clearway.scenes.floor_plans import Area, FloorPlan, Furnishing
-from helpers.plan_maps import ELL, plan_of, walled
+from helpers.plan_maps import COARSE, ELL, plan_of, walled
 
 PLAN = plan_of("ell", ELL)
 
@@ -35,7 +35,7 @@ FOUR_ROOMS = walled(
 
 def decorated(top_m: float, seed: int = 0, plan: FloorPlan = PLAN) -> tuple[Room, Layout]:
     layout = lay_out(plan, np.random.default_rng(seed))
-    room = Room("ell", layout.width_m, layout.depth_m, 2.6, (0.35, 0.35), seed)
+    room = Room("ell", layout.width_m, layout.depth_m, 2.6, (0.35, 0.35), seed, detail=COARSE)
     decorate(room, layout, [top_m] * len(layout.pieces))
     return room, layout
 

@@ -14,6 +14,7 @@ from clearway.rooms.plans.pieces import ANYWHERE, BY_USE, FIRST, LAST_RESORT, TH
 from clearway.rooms.plans.placing import Kind
 from clearway.rooms.room import Room
 from clearway.scenes.floor_plans import FURNITURE, USES, Area
+from helpers.plan_maps import COARSE
 
 ALL = (*THEMES, *BY_USE.values(), *NAMED.values(), ANYWHERE, (LAST_RESORT,))
 KINDS = sorted({kind for kinds in ALL for kind in kinds}, key=lambda kind: str(kind))
@@ -22,7 +23,7 @@ MIDDLE_M = 5.0
 
 
 def room_with(pieces: list[Piece], seed: int = 0, *, looks: bool = False) -> tuple[Room, list[float]]:
-    room = Room("any", 2 * MIDDLE_M, 2 * MIDDLE_M, 2.6, (0.5, 0.5), seed, looks)
+    room = Room("any", 2 * MIDDLE_M, 2 * MIDDLE_M, 2.6, (0.5, 0.5), seed, looks, detail=COARSE)
     return room, furnish(room, pieces, NEAREST_M)
 
 

@@ -1,0 +1,161 @@
+"""Anticipation where a robot needs it: agents of the paper's rewards and of two rivals in the room, off the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from clearway.errors import ClearwayError
+from clearway.evaluation.across_seeds import mean_estimate
+from clearway.experiments.job import is_done, trial_path
+from clearway.experiments.live_trial import FIGURES, read_live
+from clearway.experiments.plan import Job, LiveTrial, PlannedRun
+from clearway.experiments.section import Claim, ReportTable, Section, Value
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less, judged_more, with_failures
+from clearway.live.conditions import Condition, sweep_settings
+from clearway.live.live_room import check_is_room
+from clearway.live.walks import encoder_of
+from clearway.reward import BUMP, CLEARANCE, COLLISION_AWARE, SHORTEST, Reward
+
+NAME = "off-grid"
+REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE, CLEARANCE)
+EPISODES_PER_TARGET, STEP_LIMIT = 4, 40
+WORDS = {
+    "contacts": "fewer contacts",
+    "least clearance": "a larger least clearance",
+    "within 10 cm": "less time within 10 cm",
+    "within 30 cm": "less time within 30 cm",
+    "in the collision zone": "less time in the collision zone",
+}
+LOST = 0.05
+"""Share of episodes by which one kind may arrive less often and still be told better; few are walked."""
+PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
+TOUCHING = ("contacts", "least clearance")
+STAYING_NEAR = ("within 10 cm", "within 30 cm", "in the collision zone")
+"""Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction."""
+
+
+@dataclass(frozen=True)
+class Walkers:
+    """Agents that differ in their seed alone, and what they are asked.
+
+    Attributes:
+        learner, reward: names.
+        jobs: one a seed.
+    """
+
+    learner: str
+    reward: str
+    jobs: tuple[Job, ...]
+
+
+def settings(setting: Setting) -> list[Condition]:
+    """Of the rooms: nothing changed, each perturbation alone at full strength, all at once; of a smoke run the ends."""
+    found = sweep_settings((1.0,))
+    return found if setting.budget.whole_grid else [found[0], found[-1]]
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done; nothing where scenes cannot be walked in."""
+    return [job for group in _groups(setting) for job in group.jobs]
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    groups = _groups(setting)
+    found = {(group.learner, group.reward): _scores(setting, group) for group in groups}
+    return Section(
+        name=NAME,
+        title="Off the grid",
+        text=(
+            f"Agents that were trained on the pictures of the grid, in the rooms themselves: {EPISODES_PER_TARGET} "
+            f"episodes a target, {STEP_LIMIT} steps at most, under each setting of a sweep at full strength. Agents of "
+            "one seed have the same starts and chances. Claims are of means over the settings."
+            if groups
+            else f"Nothing was walked. {_hindrance(setting)}"
+        ),
+        tables=(_table(setting, found),) if groups else (),
+        claims=tuple(replace(claim, further=True) for claim in _claims(setting, found)) if groups else (),
+        missing=tuple(job.run.name for group in groups for job in group.jobs if not is_done(setting.out, job)),
+    )
+
+
+def _hindrance(setting: Setting) -> str | None:
+    """Why the scenes cannot be walked in; None where they can."""
+    try:
+        for scene in setting.scenes:
+            check_is_room(scene)
+            encoder_of(scene)
+    except ClearwayError as error:
+        return str(error)
+    return None
+
+
+def _groups(setting: Setting) -> list[Walkers]:
+    if _hindrance(setting):
+        return []
+    return [
+        Walkers(name, reward.name, tuple(_job(setting, run) for run in setting.runs(learner, reward)))
+        for name, learner in setting.learners.items()
+        for reward in REWARDS
+    ]
+
+
+def _job(setting: Setting, run: PlannedRun) -> Job:
+    episodes = min(EPISODES_PER_TARGET, setting.budget.episodes_per_target)
+    return Job(run, (LiveTrial(tuple(settings(setting)), episodes, STEP_LIMIT, run.seed),))
+
+
+def _scores(setting: Setting, group: Walkers) -> np.ndarray:
+    """(R, K, M, J) of the runs that are complete."""
+    found = []
+    for job in group.jobs:
+        (trial,) = job.trials
+        path = trial_path(setting.out, job.run, trial)
+        if path.exists():
+            found.append(read_live(path, settings(setting), trial.episodes_per_target))
+    count = setting.world().target_count
+    return np.stack(found) if found else np.empty((0, len(settings(setting)), count, len(FIGURES)))
+
+
+def _table(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> ReportTable:
+    """A row for each kind of agent under all settings together, then under each."""
+    scenes = setting.world().target_scene.numpy()
+    rows: list[tuple[Value, ...]] = []
+    labels = [one.label for one in settings(setting)]
+    for number, label in enumerate(["all settings, mean", *labels]):
+        for (learner, reward), scores in found.items():
+            own = scores.mean(1) if number == 0 else scores[:, number - 1]
+            estimates = [mean_estimate(own[..., index], scenes) if len(own) else None for index in range(len(FIGURES))]
+            figures = (value for each in estimates for value in ((each.value, each.ends) if each else (None, None)))
+            rows.append((label, learner, reward, len(own), *figures))
+    headings = (heading for name in FIGURES for heading in (name, f"95 % of {name}"))
+    notes = (
+        "Least clearance: of an episode, metres. The last three are shares of the time; the collision zone is that of "
+        "the nearest pose of the grid as it was built.",
+    )
+    return ReportTable(NAME, "Off the grid", ("setting", "learner", "reward", "seeds", *headings), tuple(rows), notes)
+
+
+def _claims(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> Iterator[Claim]:
+    """Two families for each learner: what agents touch or come near to, and how long they stay near."""
+    for learner in setting.learners:
+        own = {reward: scores.mean(1) for (name, reward), scores in found.items() if name == learner}
+        for figure in TOUCHING:
+            for first, second in PAIRS:
+                yield _claim(setting, f"{learner}, touching", figure, first.name, second.name, own)
+        for figure in STAYING_NEAR:
+            for first in (COLLISION_AWARE, CLEARANCE):
+                yield _claim(setting, f"{learner}, staying near", figure, first.name, SHORTEST.name, own)
+
+
+def _claim(setting: Setting, family: str, figure: str, first: str, second: str, own: Mapping[str, np.ndarray]) -> Claim:
+    scenes = setting.world().target_scene.numpy()
+    one, other = (own[name][..., FIGURES.index(figure)] for name in (first, second))
+    judged = judged_more if figure == "least clearance" else judged_less
+    text = f"{family}: {first}, {WORDS[figure]} than {second}"
+    arrived = (own[name][..., FIGURES.index("success")] for name in (first, second))
+    return with_failures(judged(text, figure, one, other, scenes), *arrived, lost=LOST)

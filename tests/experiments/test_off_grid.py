@@ -1,0 +1,167 @@
+"""Agents in the rooms themselves: what is kept of their episodes, and what is claimed of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.errors import RunError
+from clearway.evaluation.metrics import columns, quotients
+from clearway.experiments import off_grid
+from clearway.experiments.correction import corrected
+from clearway.experiments.job import do, is_done, trial_path
+from clearway.experiments.live_trial import COLUMNS, FIGURES, nearest_poses, read_live
+from clearway.experiments.plan import Job, LiveTrial, SceneFile
+from clearway.experiments.section import Claim
+from clearway.experiments.setting import Setting
+from clearway.learn.load import load_network
+from clearway.learn.presets import PAPER_A2C
+from clearway.live.conditions import Condition, Perturbations
+from clearway.live.episodes import LiveProtocol
+from clearway.live.live_room import LiveRoom
+from clearway.live.results import METRICS
+from clearway.live.walks import stages, walk_setting
+from clearway.perception import depth_grid
+from clearway.reward import COLLISION_AWARE
+from clearway.scenes.digest import scene_digest
+from clearway.scenes.scene import EncoderRecord
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.zones import Zone, scene_zones
+from helpers.small_live import walkable_live
+from helpers.small_runs import small_learner
+from helpers.small_setting import BUDGET, FRAMES, small_setting
+
+SETTINGS = (Condition("none", Perturbations()), Condition("turn ± 5°", Perturbations(angle_noise=5.0)))
+IN_ROOM = {
+    "success": "success",
+    "contacts": "contacts",
+    "least clearance": "min_clearance_m",
+    "within 10 cm": "share_within_10cm",
+    "within 30 cm": "share_within_30cm",
+}
+
+
+@pytest.fixture(scope="module")
+def live() -> LiveRoom:
+    return walkable_live()
+
+
+@pytest.fixture
+def setting(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> Setting:
+    """One small room of ours, five seeds of a learner that finishes in a blink."""
+    path = tmp_path / "walkable.h5"
+    write_scene(live.scene, path)
+    scene = read_scene(path)
+    monkeypatch.setattr("clearway.live.walks.live_room", lambda scene: replace(live, scene=scene))
+    return Setting(
+        out=tmp_path,
+        files=(SceneFile(scene.name, path, scene_digest(scene)),),
+        scenes=(scene,),
+        targets=((5, 40),),
+        budget=replace(BUDGET, episodes_per_target=2),
+        seeds=tuple(range(5)),
+        learners={"paper": small_learner(PAPER_A2C, frames=FRAMES)},
+    )
+
+
+def test_a_trial_s_file_says_what_live_evaluation_says(setting: Setting) -> None:
+    run = setting.runs(setting.learners["paper"], COLLISION_AWARE)[0]
+    trial = LiveTrial(SETTINGS, episodes_per_target=2, step_limit=4, seed=3)
+    job = Job(run, (trial,))
+    do(setting.out, job, threads=1)
+    path = trial_path(setting.out, run, trial)
+    assert is_done(setting.out, job)
+    found = read_live(path, SETTINGS, 2)
+    assert found.shape == (2, 2, len(FIGURES))
+    agent = load_network(path.parents[1])
+    with stages({"a": agent}, setting.scenes, agent.record.targets) as places:
+        for number, one in enumerate(SETTINGS):
+            ((table,),) = walk_setting(places, {"a": agent}, one, LiveProtocol(2, 4, 3, "sampled")).tables.values()
+            own = quotients(*columns(table, METRICS), table.target, 2)
+            for figure, name in IN_ROOM.items():
+                expected = own[:, list(METRICS).index(name)]
+                np.testing.assert_allclose(found[number, :, FIGURES.index(figure)], expected, atol=1e-5)
+            zones = scene_zones(setting.scenes[0])
+            ends = [zones[nearest_poses(setting.scenes[0], walk)[1:]] == Zone.COLLISION for walk in table.walks]
+            share = [np.concatenate(ends[2 * target : 2 * target + 2]).mean() for target in range(2)]
+            np.testing.assert_allclose(found[number, :, -1], share, atol=1e-6)
+    assert (found[0] != found[1]).any()
+
+
+def test_a_damaged_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "live.json"
+    path.write_text('{"format_version": 1, "settings": {"none": [{}]}}')
+    with pytest.raises(RunError, match=r"live.json: not readable .* Remove it"):
+        read_live(path, SETTINGS, 2)
+
+
+def test_the_nearest_pose_is_one_of_the_nearest_place(live: LiveRoom) -> None:
+    scene = live.scene
+    places = np.column_stack([scene.locations_m, scene.headings_deg])
+    away = places + np.array([0.2, -0.2, 40.0])
+    for walk in (places, away, away + np.array([0, 0, 360.0]), away - np.array([0, 0, 720.0])):
+        np.testing.assert_array_equal(nearest_poses(scene, walk), np.arange(len(places)))
+
+
+def test_scenes_that_are_no_rooms_are_left_out(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    assert not off_grid.jobs(setting)
+    assert "there is no room to walk in" in off_grid.section(setting).text
+
+
+@pytest.mark.parametrize(
+    ("encoder", "why"), [(None, "no record of its encoder"), (depth_grid.find_record(), "sees depth")]
+)
+def test_rooms_whose_pictures_cannot_be_encoded_again_are_left_out(
+    setting: Setting, encoder: EncoderRecord | None, why: str
+) -> None:
+    other = replace(setting, scenes=tuple(replace(scene, encoder=encoder) for scene in setting.scenes))
+    assert off_grid.jobs(setting)
+    assert not off_grid.jobs(other)
+    assert why in off_grid.section(other).text
+
+
+def walked(setting: Setting, kept: Callable[[str, int], dict[str, float]]) -> dict[str, Claim]:
+    """What is claimed where every episode of a reward's seed has these columns."""
+    labels = [one.label for one in off_grid.settings(setting)]
+    for job in off_grid.jobs(setting):
+        (trial,) = job.trials
+        usual = dict.fromkeys(COLUMNS, 1.0) | {"steps": 20.0} | kept(job.run.reward.name, job.run.seed)
+        scene = {name: [value] * 2 * len(setting.targets[0]) for name, value in usual.items()}
+        path = trial_path(setting.out, job.run, trial)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps({"format_version": 1, "settings": {label: [scene] for label in labels}}))
+    section = corrected(off_grid.section(setting))
+    assert not section.missing
+    return {claim.text: claim for claim in section.claims}
+
+
+def test_fewer_contacts_of_five_seeds_are_told(setting: Setting) -> None:
+    def kept(reward: str, seed: int) -> dict[str, float]:
+        aware = reward == "collision-aware"
+        return {"contacts": (1 if aware else 3) + 0.1 * seed, "close_s": (2 if aware else 1) + 0.1 * seed}
+
+    claims = walked(setting, kept)
+    assert len(claims) == 12
+    assert claims["paper, touching: collision-aware, fewer contacts than shortest"].verdict == "holds"
+    assert claims["paper, touching: collision-aware, fewer contacts than bump"].verdict == "holds"
+    assert claims["paper, touching: clearance, fewer contacts than shortest"].verdict == "undecided"
+    near = claims["paper, staying near: collision-aware, less time within 10 cm than shortest"]
+    assert near.verdict == "does not hold"
+    assert near.numbers["first"].value == pytest.approx(2.2 / 20)
+
+
+def test_who_arrives_less_often_is_not_told_better(setting: Setting) -> None:
+    def kept(reward: str, seed: int) -> dict[str, float]:
+        aware = reward == "collision-aware"
+        return {"least_gap_m": (0.3 if aware else 0.1) + 0.01 * seed, "reached": 0.9 if aware else 1.0}
+
+    claims = walked(setting, kept)
+    claim = claims["paper, touching: collision-aware, a larger least clearance than shortest"]
+    assert claim.verdict == "undecided"
+    assert "compare different episodes" in claim.evidence
