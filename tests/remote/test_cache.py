@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import ClearwayError
-from clearway.remote import cache
+from clearway.remote import leases
 from clearway.remote.address import fetched_folder, origin
 from clearway.remote.cache import LIMIT_VARIABLE, fetched
 from clearway.remote.store import Store
@@ -29,8 +29,8 @@ def web(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 def end_process() -> None:
     """Give this process's lease back, as its end would."""
-    cache._lease(fetched_folder(), os.getpid()).end()
-    cache._lease.cache_clear()
+    leases.lease_of(fetched_folder()).end()
+    leases._made.cache_clear()
 
 
 def kept() -> str:
@@ -98,9 +98,9 @@ def test_a_clock_that_jumps_takes_nothing_from_who_uses_it(
 def test_what_another_process_has_fetched_stays(web: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LIMIT_VARIABLE, "2.5e-6")
     fetched([f"{web}/a.h5", f"{web}/b.h5"], SUFFIXES)
-    other = cache._lease(fetched_folder(), os.getpid())  # as if of another process
-    cache._lease.cache_clear()
-    with pytest.raises(ClearwayError, match=r"0.0 GB are to be kept here, 0.0 GB by others .* the limit is 2.5e-06 GB"):
+    other = leases.lease_of(fetched_folder())  # as if of another process
+    leases._made.cache_clear()
+    with pytest.raises(ClearwayError, match=r"1e-06 GB are to be kept here, 2e-06 GB by others .* is 2.5e-06 GB"):
         fetched([f"{web}/c.h5"], SUFFIXES)
     assert kept() == "ab"
     end_process()

@@ -8,6 +8,7 @@ import pytest
 
 from clearway.errors import ClearwayError
 from clearway.remote import store
+from clearway.remote.address import RECORDS
 from clearway.remote.cache import fetched
 from helpers.servers_of_files import CutShort, GoogleStore, Shrunk, files_of, silent_server, web_server
 
@@ -19,7 +20,7 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     yield
     left = [path for path in (tmp_path / "cache/remote").glob("*") if not path.name.startswith(".")]
-    assert all((path / "address.txt").exists() for path in left)
+    assert all((path.parent / RECORDS / path.name).exists() for path in left)
     assert not list((tmp_path / "cache/remote").glob("*.part"))
 
 

@@ -14,6 +14,7 @@ from clearway.errors import ArgumentError
 from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.plugged import own_encoder
 from clearway.regular_files import read_ahead
+from clearway.remote.passing import in_turn
 from clearway.rooms import ROOM_NAMES
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
@@ -84,8 +85,15 @@ def scenes_and_files(sources: Scenes, *, features_in_file: bool = False) -> list
         raise ArgumentError("scenes: none given. Give at least one scene or scene file")
     files = [file for _, file in named if file is not None]
     many = features_in_file  # else they are large messages
-    loaded = iter(list(of_each(_explored, files, read_ahead) if many else map(read_scene, files)))
+    loaded = iter(list(of_each(_explored, files, _read_soon) if many else map(read_scene, in_turn(files))))
     return [(next(loaded) if scene is None else scene, file) for scene, file in named]
+
+
+def _read_soon(files: Sequence[Path]) -> None:
+    """Have files come that this process reads next."""
+    for _ in in_turn(files):
+        pass
+    read_ahead(files)
 
 
 def _explored(file: Path) -> Scene:

@@ -50,7 +50,7 @@ class Photographs:
     """
 
     paths: tuple[Path, ...]
-    stamps: tuple[tuple[int, ...], ...]
+    stamps: tuple[tuple[int | str, ...], ...]
     shape: tuple[int, ...]
 
     def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:

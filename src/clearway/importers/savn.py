@@ -54,7 +54,7 @@ class NamedPictures:
     path: Path
     names: tuple[str, ...]
     shape: tuple[int, ...]
-    stamp: tuple[int, ...]
+    stamp: tuple[int | str, ...]
 
     def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
         """The pictures asked for.

@@ -22,7 +22,7 @@ from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import ScenePolicy
-from clearway.remote.address import address_of
+from clearway.remote.address import address_of, is_fetched
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES
@@ -181,7 +181,7 @@ def _places(record: RunRecord) -> dict[str, str]:
         return {}
     from clearway.remote.cache import fetched
 
-    return dict(zip(addresses, map(str, fetched(addresses, SCENE_SUFFIXES)), strict=True))
+    return dict(zip(addresses, map(str, fetched(addresses, SCENE_SUFFIXES, may_pass=True)), strict=True))
 
 
 def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Scene:
@@ -189,7 +189,7 @@ def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Sc
         if name not in given:
             raise RunError(f"scene {name} of the run is not among the files given. Add it to --scenes")
         return given[name]
-    if path is None or not Path(path).exists():
+    if path is None or not (Path(path).exists() or is_fetched(Path(path))):
         raise RunError(f"{path or name}: the run's scene file is missing. Give it with --scenes")
     return read_scene(Path(path), name=name)
 

@@ -7,12 +7,11 @@ import re
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
-from clearway.files import cache_dir
-from clearway.regular_files import read_text
+from clearway.files import cache_dir, read_json
 
-MAX_ADDRESS_BYTES = 64 * 1024
+MAX_RECORD_BYTES = 64 * 1024
 EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to install, by scheme
-ADDRESS_FILE = "address.txt"  # beside a file that was fetched
+RECORDS = ".records"  # where every file came from that was fetched, by its entry's name
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
 
 
@@ -35,13 +34,18 @@ def without_query(address: str) -> str:
 
 
 def fetched_folder() -> Path:
-    """Where files that were fetched are kept, each in a folder of its own."""
+    """Where files that were fetched are kept, each in a folder of its own, its entry."""
     return cache_dir() / "remote"
+
+
+def is_fetched(path: Path) -> bool:
+    """Whether a path is that of a file which was fetched; it may have gone since, to make room for others."""
+    return path.resolve().parent.parent == fetched_folder().resolve()
 
 
 def origin(path: Path) -> str:
     """Where a file can be had again: the address of one that was fetched, the whole path of any other."""
     path = path.resolve()
-    if path.parent.parent == fetched_folder().resolve():
-        return read_text(path.parent / ADDRESS_FILE, MAX_ADDRESS_BYTES)
+    if is_fetched(path):
+        return str(read_json(fetched_folder() / RECORDS / path.parent.name, MAX_RECORD_BYTES)["address"])
     return str(path)

@@ -30,7 +30,7 @@ class FileFeatures:
 
     path: Path
     shape: tuple[int, ...]
-    stamp: tuple[int, ...]
+    stamp: tuple[int | str, ...]
 
     @property
     def dtype(self) -> np.dtype:

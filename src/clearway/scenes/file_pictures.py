@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import SceneError
+from clearway.remote.address import is_fetched
 from clearway.scenes.hdf5 import check_layout, need_dataset, opened, read_values
 
 BLOCK_PICTURES = 64  # pictures that walk through memory together when all of them are read
@@ -33,7 +34,7 @@ class FilePictures:
     path: Path
     dataset: str
     shape: tuple[int, ...]
-    stamp: tuple[int, ...]
+    stamp: tuple[int | str, ...]
     dtype: str = "uint8"
 
     def __getitem__(self, index: int | slice | np.ndarray) -> np.ndarray:
@@ -65,8 +66,13 @@ def _runs(ascending: np.ndarray) -> slice | np.ndarray:
     return slice(first, last + 1) if last - first + 1 == len(ascending) else ascending
 
 
-def file_stamp(path: Path) -> tuple[int, ...]:
-    """Device, inode, size and time of change: differs once a file is replaced or written to; () if it is gone."""
+def file_stamp(path: Path) -> tuple[int | str, ...]:
+    """Device, inode, size and time of change: differs once a file is replaced or written to; () if it is gone.
+
+    Of a file that was fetched, the name of its entry in the cache: it may go and come again, and is the same one.
+    """
+    if is_fetched(path):
+        return (path.resolve().parent.name,)
     try:
         status = path.stat()
     except OSError:

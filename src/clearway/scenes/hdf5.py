@@ -19,6 +19,7 @@ import numpy as np
 from clearway.errors import SceneError, reason_of
 from clearway.files import parse_json, written_whole
 from clearway.regular_files import name_of_opened
+from clearway.remote.passing import at_hand
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
@@ -55,7 +56,19 @@ def faults_named(source: Path, dataset: str = "", problem: str = "cannot be read
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file at `path`, open for reading. Raises SceneError where it is missing or not HDF5."""
+    """The HDF5 file at `path`, open for reading; one from elsewhere that has gone from the cache comes again.
+
+    Raises:
+        SceneError: it is missing or not HDF5.
+        ClearwayError: it cannot be had again.
+    """
+    with at_hand(path), _opened_here(path) as file:
+        yield file
+
+
+@contextmanager
+def _opened_here(path: Path) -> Iterator[h5py.File]:
+    """A file of this machine, see `opened`."""
     if path.is_dir():
         raise SceneError(path, "is a folder", "Name a scene file in it")
     if not path.exists():

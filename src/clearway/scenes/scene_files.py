@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from clearway.errors import ClearwayError
-from clearway.remote.address import address_of
+from clearway.remote.address import address_of, is_fetched
 
 SCENE_SUFFIXES = (".h5", ".hdf5")
 
@@ -24,13 +24,13 @@ def scene_files(paths: Sequence[Path]) -> list[Path]:
         if (address := address_of(path)) is not None:
             from clearway.remote.cache import fetched
 
-            files += fetched([address], SCENE_SUFFIXES)
+            files += fetched([address], SCENE_SUFFIXES, may_pass=True)  # `hdf5.opened` has them come
         elif path.is_dir():
             found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
             if not found:
                 raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
             files += found
-        elif path.exists():
+        elif path.exists() or is_fetched(path):
             files.append(path)
         else:
             raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")

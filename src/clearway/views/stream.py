@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import ArgumentError, SceneError
+from clearway.remote.passing import in_turn
 from clearway.scenes.scene_files import scene_files
 from clearway.scenes.sensors import Sensor
 from clearway.views.settings import ViewSettings, differing
@@ -201,7 +202,8 @@ class Views:
         room = np.repeat([block.room for block in blocks], [block.poses * takes for block in blocks])
         chosen = [sensor for sensor in self.sensors if sensor.name in names]
         seen = {sensor.name: np.empty((len(room), *sensor.shape), sensor.kept_dtype) for sensor in chosen}
-        for block in blocks:
+        paths = [self.shards[block.room].path for block in blocks]
+        for block, _ in zip(blocks, in_turn(paths), strict=True):
             shard = self.shards[block.room]
             rows = slice(block.first * takes, (block.first + block.poses) * takes)
             end = begin + block.poses * takes
@@ -232,7 +234,7 @@ def views_in(paths: Sequence[Path]) -> Views:
         ClearwayError: there is no such file, a folder holds none, a file is no sound shard, or they do not belong
             together.
     """
-    shards = [read_shard(path) for path in scene_files(paths)]
+    shards = list(map(read_shard, in_turn(scene_files(paths))))
     first, seen = shards[0], set()
     for shard in shards:
         if other := differing(shard.settings, first.settings):
