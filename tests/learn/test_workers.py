@@ -16,6 +16,7 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
+from clearway.learn.crew import launched
 from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
@@ -23,6 +24,7 @@ from clearway.scenes.thor_v1 import write_scene
 from helpers import killed_workers
 from helpers.crew_processes import PATIENCE_S, wait_until, workers_of
 from helpers.made import corridor_scene
+from helpers.one_fails import WORDS, OneFails
 from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 KILLS = int(os.environ.get("CLEARWAY_KILLS", "5"))
@@ -164,6 +166,13 @@ def test_an_error_of_one_worker_ends_all_with_its_words(tmp_path: Path) -> None:
         train_by_workers(request, tmp_path / "run", 2, threads=1)
     assert time.monotonic() - began < PATIENCE_S
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.slow
+def test_an_error_of_one_worker_is_heard_by_those_who_wait_for_it(tmp_path: Path) -> None:
+    began = time.monotonic()
+    assert launched(OneFails(tmp_path, os.getpid(), 1, "cpu"), 2) == [WORDS, WORDS]
+    assert time.monotonic() - began < PATIENCE_S
 
 
 @pytest.mark.slow
