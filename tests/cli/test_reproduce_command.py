@@ -229,6 +229,8 @@ def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     assert (list(joined.names), joined.commands) == (["table1", "fig3"], ("one", "two"))
     other = replace(second, frames=9)
     assert reproduce._with_earlier(other) == other
+    fresh = replace(second, first_seed=5)
+    assert reproduce._with_earlier(fresh) == fresh
     spelt = replace(second, seeds=5)  # the budget's own number
     assert list(reproduce._with_earlier(spelt).names) == ["table1", "fig3"]
     (tmp_path / reproduce.REQUEST_FILE).write_text(json.dumps(content | {"learners": ["default", "paper"]}))
@@ -238,6 +240,19 @@ def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     assert reproduce._with_earlier(second) == second
     respelt = replace(second, changes=("envs=5", "lr_start=2e-3"))
     assert list(reproduce._with_earlier(respelt).names) == ["table1", "fig3"]
+
+
+def test_seeds_begin_where_they_are_told_to(dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Job] = []
+    monkeypatch.setattr(reproduce, "run_jobs", lambda _, jobs, **__: asked.extend(jobs))
+    request = ReproduceRequest(
+        names=("fig4",), out=tmp_path, budget="smoke", dumps=sorted(dumps.iterdir()), seeds=2, first_seed=5
+    )
+    assert reproduce.reproduce(request).setting.seeds == (5, 6)
+    assert {job.run.seed for job in asked} == {5, 6}
+    assert reproduce.gather(tmp_path).setting.seeds == (5, 6)
+    with pytest.raises(ValueError, match="-1 where a number of at least 0 is expected"):
+        reproduce._checked(replace(request, first_seed=-1))
 
 
 def test_the_command_that_ends_last_reports_what_others_asked_for_meanwhile(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
-from clearway.cli.arguments import check_at_least, scene_files
+from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, say
 from clearway.errors import ClearwayError
 
@@ -44,6 +44,8 @@ class Reproduce:
     """For the default rooms, as for clearway scenes build; the published figures were made with random-resnet50."""
     seeds: int | None = None
     """Agents of each kind; by default as the budget says."""
+    first_seed: int = 0
+    """Of the agents: --seeds 5 --first-seed 5 trains those of seeds 5 to 9, which an answer in hand has not seen."""
     learners: tuple[LearnerName, ...] = ("paper", "default")
     """paper: the paper's settings, synchronous; paper-a3c: asynchronous, far slower; default: the recipe."""
     set: tuple[str, ...] = ()
@@ -63,6 +65,7 @@ class Reproduce:
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
 
         check_at_least(1, threads=self.threads, seeds=self.seeds, workers=self.workers, frames=self.frames)
+        check_seeds(first_seed=self.first_seed)
         if not self.names:
             raise ClearwayError(f"no experiment named. Name some of {', '.join(EXPERIMENTS)}, or all")
         if self.rooms and self.scenes:
@@ -81,6 +84,7 @@ class Reproduce:
             frames=self.frames,
             encoder=self.encoder,
             seeds=self.seeds,
+            first_seed=self.first_seed,
             learners=list(dict.fromkeys(self.learners)),
             changes=self.set,
             workers=self.workers,

@@ -37,6 +37,7 @@ class ReproduceRequest:
         frames: of every learner; None: as the budget says.
         encoder: for the default rooms.
         seeds: how many; None: as the budget says.
+        first_seed: of them; the others follow it.
         learners: names among `setting.LEARNERS`.
         changes: of settings of every learner, such as "lr_start=0.002".
         workers: jobs side by side; None: as many as cores and memory allow.
@@ -53,6 +54,7 @@ class ReproduceRequest:
     frames: int | None = None
     encoder: str = "auto"
     seeds: int | None = None
+    first_seed: int = 0
     learners: Sequence[LearnerName] = ("paper", "default")
     changes: Sequence[str] = ()
     workers: int | None = None
@@ -152,9 +154,9 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
         unknown = [name for name in given if name not in get_args(kind)]
         if unknown:
             raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(get_args(kind))}")
-    for count in (request.frames, request.seeds):
-        if count is not None and (type(count) is not int or count < 1):
-            raise ValueError(f"{count!r:.40} where a number of at least 1 is expected")
+    for count, least in ((request.frames, 1), (request.seeds, 1), (request.first_seed, 0)):
+        if count is not None and (type(count) is not int or count < least):
+            raise ValueError(f"{count!r:.40} where a number of at least {least} is expected")
     if not all(isinstance(text, str) for text in (request.encoder, *request.changes, *request.commands)):
         raise ValueError("the encoder, a change or a command is no text")
     return request
@@ -204,6 +206,7 @@ def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
         dumps=request.dumps,
         encoder=request.encoder,
         seeds=request.seeds,
+        first_seed=request.first_seed,
         learners=request.learners,
         changes=request.changes,
         show_progress=show_progress,

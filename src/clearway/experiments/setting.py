@@ -103,6 +103,7 @@ def prepare(
     dumps: Sequence[Path] = (),
     encoder: str,
     seeds: int | None = None,
+    first_seed: int = 0,
     learners: Sequence[LearnerName],
     changes: Sequence[str] = (),
     show_progress: bool = False,
@@ -115,6 +116,7 @@ def prepare(
         dumps: scene files with features, such as the published ones; none: the default rooms.
         encoder: for the default rooms.
         seeds: how many; None: as the budget says.
+        first_seed: of them; the others follow it.
         learners: names among `LEARNERS`.
         changes: of settings of every learner, such as "lr_start=0.002".
         show_progress: draw progress bars.
@@ -138,7 +140,7 @@ def prepare(
         scenes=scenes,
         targets=tuple(default_targets(scene) for scene in scenes),
         budget=budget,
-        seeds=tuple(range(budget.seeds if seeds is None else seeds)),
+        seeds=tuple(range(first_seed, first_seed + (budget.seeds if seeds is None else seeds))),
         learners=own,
     )
 
