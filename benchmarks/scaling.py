@@ -2,6 +2,7 @@
 
     python benchmarks/scaling.py                        # 1 and 2 workers, 2, 20 and 200 scenes; some minutes
     python benchmarks/scaling.py --scenes 20 --links    # as root: also over slow links, in network namespaces
+    python benchmarks/scaling.py --scenes 2 --set envs_by=scenes    # other settings of the learner
 
 Scenes are generated rooms with 2,048 made-up features a state, 400 environments in all; more than 20 scenes share a
 head. Repeats of one process with two threads, and of one and two workers of a thread each, take turns in one run.
@@ -160,13 +161,13 @@ class Model:
         )
 
 
-def compared(scenes: int, updates: int, repeats: int) -> tuple[dict[str, Update], Model]:
+def compared(scenes: int, updates: int, repeats: int, settings: dict[str, object]) -> tuple[dict[str, Update], Model]:
     """One process with two threads, one worker and two workers, turn by turn."""
     with ExitStack() as stack:
         cases = {
-            "one process, two threads": stack.enter_context(workers(scenes, 1, 2)),
-            "one worker": stack.enter_context(workers(scenes, 1)),
-            "two workers": stack.enter_context(workers(scenes, 2)),
+            "one process, two threads": stack.enter_context(workers(scenes, 1, 2, settings)),
+            "one worker": stack.enter_context(workers(scenes, 1, 1, settings)),
+            "two workers": stack.enter_context(workers(scenes, 2, 1, settings)),
         }
         for case in cases.values():
             case.ask("train", 2)
@@ -236,12 +237,13 @@ def main() -> None:
     parser.add_argument("--updates", type=int, default=2, help="of a repeat")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--links", action="store_true", help="also over slow links; as root")
+    parser.add_argument("--set", nargs="+", default=[], help="settings of the learner, such as envs_by=scenes")
     parser.add_argument("--json", type=Path, help="write all figures here")
     given = parser.parse_args()
     record: dict[str, object] = {"hardware": hardware(), "versions": package_versions()}
     print("| scenes | case | frames/s | s an update | MB | messages | s of communication | model |\n|" + "---|" * 8)
     for scenes in given.scenes:
-        updates, model = compared(scenes, given.updates, given.repeats)
+        updates, model = compared(scenes, given.updates, given.repeats, dict(pair.split("=") for pair in given.set))
         for name, one in updates.items():
             talk = "||||"
             if one.messages:

@@ -1,5 +1,6 @@
 """The arms that take single parts away."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,11 @@ def test_an_arm_differs_in_one_setting() -> None:
     assert [own.history_length for own in found.values()] == [1, 2, 8, 4]
     assert [own.heads_by_scene for own in found.values()] == [True, True, True, False]
     assert "default, one head" not in arms("default", DEFAULT, scenes=1)
+
+
+def test_a_learner_is_no_arm_of_itself() -> None:
+    shared = replace(DEFAULT, history_length=2, heads="shared")
+    assert list(arms("default", shared, scenes=2)) == ["default, history 1", "default, history 8"]
 
 
 def test_a_learner_without_shared_heads_has_no_such_arm() -> None:

@@ -124,7 +124,8 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
     setting = found.setting
     budget = setting.budget
     learners = (
-        f"{name}: {ABOUT_LEARNERS[name]}, {learner.frames:,} frames" for name, learner in setting.learners.items()
+        f"{name}: {ABOUT_LEARNERS[name]}{', changed' * bool(found.changes)}, {learner.frames:,} frames"
+        for name, learner in setting.learners.items()
     )
     changed = f"Changed in every learner: {', '.join(found.changes)}." if found.changes else ""
     warning = " ".join(filter(None, (budget.warning, changed)))

@@ -37,16 +37,17 @@ def rewards() -> tuple[Reward, ...]:
 
 
 def arms(name: str, learner: Learner, scenes: int) -> dict[str, Learner]:
-    """The learner with one setting changed, by its arm's name; heads differ where there are several scenes."""
+    """The learner with one setting changed, by its arm's name; none that is the learner as it is.
+
+    Heads differ where there are several scenes.
+    """
     settings = asdict(learner)
     changes = {f"history {length}": f"history_length={length}" for length in HISTORIES}
     if scenes > 1:
         changes[SHARED] = "heads=shared"
-    return {
-        f"{name}, {arm}": with_settings(learner, [word])
-        for arm, word in changes.items()
-        if word.partition("=")[0] in settings
-    }
+    known = {arm: word for arm, word in changes.items() if word.partition("=")[0] in settings}
+    found = {f"{name}, {arm}": with_settings(learner, [word]) for arm, word in known.items()}
+    return {arm: own for arm, own in found.items() if own != learner}
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -62,7 +63,7 @@ def section(setting: Setting) -> Section:
         name=NAME,
         title="What single parts bring",
         text=(
-            "A learner, and the same with one thing changed: poses that the agent knows (history; four else), one "
+            "A learner, and the same with one thing changed: poses that the agent knows (history), one "
             f"head for all scenes in place of one each, and rewards with one of the two penalties: {BETA} keeps the "
             f"collision zone's, {GAMMA} the precollision zone's."
         ),
