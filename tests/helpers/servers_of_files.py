@@ -77,9 +77,17 @@ class _Files(SimpleHTTPRequestHandler):
         pass
 
 
-def files_of(folder: Path) -> Callable[..., BaseHTTPRequestHandler]:
-    """Python's own server of a folder's files."""
-    return partial(_Files, directory=str(folder))
+class Dateless(_Files):
+    """Does not say when a file was changed."""
+
+    def send_header(self, keyword: str, value: str) -> None:
+        if keyword != "Last-Modified":
+            super().send_header(keyword, value)
+
+
+def files_of(folder: Path, kind: type[_Files] = _Files) -> Callable[..., BaseHTTPRequestHandler]:
+    """Python's own server of a folder's files, or one that differs from it."""
+    return partial(kind, directory=str(folder))
 
 
 class CutShort(_Files):

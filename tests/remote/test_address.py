@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from clearway.remote.address import address_of, file_name, origin, without_query
+from clearway.remote.address import address_of, file_name, origin, without_secrets
 
 
 @pytest.mark.parametrize(
@@ -21,8 +21,9 @@ def test_paths_are_no_addresses(path: str) -> None:
 def test_names_are_last_parts() -> None:
     assert file_name("s3://rooms/a/b c?.h5") == "b c?.h5"
     assert file_name("https://example.org/a%20b.h5?signature=c/d") == "a b.h5"
-    assert without_query("https://example.org/a.h5?signature=c") == "https://example.org/a.h5"
-    assert without_query("s3://rooms/what?.h5") == "s3://rooms/what?.h5"
+    assert without_secrets("https://example.org/a.h5?signature=c") == "https://example.org/a.h5"
+    assert without_secrets("https://me:secret@example.org/@/a.h5") == "https://example.org/@/a.h5"
+    assert without_secrets("s3://rooms/what?.h5") == "s3://rooms/what?.h5"
 
 
 def test_a_file_of_this_machine_comes_from_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

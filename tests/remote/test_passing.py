@@ -1,6 +1,9 @@
 """Sets that do not fit into the cache: their files come when they are read, and go."""
 
+import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -9,22 +12,24 @@ import numpy as np
 import pytest
 
 import clearway
+from clearway.cli.main import main
 from clearway.errors import ClearwayError
 from clearway.learn.load import run_scenes
 from clearway.learn.run_folder import RunFolder
-from clearway.remote import cache
-from clearway.remote.address import RECORDS, fetched_folder
-from clearway.remote.cache import LIMIT_VARIABLE, CacheWarning, fetched
-from clearway.remote.passing import at_hand
+from clearway.remote import passing
+from clearway.remote.address import RECORDS, fetched_folder, origin
+from clearway.remote.cache import AHEAD, LIMIT_VARIABLE, CacheWarning, fetched
+from clearway.remote.store import Store
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views.stream import views_in
 from helpers.made import corridor_scene
 from helpers.made_views import write_made
-from helpers.servers_of_files import files_of, web_server
+from helpers.servers_of_files import Dateless, files_of, web_server
 from helpers.small_runs import small_learner
 
 NAMES = tuple("abcdef")
+SET = "s3://rooms/set"
 
 
 def limit_to(files: float, folder: Path, monkeypatch: pytest.MonkeyPatch) -> float:
@@ -37,6 +42,17 @@ def limit_to(files: float, folder: Path, monkeypatch: pytest.MonkeyPatch) -> flo
 def kept_bytes() -> int:
     """Of all files in the cache."""
     return sum(path.stat().st_size for path in fetched_folder().rglob("*.h5"))
+
+
+def passing_scenes() -> list[clearway.Scene]:
+    """The scenes of the store, which do not fit."""
+    with pytest.warns(CacheWarning, match=f"{SET}: .* do not fit .* Set {LIMIT_VARIABLE} to more"):
+        return clearway.load_scenes(SET)
+
+
+def looked_at(scene: clearway.Scene) -> np.ndarray:
+    assert scene.observations is not None
+    return scene.observations[:]
 
 
 @pytest.fixture
@@ -57,11 +73,13 @@ def views(s3: Callable[[str, bytes], None], tmp_path: Path) -> Path:
     return tmp_path / "views"
 
 
-@pytest.mark.parametrize("files", [1, 2.5])
+@pytest.mark.parametrize("files", [1, 2.5, 4 / AHEAD])
 def test_views_come_in_the_same_order_within_the_limit(
     files: float, views: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limit = limit_to(files, views, monkeypatch)
+    if files > len(NAMES):  # all of them fit, and pass all the same
+        monkeypatch.setattr("clearway.remote.cache._stay", lambda *_: False)
     here = views_in([views])
     with pytest.warns(CacheWarning, match=f"s3://rooms/views: .* do not fit .* Set {LIMIT_VARIABLE} to more"):
         there = views_in([Path("s3://rooms/views")])
@@ -75,83 +93,125 @@ def test_views_come_in_the_same_order_within_the_limit(
     assert count == 2 * here.batch_count(4)
 
 
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["one worker", "several workers"])
 def test_an_agent_learns_from_a_set_that_does_not_fit(
-    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    workers: int, scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    limit = limit_to(2, scenes, monkeypatch)
-    learner = small_learner(frames=80)
-    clearway.train(scenes, algorithm=learner, out=tmp_path / "here")
+    limit = limit_to(1, scenes, monkeypatch)
+    learner = small_learner(frames=240)
+    clearway.train(scenes, algorithm=learner, workers=workers, out=tmp_path / "here")
     with pytest.warns(CacheWarning):
-        clearway.train("s3://rooms/set", algorithm=learner, out=tmp_path / "there")
+        clearway.train(SET, algorithm=learner, workers=workers, out=tmp_path / "there")
     here, there = (RunFolder(tmp_path / name) for name in ("here", "there"))
-    ours, theirs = ([row["loss"] for row in folder.metrics()] for folder in (here, there))
-    assert theirs == ours
+    ours, theirs = ([(row["loss"], row["steps"]) for row in folder.metrics()] for folder in (here, there))
+    assert theirs == ours and len(ours) == 3
     assert 0 < kept_bytes() <= limit
     record = there.read_record()
-    assert [scene.path for scene in record.scenes] == [f"s3://rooms/set/{name}.h5" for name in NAMES]
+    assert [scene.path for scene in record.scenes] == [f"{SET}/{name}.h5" for name in NAMES]
     with pytest.warns(CacheWarning):
         again = run_scenes(record)
     assert [scene_digest(scene) for scene in again] == [scene.digest for scene in record.scenes]
 
 
-def test_threads_share_what_comes(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    limit = limit_to(3, scenes, monkeypatch)
-    here = {scene.name: np.asarray(scene.observations[:]) for scene in clearway.load_scenes(scenes)}  # type: ignore[index]
-    with pytest.warns(CacheWarning):
-        there = clearway.load_scenes("s3://rooms/set")
+def test_threads_read_side_by_side(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is room for one file, and every one of them is wanted by several at once."""
+    limit = limit_to(1, scenes, monkeypatch)
+    here = {scene.name: looked_at(scene) for scene in clearway.load_scenes(scenes)}
+    there = passing_scenes()
 
     def same(number: int) -> bool:
-        scene = there[number % len(there)]
-        return bool((scene.observations[:] == here[scene.name]).all())  # type: ignore[index]
+        scene = there[number // 3 % len(there)]
+        return bool((looked_at(scene) == here[scene.name]).all())
 
-    with ThreadPoolExecutor(3) as pool:
-        assert all(pool.map(same, range(30)))
+    with ThreadPoolExecutor(6) as pool:
+        assert all(pool.map(same, range(36)))
     assert kept_bytes() <= limit
 
 
-def test_readers_wait_for_each_other(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where there is room for the file of one alone."""
-    limit = limit_to(1.1, scenes, monkeypatch)
-    with pytest.warns(CacheWarning):
-        there = clearway.load_scenes("s3://rooms/set")
-    with ThreadPoolExecutor(len(there)) as pool:
-        seen = list(pool.map(lambda scene: scene.observations[:].sum(), there))
-    assert seen == [scene.observations[:].sum() for scene in clearway.load_scenes(scenes)]  # type: ignore[index]
+@pytest.mark.slow
+def test_processes_read_side_by_side(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit = limit_to(1.5, scenes, monkeypatch)
+    program = (
+        "import warnings, clearway; warnings.simplefilter('ignore'); "
+        f"print(sum(int(scene.observations[:].sum()) for _ in range(3) for scene in clearway.load_scenes('{SET}')))"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    started = [
+        subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, env=environment)
+        for _ in range(2)
+    ]
+    expected = 3 * sum(int(looked_at(scene).sum()) for scene in clearway.load_scenes(scenes))
+    assert [int(process.communicate(timeout=60)[0]) for process in started] == [expected] * 2
     assert kept_bytes() <= limit
-    monkeypatch.setattr(cache, "WAIT_S", 0.2)
-    with at_hand(there[0].observations.path), pytest.raises(ClearwayError, match="are to be kept here"):  # type: ignore[union-attr]
-        there[1].observations[0]  # type: ignore[index]
+
+
+def test_a_file_that_several_want_comes_once(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit_to(3, scenes, monkeypatch)
+    (first, *_), came, download = passing_scenes(), [], Store.download
+    shutil.rmtree(first.observations.path.parent, ignore_errors=True)  # type: ignore[union-attr]
+    monkeypatch.setattr(Store, "download", lambda *given: (came.append(given[1].name), download(*given)))
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(looked_at, [first] * 8))
+    assert came == ["a.h5"]
+
+
+def test_who_has_opened_a_file_reads_on_when_it_goes(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit_to(1, scenes, monkeypatch)
+    first, second, *_ = passing_scenes()
+    with passing.name_of_present(first.observations.path) as name:  # type: ignore[union-attr]
+        looked_at(second)
+        assert not first.observations.path.exists()  # type: ignore[union-attr]
+        assert name.read_bytes() == (scenes / "a.h5").read_bytes()
+
+
+def test_a_whole_set_leaves_room_for_those_that_pass(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = sum(path.stat().st_size for path in scenes.iterdir())
+    monkeypatch.setenv(LIMIT_VARIABLE, f"{whole * 1.01 / 1e9:.12f}")
+    passing_scenes()
+    monkeypatch.setenv(LIMIT_VARIABLE, f"{whole * 1.01 / (1 - AHEAD) / 1e9:.12f}")
+    assert len(clearway.load_scenes(SET)) == len(NAMES)
+    assert kept_bytes() == whole
 
 
 def test_a_file_that_changed_there_is_refused(
     scenes: Path, s3: Callable[[str, bytes], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limit_to(1, scenes, monkeypatch)
-    with pytest.warns(CacheWarning):
-        first, *_ = clearway.load_scenes("s3://rooms/set")
+    first, *_ = passing_scenes()
     s3("set/a.h5", (scenes / "b.h5").read_bytes())
     with pytest.raises(ClearwayError, match=r"^s3://rooms/set/a.h5: has changed since it was first read. Begin again$"):
-        first.observations[0]  # type: ignore[index]
+        looked_at(first)
+
+
+def test_a_copy_that_was_written_to_is_refused(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit_to(1, scenes, monkeypatch)
+    *_, last = passing_scenes()
+    path = last.observations.path  # type: ignore[union-attr]
+    path.write_bytes(path.read_bytes())
+    with pytest.raises(ClearwayError, match="has changed since the scene was read"):
+        looked_at(last)
 
 
 def test_a_file_that_is_gone_there_is_named(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from s3fs import S3FileSystem
 
     limit_to(1, scenes, monkeypatch)
-    with pytest.warns(CacheWarning):
-        first, *_ = clearway.load_scenes("s3://rooms/set")
+    first, *_ = passing_scenes()
     S3FileSystem().rm("rooms/set/a.h5")
     with pytest.raises(ClearwayError, match=r"^s3://rooms/set/a.h5: there is nothing there. Check the address$"):
-        first.observations[0]  # type: ignore[index]
+        looked_at(first)
 
 
-def test_an_emptied_cache_is_told_of(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_emptied_cache_is_told_of_and_heals(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limit_to(1, scenes, monkeypatch)
-    with pytest.warns(CacheWarning):
-        first, *_ = clearway.load_scenes("s3://rooms/set")
-    shutil.rmtree(fetched_folder() / RECORDS)
+    first, *_ = passing_scenes()
+    record = fetched_folder() / RECORDS / first.observations.path.parent.name  # type: ignore[union-attr]
+    record.write_text("")
     with pytest.raises(ClearwayError, match=r"a.h5: has gone, and its record, too. Begin again with the address"):
-        first.observations[0]  # type: ignore[index]
+        looked_at(first)
+    passing_scenes()
+    assert looked_at(first).size
+    assert origin(first.observations.path) == f"{SET}/a.h5"  # type: ignore[union-attr]
 
 
 def test_a_file_larger_than_the_cache_is_refused(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,15 +220,56 @@ def test_a_file_larger_than_the_cache_is_refused(scenes: Path, monkeypatch: pyte
         pytest.warns(CacheWarning),
         pytest.raises(ClearwayError, match=f"GB are to be kept here, .* Set {LIMIT_VARIABLE} to more"),
     ):
-        clearway.load_scenes("s3://rooms/set")
+        clearway.load_scenes(SET)
     assert kept_bytes() == 0
 
 
-def test_signed_addresses_are_not_fetched_twice(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Their signatures are kept nowhere."""
+@pytest.mark.parametrize("query", ["?signature=secret", ""], ids=["signed", "no version"])
+def test_what_cannot_be_known_again_does_not_pass(query: str, scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Signatures are kept nowhere, and a file without a version may be another one when it comes again."""
     limit_to(1, scenes, monkeypatch)
-    with web_server(files_of(scenes)) as address:
-        signed = [f"{address}/{name}.h5?signature=secret" for name in NAMES]
-        with pytest.raises(ClearwayError, match=f"GB are to be kept here, .* Set {LIMIT_VARIABLE} to more"):
-            fetched(signed, (".h5",), may_pass=True)
+    handler = files_of(scenes, Dateless) if not query else files_of(scenes)
+    with web_server(handler) as address, pytest.raises(ClearwayError, match="GB are to be kept here"):
+        fetched([f"{address}/{name}.h5{query}" for name in NAMES], (".h5",), may_pass=True)
     assert kept_bytes() == 0
+
+
+def test_only_the_cache_s_own_files_come_and_go(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder with a link into the cache, and a file that somebody put there, are left as they are."""
+    limit_to(1, scenes, monkeypatch)
+    *_, last = passing_scenes()
+    path = last.observations.path  # type: ignore[union-attr]
+    link = scenes.parent / "rooms-2" / "f.h5"
+    link.parent.mkdir()
+    link.symlink_to(path)
+    own = fetched_folder() / "own" / "a.h5"
+    own.parent.mkdir()
+    shutil.copy(scenes / "a.h5", own)
+    assert (looked_at(clearway.load_scene(link)) == looked_at(last)).all()
+    assert looked_at(clearway.load_scene(own)).size
+    monkeypatch.chdir(path.parent)
+    assert looked_at(clearway.load_scene(path.name)).size
+    assert link.is_symlink() and own.exists()
+    alike = scenes.parent / path.parent.name / "f.h5"
+    alike.parent.mkdir()
+    shutil.copy(path, alike)
+    scene = clearway.load_scene(alike)
+    alike.unlink()
+    with pytest.raises(ClearwayError, match="has changed since the scene was read"):
+        looked_at(scene)
+
+
+def test_commands_read_what_passes(
+    scenes: Path, views: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limit_to(1, views, monkeypatch)
+    for words in (
+        ["inspect", "s3://rooms/views"],
+        ["inspect", f"{SET}/a.h5"],
+        ["export", f"{SET}/a.h5", "--out", str(tmp_path / "a.h5")],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["scenes", *words])
+        told = capsys.readouterr()
+        assert ended.value.code == 0, told.err
+    assert (tmp_path / "a.h5").exists()

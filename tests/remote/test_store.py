@@ -105,3 +105,12 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     assert told("https://127.0.0.1/a.h5") == (
         "https:// needs another package. Install it: pip install 'clearway[https]'"
     )
+
+
+def test_a_version_is_the_best_that_a_server_tells_alone() -> None:
+    """Some stores list milliseconds, and tell seconds of a file."""
+    assert store._version({"ETag": "a", "LastModified": "12.345"}) == store._version(
+        {"ETag": "a", "LastModified": "12"}
+    )
+    assert store._version({"LastModified": "12"}) == "12"
+    assert store._version({"ETag": None}) == ""

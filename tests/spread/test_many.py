@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from collections.abc import Iterator
 
 import pytest
 
@@ -34,8 +35,9 @@ def test_processes_give_results_warnings_and_errors_as_this_one_does() -> None:
         list(many.of_each(halved, range(90, 110)))
 
 
-def fetched(numbers: range) -> None:
+def fetched(numbers: range) -> Iterator[int]:
     warnings.warn(f"next are {list(numbers)}", stacklevel=1)
+    yield from numbers
 
 
 @pytest.mark.usefixtures("processes")

@@ -85,15 +85,14 @@ def scenes_and_files(sources: Scenes, *, features_in_file: bool = False) -> list
         raise ArgumentError("scenes: none given. Give at least one scene or scene file")
     files = [file for _, file in named if file is not None]
     many = features_in_file  # else they are large messages
-    loaded = iter(list(of_each(_explored, files, _read_soon) if many else map(read_scene, in_turn(files))))
+    loaded = iter(list(of_each(_explored, files, _soon) if many else map(read_scene, in_turn(files))))
     return [(next(loaded) if scene is None else scene, file) for scene, file in named]
 
 
-def _read_soon(files: Sequence[Path]) -> None:
-    """Have files come that this process reads next."""
-    for _ in in_turn(files):
-        pass
+def _soon(files: Sequence[Path]) -> Iterator[Path]:
+    """Files that are read one after the other, of which the next ones are fetched together."""
     read_ahead(files)
+    yield from in_turn(files)
 
 
 def _explored(file: Path) -> Scene:

@@ -91,18 +91,18 @@ class Inspect:
         from clearway.scenes.contents import check_contents
         from clearway.scenes.inspect import summary
         from clearway.scenes.thor_v1 import read_scene
+        from clearway.views.shard import is_shard
         from clearway.views.stream import views_in
-        from clearway.views.summary import are_views
         from clearway.views.summary import summary as views_summary
         from clearway.zones import scene_zones, zone_counts
 
         check_ending(".png", map=self.map)
-        if are_views(self.file):
+        path, *others = scene_files([self.file])
+        if is_shard(path):
             if self.map:
                 raise ClearwayError(f"{self.file}: holds views, which have no map. Leave out --map")
-            self._print(views_summary(views_in([self.file])))
+            self._print(views_summary(views_in([path, *others])))
             return
-        path, *others = scene_files([self.file])
         if others:
             raise ClearwayError(f"{self.file}: a folder of {1 + len(others)} scene files. Name one, such as {path}")
         scene = read_scene(path)
@@ -144,10 +144,13 @@ class Export:
         if self.file.is_dir():
             raise ClearwayError(f"{self.file}: a folder. Name one scene file")
         check_ending(*SCENE_SUFFIXES, out=self.out)
-        if self.out.resolve() == self.file.resolve():
+        path, *others = scene_files([self.file])
+        if others:
+            raise ClearwayError(f"{self.file}: a folder. Name one scene file, such as {path.name}")
+        if self.out.resolve() == path.resolve():
             raise ClearwayError(f"{self.out}: would be written over the scene itself. Give another file with --out")
         said = replaces(self.out)
-        export_thor_v1(read_scene(self.file), self.out)
+        export_thor_v1(read_scene(path), self.out)
         say(f"{self.out}: in the layout {self.format}{said}")
 
 

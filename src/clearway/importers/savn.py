@@ -211,7 +211,7 @@ def _pictures(path: Path, names: tuple[str, ...]) -> Observations | None:
         shapes = {tuple(shape) for shape in _picture_shapes(file, names, path)}
     if len(shapes) > 1:
         raise SceneError(path, "holds pictures of different sizes", "Get another copy")
-    return NamedPictures(path.resolve(), names, (len(names), *shapes.pop()), file_stamp(path))
+    return NamedPictures(path.resolve(), names, (len(names), *shapes.pop()), file_stamp(path.resolve()))
 
 
 def _picture_shapes(file: h5py.File, names: tuple[str, ...], path: Path) -> Iterator[tuple[int, ...]]:

@@ -253,6 +253,7 @@ def done_by(task: Task, place: Place, server: dist.Store) -> str | None:
     except Exception as error:  # whatever it is, another try would meet it again
         told = str(error) if isinstance(error, ClearwayError) else traceback.format_exc()
         store.set(FAILED, told)
-        dist.destroy_process_group()  # so that others who wait for this one hear of it at once
+        if not cuda:
+            dist.destroy_process_group()  # so that others who wait for this one hear of it at once
         return told
     return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
@@ -12,6 +13,8 @@ from clearway.files import cache_dir, read_json
 MAX_RECORD_BYTES = 64 * 1024
 EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to install, by scheme
 RECORDS = ".records"  # where every file came from that was fetched, by its entry's name
+COPIED_NS = 10**18  # time of change that every copy has, so that one that comes again is the same
+ENTRY = re.compile(r"[0-9a-f]{32}-(\d{1,20})")  # see `cache`
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
 
 
@@ -28,9 +31,13 @@ def file_name(address: str) -> str:
     return PurePosixPath(path).name
 
 
-def without_query(address: str) -> str:
-    """A web address without what stands behind its question mark, such as a signature, which is nobody else's."""
-    return address.partition("?")[0] if address.startswith("http") else address
+def without_secrets(address: str) -> str:
+    """A web address without name and password, and without its query, such as a signature."""
+    if not address.startswith("http"):
+        return address
+    scheme, _, rest = address.partition("?")[0].partition("://")
+    host, slash, path = rest.partition("/")
+    return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
 
 
 def fetched_folder() -> Path:
@@ -40,12 +47,21 @@ def fetched_folder() -> Path:
 
 def is_fetched(path: Path) -> bool:
     """Whether a path is that of a file which was fetched; it may have gone since, to make room for others."""
-    return path.resolve().parent.parent == fetched_folder().resolve()
+    if not ENTRY.fullmatch(path.parent.name):
+        return False
+    return path.parent.parent.resolve() == fetched_folder().resolve()
+
+
+def file_bytes(path: Path) -> int:
+    """Size of a file, of one that was fetched also when it has gone. Raises OSError where there is none."""
+    found = ENTRY.fullmatch(path.parent.name)
+    return int(found[1]) if found and is_fetched(path) else path.stat().st_size
 
 
 def origin(path: Path) -> str:
-    """Where a file can be had again: the address of one that was fetched, the whole path of any other."""
+    """Where a file can be had again: the address of one that was fetched, where that is known; else the whole path."""
     path = path.resolve()
     if is_fetched(path):
-        return str(read_json(fetched_folder() / RECORDS / path.parent.name, MAX_RECORD_BYTES)["address"])
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            return str(read_json(fetched_folder() / RECORDS / path.parent.name, MAX_RECORD_BYTES)["address"])
     return str(path)

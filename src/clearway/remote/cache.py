@@ -1,8 +1,8 @@
 """Files from elsewhere on this machine: fetched whole or not at all, within a limit, the least recently used out first.
 
 A file lies in a folder of its own in the cache folder, under `remote`, whose name, its entry, is made of its address,
-version and size: the same entry is the same file. What living processes use stays (`leases`). Where it came from stands
-in its record, by which it is fetched again after it went (`passing`).
+version and size: the same entry is the same file. What living processes keep stays (`leases`). Where it came from
+stands in its record, by which it is fetched again after it went (`passing`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import hashlib
 import math
 import os
 import shutil
-import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -21,15 +20,14 @@ from pathlib import Path
 from clearway.errors import ClearwayError
 from clearway.files import CACHE_VARIABLE, json_text, locked, part_folder, read_json
 from clearway.progress import picture_progress
-from clearway.remote.address import MAX_RECORD_BYTES, RECORDS, fetched_folder, without_query
-from clearway.remote.leases import Lease, lease_of, leased
+from clearway.remote.address import COPIED_NS, ENTRY, MAX_RECORD_BYTES, RECORDS, fetched_folder, without_secrets
+from clearway.remote.leases import lease_of, leased
 from clearway.remote.store import RemoteFile, Store
 
 LIMIT_VARIABLE = "CLEARWAY_CACHE_GB"
 LIMIT_GB = 50.0
 AT_ONCE = 16  # files that are fetched at a time
-WAIT_S, PAUSE_S = 60.0, 0.05  # for other readers to give back what they hold
-AHEAD = 1 / 8  # of the limit, that files may have which are fetched before their turn
+AHEAD = 1 / 8  # of the limit, for files that pass, and that as many may have as are fetched together
 
 
 class CacheWarning(UserWarning):
@@ -55,52 +53,39 @@ def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool
     folder = fetched_folder()
     places = {file: folder / _entry(file) / file.name for file in files}
     with _faults_named(folder):
-        _write_records(folder, files)
-        if may_pass and all(without_query(file.address) == file.address for file in files) and not _fit(folder, files):
-            size_gb, limit_gb = sum(file.size for file in files) / 1e9, _limit_bytes() / 1e9
-            told = f"{size_gb:,.3g} GB do not fit into the cache of {limit_gb:g} GB"
-            remedy = f"they are fetched as they are read, more than once. Set {LIMIT_VARIABLE} to more"
-            warnings.warn(f"{addresses[0]}: {told}; {remedy}", CacheWarning, stacklevel=2)
-        else:
-            _hold(folder, list(places.values()))
+        may_pass = may_pass and all(file.version and without_secrets(file.address) == file.address for file in files)
+        with locked(folder / ".cache"):
+            _write_records(folder, files)
+            stay = _stay(folder, list(places.values()), may_pass)
+        if stay:
             missing = {file: store for file, store in files.items() if not places[file].exists()}
             _fetch(missing, folder, show_progress=len(missing) > 1)
+        else:
+            told = f"{sum(file.size for file in files) / 1e9:,.3g} GB do not fit into a cache of {_limit() / 1e9:g} GB"
+            remedy = f"they are fetched as they are read, more than once. Set {LIMIT_VARIABLE} to more"
+            warnings.warn(f"{without_secrets(addresses[0])}: {told}; {remedy}", CacheWarning, stacklevel=2)
     return [places[file] for some in found for file in some]
 
 
-@contextmanager
-def held(places: Sequence[Path]) -> Iterator[None]:
-    """Have files that were fetched on this machine while the block runs; those that have gone come again.
-
-    Where others hold so much that there is no room for them, they have `WAIT_S` to give some back.
+def fetch_again(places: Sequence[Path]) -> None:
+    """Fetch files again that have gone, one group of them at a time on this machine; they may go again at once.
 
     Raises:
         ClearwayError: one cannot be had again or is another one now, or the cache is too small for them together.
     """
     folder = fetched_folder()
-    with _faults_named(folder):
-        waits_until = time.monotonic() + WAIT_S
-        while not lease_of(folder).hold_again([place.parent.name for place in places]):
-            try:
-                _hold(folder, places)
-                break
-            except ClearwayError:
-                if time.monotonic() > waits_until or sum(_size(place.parent.name) for place in places) > _limit_bytes():
-                    raise
-                time.sleep(PAUSE_S)
-    try:
-        with _faults_named(folder):
-            missing = dict.fromkeys(place for place in places if not place.exists())
-            _fetch(dict(_found_again(folder, place) for place in missing), folder, show_progress=False)
-        yield
-    finally:
-        lease_of(folder).give_back([place.parent.name for place in places])
+    with _faults_named(folder), locked(folder / ".passing"):
+        missing = dict.fromkeys(place for place in places if not place.exists())  # others have fetched some meanwhile
+        files = dict(_found_again(folder, place) for place in missing)
+        with locked(folder / ".cache"):
+            _make_room(folder, sum(file.size for file in files))
+        _fetch(files, folder, show_progress=False)
 
 
 def groups(places: Iterable[Path]) -> Iterator[list[Path]]:
-    """Files that were fetched, in order, by as many as may be held together before their turn."""
+    """Files that were fetched, in order, by as many as may come together before their turn."""
     group: list[Path] = []
-    left = most = AHEAD * _limit_bytes()
+    left = most = AHEAD * _limit()
     for place in places:
         left -= _size(place.parent.name)
         if group and (left < 0 or len(group) == AT_ONCE):
@@ -121,39 +106,32 @@ def _faults_named(folder: Path) -> Iterator[None]:
         raise ClearwayError(f"{folder}: cannot keep what is fetched ({fault.strerror or fault}). {remedy}") from fault
 
 
-def _fit(folder: Path, files: Iterable[RemoteFile]) -> bool:
-    """Whether files fit into the limit together with all that living processes use."""
-    with locked(folder / ".cache"):
-        return sum(map(_size, leased(folder) | {_entry(file) for file in files})) <= _limit_bytes()
-
-
-def _hold(folder: Path, places: Sequence[Path]) -> None:
-    """Lease entries, of which those that lie there now stay, and make room for the others."""
-    lease = lease_of(folder)
-    entries = [place.parent.name for place in places]
-    with locked(folder / ".cache"):
-        lease.hold(entries)
-        for place in places:
-            if place.exists() and place.stat().st_size != _size(place.parent.name):  # damaged since
-                shutil.rmtree(place.parent)
-            elif place.exists():
-                os.utime(place.parent)
-        try:
-            _make_room(folder, lease)
-        except ClearwayError:
-            lease.give_back(entries)
-            raise
+def _stay(folder: Path, places: Sequence[Path], may_pass: bool) -> bool:
+    """Keep files for as long as this process lives, and make room for them; not where they may pass and do not fit."""
+    lease, entries = lease_of(folder), [place.parent.name for place in places]
+    kept = leased(folder) | set(entries)
+    if may_pass and sum(map(_size, kept)) > (1 - AHEAD) * _limit():  # the rest is for those that pass
+        return False
+    lease.add(entries)
+    for entry, place in zip(entries, places, strict=True):
+        if place.exists() and place.stat().st_size != _size(entry):  # damaged since
+            shutil.rmtree(folder / entry)
+        elif place.exists():
+            os.utime(folder / entry)
+    _make_room(folder)
+    return True
 
 
 def _write_records(folder: Path, files: Iterable[RemoteFile]) -> None:
-    """Write down where files come from, without the signature of a signed address, which is nobody else's."""
+    """Write down where files come from, but no secrets."""
     records = folder / RECORDS
     records.mkdir(parents=True, exist_ok=True)
-    known = {entry.name for entry in os.scandir(records)}
+    known = {entry.name: entry.stat().st_size for entry in os.scandir(records)}
     for file in files:
-        if (name := _entry(file)) not in known:
-            part = records / f".{name}-{os.getpid()}"
-            part.write_text(json_text({"address": without_query(file.address), "version": file.version}))
+        text = json_text({"address": without_secrets(file.address), "version": file.version}).encode()
+        if known.get(name := _entry(file)) != len(text):
+            part = records / ".part"
+            part.write_bytes(text)
             part.replace(records / name)
 
 
@@ -176,29 +154,31 @@ def _found_again(folder: Path, place: Path) -> tuple[RemoteFile, Store]:
     return file, store
 
 
-def _make_room(folder: Path, own: Lease) -> None:
-    """Remove files that nobody has leased until all others and those that are leased fit into the limit.
+def _make_room(folder: Path, more: int = 0) -> None:
+    """Remove files that nobody keeps until all others, those that are kept, and so many more bytes fit into the limit.
 
     Raises:
-        ClearwayError: those that are leased do not fit.
+        ClearwayError: those that are kept do not fit.
     """
-    limit = _limit_bytes()
-    used = leased(folder)
-    size = sum(map(_size, used))
+    limit, used = _limit(), leased(folder)
+    size = sum(map(_size, used)) + more
     if size > limit:
-        wanted = sum(map(_size, own.uses))
-        problem = f"{wanted / 1e9:,.3g} GB are to be kept here, {(size - wanted) / 1e9:,.3g} GB by others that run now"
+        own = sum(map(_size, lease_of(folder).entries)) + more
+        problem = f"{own / 1e9:,.3g} GB are to be kept here, {(size - own) / 1e9:,.3g} GB by others that run now"
         raise ClearwayError(f"{folder}: {problem}, the limit is {limit / 1e9:g} GB. Set {LIMIT_VARIABLE} to more")
-    free = [entry for entry in os.scandir(folder) if entry.name not in used and _is_entry(entry.name)]
+    free = [entry for entry in os.scandir(folder) if entry.name not in used and ENTRY.fullmatch(entry.name)]
     size += sum(_size(entry.name) for entry in free)
+    if size <= limit:
+        return
     for entry in sorted(free, key=lambda entry: entry.stat().st_mtime):
-        if size <= limit:
-            break
         shutil.rmtree(entry.path)
         size -= _size(entry.name)
+        if size <= limit:
+            break
 
 
-def _limit_bytes() -> float:
+def _limit() -> float:
+    """Of the cache, bytes."""
     words = os.environ.get(LIMIT_VARIABLE)
     if not words:
         return LIMIT_GB * 1e9
@@ -226,6 +206,7 @@ def _fetch(files: Mapping[RemoteFile, Store], folder: Path, *, show_progress: bo
             new = part / _entry(file)
             new.mkdir()
             files[file].download(file, new / file.name)
+            os.utime(new / file.name, ns=(COPIED_NS, COPIED_NS))
             try:
                 new.replace(folder / new.name)
             except OSError:
@@ -246,11 +227,6 @@ def _entry(file: RemoteFile) -> str:
     """The name of a file's folder: what it is, and its bytes."""
     digest = hashlib.sha256(f"{file.address}\n{file.version}".encode()).hexdigest()
     return f"{digest[:32]}-{file.size}"
-
-
-def _is_entry(name: str) -> bool:
-    digest, _, size = name.partition("-")
-    return len(digest) == 32 and size.isdigit()
 
 
 def _size(entry: str) -> int:

@@ -17,7 +17,7 @@ from typing import Any
 import fsspec
 
 from clearway.errors import ClearwayError
-from clearway.remote.address import EXTRAS, file_name, without_query
+from clearway.remote.address import EXTRAS, file_name, without_secrets
 
 CONNECT_S = 10  # for a connection
 SILENCE_S = 20  # for the next bytes
@@ -107,7 +107,7 @@ class Store:
             self.system.get_file(self.system._strip_protocol(file.address), str(path))
         if (size := path.stat().st_size) != file.size:
             problem = f"{size:,} of {file.size:,} bytes came"
-            raise ClearwayError(f"{without_query(file.address)}: {problem}. Try again; the file there may be damaged")
+            raise ClearwayError(f"{without_secrets(file.address)}: {problem}. Try again; the file there may be damaged")
 
     def names(self, address: str) -> list[str]:
         """Names of what lies in a folder, ascending; none where there is no such folder.
@@ -150,7 +150,11 @@ class Store:
 
 
 def _version(entry: dict[str, Any]) -> str:
-    return " ".join(str(entry[name]) for name in _VERSIONS if entry.get(name))
+    """What tells one content of a file from another, the same of a listing and of the file alone; else nothing.
+
+    The best there is, alone: some stores list milliseconds, and tell seconds of a file.
+    """
+    return next((str(entry[name]) for name in _VERSIONS if entry.get(name)), "")
 
 
 def _options(scheme: str) -> dict[str, Any]:
@@ -175,7 +179,7 @@ def _faults_named(address: str) -> Iterator[None]:
     except ClearwayError:
         raise
     except Exception as fault:  # each store's library has a hundred kinds of its own, without a common base
-        raise ClearwayError(f"{without_query(address)}: {_told(fault, time.monotonic() - began)}") from fault
+        raise ClearwayError(f"{without_secrets(address)}: {_told(fault, time.monotonic() - began)}") from fault
 
 
 def _told(fault: Exception, seconds: float) -> str:

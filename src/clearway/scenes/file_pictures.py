@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.remote.address import is_fetched
+from clearway.remote.address import COPIED_NS, is_fetched
 from clearway.scenes.hdf5 import check_layout, need_dataset, opened, read_values
 
 BLOCK_PICTURES = 64  # pictures that walk through memory together when all of them are read
@@ -69,12 +69,13 @@ def _runs(ascending: np.ndarray) -> slice | np.ndarray:
 def file_stamp(path: Path) -> tuple[int | str, ...]:
     """Device, inode, size and time of change: differs once a file is replaced or written to; () if it is gone.
 
-    Of a file that was fetched, the name of its entry in the cache: it may go and come again, and is the same one.
+    Of a file that was fetched, its entry in the cache and the time: it may go and come again, and is the same one.
     """
-    if is_fetched(path):
-        return (path.resolve().parent.name,)
+    fetched = is_fetched(path)
     try:
         status = path.stat()
     except OSError:
-        return ()
+        return (path.parent.name, COPIED_NS) if fetched else ()
+    if fetched:
+        return (path.parent.name, status.st_mtime_ns)
     return (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)

@@ -18,8 +18,8 @@ import numpy as np
 
 from clearway.errors import SceneError, reason_of
 from clearway.files import parse_json, written_whole
-from clearway.regular_files import name_of_opened
-from clearway.remote.passing import at_hand
+from clearway.remote.address import is_fetched
+from clearway.remote.passing import name_of_present
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
@@ -62,18 +62,11 @@ def opened(path: Path) -> Iterator[h5py.File]:
         SceneError: it is missing or not HDF5.
         ClearwayError: it cannot be had again.
     """
-    with at_hand(path), _opened_here(path) as file:
-        yield file
-
-
-@contextmanager
-def _opened_here(path: Path) -> Iterator[h5py.File]:
-    """A file of this machine, see `opened`."""
     if path.is_dir():
         raise SceneError(path, "is a folder", "Name a scene file in it")
-    if not path.exists():
+    if not is_fetched(path) and not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
-    with faults_named(path, problem="cannot be opened as HDF5"), name_of_opened(path) as name:
+    with faults_named(path, problem="cannot be opened as HDF5"), name_of_present(path) as name:
         try:
             file = h5py.File(name, "r")
         except OSError as fault:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from clearway.remote.address import file_bytes
+
 MIB = 1024**2
 BASE_BYTES = 512 * MIB
 BYTES_PER_FILE_BYTE = 200
@@ -18,4 +20,4 @@ def memory_limit(file_bytes: int) -> int:
 
 def array_limit(path: Path) -> int:
     """Most bytes of a file's values that are held at once. Raises OSError where there is no such file."""
-    return memory_limit(path.stat().st_size) // COPIES
+    return memory_limit(file_bytes(path)) // COPIES

@@ -85,7 +85,8 @@ def read_readings(file: h5py.File, path: Path, count: int) -> tuple[Readings, ..
         hdf5.check_layout(dataset, path, shape=(count, *sensor.shape), kinds=kept.kind)
         if dataset.dtype != kept:
             raise SceneError(path, f"holds {dataset.dtype}, expected {kept}", hdf5.MAKE_AGAIN, f"{SENSORS}/{name}")
-        raw = FilePictures(path.resolve(), f"{SENSORS}/{name}", tuple(dataset.shape), file_stamp(path), kept.name)
+        whole = path.resolve()
+        raw = FilePictures(whole, f"{SENSORS}/{name}", tuple(dataset.shape), file_stamp(whole), kept.name)
         found.append(Readings(sensor, raw, str(path)))
     return tuple(found)
 

@@ -158,7 +158,7 @@ def _find_features(file: h5py.File, path: Path, count: int, in_file: bool) -> Fe
     if dataset is None:
         return None
     if in_file:
-        return FileFeatures(path.resolve(), (count, dataset.shape[-1]), file_stamp(path))
+        return FileFeatures(path.resolve(), (count, dataset.shape[-1]), file_stamp(path.resolve()))
     return read_features(dataset, path)
 
 
@@ -169,7 +169,7 @@ def _find_pictures(file: h5py.File, path: Path, count: int) -> FilePictures | No
     hdf5.check_layout(dataset, path, shape=(count, None, None, 3), kinds="u")
     if dataset.dtype != np.uint8:
         raise SceneError(path, f"holds {dataset.dtype}, expected uint8", hdf5.MAKE_AGAIN, "observation")
-    return FilePictures(path.resolve(), "observation", tuple(dataset.shape), file_stamp(path))
+    return FilePictures(path.resolve(), "observation", tuple(dataset.shape), file_stamp(path.resolve()))
 
 
 def _distance_quirks(file: h5py.File, path: Path, scene: Scene) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 from clearway.errors import ClearwayError
@@ -16,31 +16,31 @@ AT_ONCE = 50  # things in a part
 
 Thing = TypeVar("Thing")
 Result = TypeVar("Result")
-_Before: TypeAlias = Callable[[Sequence[Any]], None] | None
-_Part: TypeAlias = tuple[Callable[[Any], Any], _Before, Sequence[Any]]
+_Ahead: TypeAlias = Callable[[Sequence[Any]], Iterable[Any]] | None
+_Part: TypeAlias = tuple[Callable[[Any], Any], _Ahead, Sequence[Any]]
 _Done: TypeAlias = tuple[list[Any], list[tuple[str, type[Warning]]]]  # results, and what was warned of
 
 
 def of_each(
     function: Callable[[Thing], Result],
     things: Sequence[Thing],
-    before: Callable[[Sequence[Thing]], None] | None = None,
+    ahead: Callable[[Sequence[Thing]], Iterable[Thing]] | None = None,
 ) -> Iterator[Result]:
     """What a function makes of each thing, in order; what it warns of is warned of here.
 
     Args:
         function: stands in a module.
         things: the things.
-        before: where there are processes, called in each with the things that it does next; stands in a module.
+        ahead: gives things in their order, and has those come together that are next; stands in a module.
 
     Raises:
         ClearwayError: what the function raised, or a process died.
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if len(things) < MANY or cores == 1:
-        yield from map(function, things)
+        yield from map(function, things if ahead is None else ahead(things))
         return
-    parts = [(function, before, things[first : first + AT_ONCE]) for first in range(0, len(things), AT_ONCE)]
+    parts = [(function, ahead, things[first : first + AT_ONCE]) for first in range(0, len(things), AT_ONCE)]
     environment = {"OMP_NUM_THREADS": "1"}
     work: Work[None, _Part, _Done] = Work(_ready, _done, _died, environment=environment)
     with workers_for(work, workers=cores) as crew:
@@ -57,12 +57,10 @@ def _ready() -> None:
 
 def _done(_: None, part: _Part) -> _Done:
     """The results of a part, and what was warned of."""
-    function, before, things = part
+    function, ahead, things = part
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        if before is not None:
-            before(things)
-        results = [function(thing) for thing in things]
+        results = [function(thing) for thing in (things if ahead is None else ahead(things))]
     return results, [(str(one.message), one.category) for one in caught]
 
 

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from clearway.errors import ArgumentError, SceneError
+from clearway.remote.address import file_bytes
 from clearway.rooms.camera import VERTICAL_FOV_DEG
 from clearway.scenes import hdf5
 from clearway.scenes.file_pictures import FilePictures, file_stamp
@@ -150,7 +151,7 @@ def read_shard(path: Path) -> Shard:
         room, record = (hdf5.read_record(file, name, path) or {} for name in ("room", "settings"))
         settings = _settings(record, path)
         count = settings.picture_count
-        limit = memory_limit(path.stat().st_size)
+        limit = memory_limit(file_bytes(path))
         for name in (RGB, TABLE):
             if (dataset := hdf5.find_dataset(file, name, path)) is None:
                 raise SceneError(path, "is missing", "Give a whole file of clearway scenes views", name)
@@ -168,7 +169,7 @@ def read_shard(path: Path) -> Shard:
         raise SceneError(path, f"has other sensors than its settings say: {shown}", hdf5.MAKE_AGAIN)
     if {"name", "key"} != set(room) or not all(isinstance(text, str) for text in room.values()):
         raise SceneError(path, "does not say which room it shows", hdf5.MAKE_AGAIN)
-    rgb = FilePictures(path.resolve(), RGB, (count, *colour.shape), file_stamp(path))
+    rgb = FilePictures(path.resolve(), RGB, (count, *colour.shape), file_stamp(path.resolve()))
     return Shard(path, str(room["name"]), str(room["key"]), settings, rgb, further)
 
 

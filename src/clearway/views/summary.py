@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from clearway.scenes.scene_files import SCENE_SUFFIXES
-from clearway.views.shard import is_shard
+from clearway.remote.address import file_bytes
 from clearway.views.stream import Views
 from clearway.views.table import joined
 from clearway.zones import Zone
 
 CHECKED_PICTURES = 256  # that are in memory together
 NEAR_M = 0.3  # ahead of the body
-
-
-def are_views(path: Path) -> bool:
-    """Whether a file is a shard, or the first scene file of a folder is. Raises SceneError where it is no HDF5."""
-    if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.suffix in SCENE_SUFFIXES)
-        return bool(files) and is_shard(files[0])
-    return path.is_file() and is_shard(path)
 
 
 def summary(views: Views) -> dict[str, object]:
@@ -46,7 +35,7 @@ def summary(views: Views) -> dict[str, object]:
         "seed": settings.seed,
         "held_out": settings.held_out,
         "scene_headings": settings.scene_headings,
-        "bytes_a_picture": round(sum(shard.path.stat().st_size for shard in views.shards) / len(views)),
+        "bytes_a_picture": round(sum(file_bytes(shard.path) for shard in views.shards) / len(views)),
         "zones": {zone.name.lower(): int((table.zone == zone).sum()) for zone in Zone},
         "mean_clearance_m": round(float(table.clearance_m.mean()), 3),
         "mean_free_m": round(float(table.free_m.mean()), 3),
