@@ -169,6 +169,7 @@ def check_zones_of_cells(section: Section) -> None:
         assert claim.verdict == "undecided"
 
 
+@pytest.mark.slow
 def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
     records["unpack"](DOCS / "records" / "zones-or-step-bathroom.tar.xz", tmp_path / "zones")

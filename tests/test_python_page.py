@@ -41,6 +41,7 @@ def test_what_is_to_be_shortened_stands_there() -> None:
     assert all(old in whole for old in SMALLER)
 
 
+@pytest.mark.slow
 def test_the_blocks_run_on_a_small_room(tmp_path: Path, monkeypatch, capsys) -> None:
     def stand_in(name, seed, **_):
         return grid_scene(3, width=6, depth=5, obstacle_share=0.1, picture_size=(32, 32), name=name)

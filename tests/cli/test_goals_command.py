@@ -64,6 +64,7 @@ def rooms(clearway, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_it_walks_by_perturbed_pictures_of_rooms_built_again(clearway, run, rooms):
     words = ("evaluate", run / "run", rooms, "--goals", 5, "--step-limit", 60, "--perturb", "all", "--takes", 1)
     found = clearway(*words, "--json").json

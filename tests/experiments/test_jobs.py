@@ -125,6 +125,7 @@ def test_ctrl_c_is_said_once_and_not_by_workers(tmp_path: Path) -> None:
     assert "interrupted" in said
 
 
+@pytest.mark.slow
 def test_a_killed_command_leaves_no_worker_that_keeps_its_runs_locked(tmp_path: Path) -> None:
     with subprocess.Popen(endless_command(tmp_path), stderr=subprocess.PIPE, text=True) as process:
         wait_until(lambda: any(tmp_path.glob("out/runs/*/metrics.jsonl")), process)

@@ -43,5 +43,6 @@ def test_with_the_advantage_s_sign_turned_round_it_does_not(monkeypatch: pytest.
     assert not solves_everything(RECIPE)
 
 
+@pytest.mark.slow
 def test_it_solves_a_small_world_one_scene_at_a_time() -> None:
     assert solves_everything(replace(RECIPE, frames=120_000, scenes_at_once=1, scene_updates=2))

@@ -61,6 +61,7 @@ def walk_while_replicas_die(service: Running, sessions: int, kills: int, pause_s
     return sum(steps for steps in told if isinstance(steps, int))
 
 
+@pytest.mark.slow
 def test_replicas_die_under_load_and_no_session_is_lost_nor_a_step_walked_twice() -> None:
     with running(replicas=2, seconds=0.002, health=True) as service:
         steps = walk_while_replicas_die(service, sessions=6, kills=3, pause_s=0.5)

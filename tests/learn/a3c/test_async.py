@@ -183,6 +183,7 @@ def has_begun(process: int) -> bool:
     return "clearway-a3c" in Path(f"/proc/{process}/maps").read_text()
 
 
+@pytest.mark.slow
 @needs_proc
 def test_workers_do_not_outlive_a_killed_parent(tmp_path: Path) -> None:
     process, workers = run_until_metrics(tmp_path)
