@@ -1,6 +1,7 @@
 """Files from elsewhere, kept within a limit."""
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -109,6 +110,29 @@ def test_what_another_process_has_fetched_stays(web: str, monkeypatch: pytest.Mo
     assert kept() in ("ac", "bc")  # those two came together
     assert not other.path.exists()
     end_process()
+
+
+def test_what_was_refused_is_not_kept(web: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LIMIT_VARIABLE, "2.5e-6")
+    fetched([f"{web}/a.h5"], SUFFIXES)
+    with pytest.raises(ClearwayError, match="5e-06 GB are to be kept here"):
+        fetched([web], SUFFIXES)
+    assert [path.name for path in fetched([f"{web}/a.h5", f"{web}/e.h5"], SUFFIXES)] == ["a.h5", "e.h5"]
+    end_process()
+
+
+def test_who_emptied_the_cache_has_taken_no_lease(web: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LIMIT_VARIABLE, "2.5e-6")
+    fetched([f"{web}/a.h5"], SUFFIXES)
+    shutil.rmtree(fetched_folder())
+    fetched([f"{web}/b.h5"], SUFFIXES)
+    mine = leases.lease_of(fetched_folder())
+    leases._made.cache_clear()  # as if of another process
+    with pytest.raises(ClearwayError, match="are to be kept here"):
+        fetched([f"{web}/c.h5", f"{web}/d.h5"], SUFFIXES)
+    assert kept() == "b"
+    end_process()
+    mine.end()
 
 
 @pytest.mark.parametrize("words", ["much", "0", "-1", "nan"])

@@ -112,13 +112,18 @@ def _stay(folder: Path, places: Sequence[Path], may_pass: bool) -> bool:
     kept = leased(folder) | set(entries)
     if may_pass and sum(map(_size, kept)) > (1 - AHEAD) * _limit():  # the rest is for those that pass
         return False
-    lease.add(entries)
+    new = [entry for entry in dict.fromkeys(entries) if entry not in lease.entries]
+    lease.add(new)
     for entry, place in zip(entries, places, strict=True):
         if place.exists() and place.stat().st_size != _size(entry):  # damaged since
             shutil.rmtree(folder / entry)
         elif place.exists():
             os.utime(folder / entry)
-    _make_room(folder)
+    try:
+        _make_room(folder)
+    except ClearwayError:
+        lease.drop(new)
+        raise
     return True
 
 

@@ -40,6 +40,15 @@ class Lease:
     def add(self, entries: Iterable[str]) -> None:
         """Write further entries down."""
         self.entries.update(dict.fromkeys(entries))
+        self._write()
+
+    def drop(self, entries: Iterable[str]) -> None:
+        """Give some entries back."""
+        for entry in entries:
+            del self.entries[entry]
+        self._write()
+
+    def _write(self) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         if not self._lock_path.exists():  # its user has emptied the cache, and others would take this for abandoned
             self.lock.release(force=True)

@@ -40,7 +40,7 @@ def _opened_name(path: Path, opened: ExitStack) -> Path:
         except FileNotFoundError:
             if not left:
                 raise
-    with suppress(FileNotFoundError):  # it has gone again
+    with suppress(OSError):  # it has gone again, or may only be read
         os.utime(path.parent)  # used last
     return name
 
