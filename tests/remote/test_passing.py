@@ -8,6 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -162,6 +163,21 @@ def test_who_has_opened_a_file_reads_on_when_it_goes(scenes: Path, monkeypatch: 
         looked_at(second)
         assert not first.observations.path.exists()  # type: ignore[union-attr]
         assert name.read_bytes() == (scenes / "a.h5").read_bytes()
+
+
+def test_a_file_that_goes_while_it_is_opened_is_opened_again(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit_to(1, scenes, monkeypatch)
+    *_, last = passing_scenes()
+    path, expected, opened, goes = last.observations.path, looked_at(last), h5py.File, [True]  # type: ignore[union-attr]
+
+    def late(name: Path, mode: str) -> h5py.File:
+        if goes:
+            goes.clear()
+            shutil.rmtree(path.parent)
+        return opened(name, mode)
+
+    monkeypatch.setattr(h5py, "File", late)
+    assert (looked_at(last) == expected).all() and not goes
 
 
 def test_a_whole_set_leaves_room_for_those_that_pass(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from clearway.errors import SceneError, reason_of
 from clearway.files import parse_json, written_whole
 from clearway.remote.address import is_fetched
-from clearway.remote.passing import name_of_present
+from clearway.remote.passing import TRIES, name_of_present
 from clearway.scenes.memory_limits import COPIES, MOST_BYTES, array_limit
 from clearway.scenes.storage import check_storage, check_unpacking, check_written
 
@@ -66,19 +66,29 @@ def opened(path: Path) -> Iterator[h5py.File]:
         raise SceneError(path, "is a folder", "Name a scene file in it")
     if not is_fetched(path) and not path.exists():
         raise SceneError(path, "there is no such file", "Check the path")
-    with faults_named(path, problem="cannot be opened as HDF5"), name_of_present(path) as name:
-        try:
-            file = h5py.File(name, "r")
-        except OSError as fault:
-            if not h5py.is_hdf5(name):
-                problem = "is not an HDF5 file"
-                raise SceneError(path, problem, "Give a scene file in the thor_v1 format") from fault
-            raise
+    with faults_named(path, problem="cannot be opened as HDF5"):
+        file = _opened(path)
     try:
         yield file
     finally:
         with faults_named(path, problem="cannot be closed"):
             file.close()
+
+
+def _opened(path: Path) -> h5py.File:
+    """The file; the library asks for its place on the disk, so one that goes while it is opened is opened again."""
+    for left in reversed(range(TRIES)):
+        with name_of_present(path) as name:
+            try:
+                return h5py.File(name, "r")
+            except OSError as fault:
+                if left and is_fetched(path) and not path.exists():
+                    continue
+                if not h5py.is_hdf5(name):
+                    problem = "is not an HDF5 file"
+                    raise SceneError(path, problem, "Give a scene file in the thor_v1 format") from fault
+                raise
+    raise AssertionError("the last try ends above")
 
 
 @contextmanager
