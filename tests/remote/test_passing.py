@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -178,6 +179,45 @@ def test_a_file_that_goes_while_it_is_opened_is_opened_again(scenes: Path, monke
 
     monkeypatch.setattr(h5py, "File", late)
     assert (looked_at(last) == expected).all() and not goes
+
+
+def test_a_damaged_copy_comes_again(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit_to(1, scenes, monkeypatch)
+    *_, last = passing_scenes()
+    path = last.observations.path  # type: ignore[union-attr]
+    path.write_bytes(path.read_bytes()[:-100])
+    assert (looked_at(passing_scenes()[-1]) == looked_at(clearway.load_scenes(scenes)[-1])).all()
+
+
+def test_a_file_that_is_replaced_while_it_comes_is_refused(
+    scenes: Path, s3: Callable[[str, bytes], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    download = Store.download
+
+    def late(*given: Any) -> None:
+        s3("set/a.h5", bytes((scenes / "a.h5").stat().st_size))
+        download(*given)
+
+    monkeypatch.setattr(Store, "download", late)
+    with pytest.raises(ClearwayError, match=r"^s3://rooms/set/a.h5: has changed while it was fetched. Begin again$"):
+        fetched([f"{SET}/a.h5"], (".h5",))
+    assert kept_bytes() == 0
+
+
+def test_what_comes_counts_for_others(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A set that stays, and is fetched while a file of one that passes is under way, makes no more of the cache."""
+    limit_to(1.2, scenes, monkeypatch)
+    (first, *_), download = passing_scenes(), Store.download
+
+    def late(*given: Any) -> None:
+        monkeypatch.setattr(Store, "download", download)
+        with pytest.raises(ClearwayError, match="are to be kept here"):
+            fetched([f"{SET}/f.h5"], (".h5",))
+        download(*given)
+
+    monkeypatch.setattr(Store, "download", late)
+    assert looked_at(first).size
+    fetched([f"{SET}/f.h5"], (".h5",))
 
 
 def test_a_whole_set_leaves_room_for_those_that_pass(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,13 +49,32 @@ def is_fetched(path: Path) -> bool:
     """Whether a path is that of a file which was fetched; it may have gone since, to make room for others."""
     if not ENTRY.fullmatch(path.parent.name):
         return False
-    return path.parent.parent.resolve() == fetched_folder().resolve()
+    parent, own = path.parent.parent, fetched_folder()
+    return parent == own or parent.resolve() == own.resolve()
+
+
+def entry_bytes(entry: str) -> int:
+    """Size of the file of an entry."""
+    return int(entry.partition("-")[2])
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a file that was fetched is there as it was fetched."""
+    try:
+        status = path.stat()
+    except OSError:
+        return False
+    return (status.st_size, status.st_mtime_ns) == (entry_bytes(path.parent.name), COPIED_NS)
 
 
 def file_bytes(path: Path) -> int:
     """Size of a file, of one that was fetched also when it has gone. Raises OSError where there is none."""
-    found = ENTRY.fullmatch(path.parent.name)
-    return int(found[1]) if found and is_fetched(path) else path.stat().st_size
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        if is_fetched(own := path.resolve()):
+            return entry_bytes(own.parent.name)
+        raise
 
 
 def origin(path: Path) -> str:

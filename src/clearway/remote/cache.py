@@ -14,13 +14,22 @@ import shutil
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from clearway.errors import ClearwayError
 from clearway.files import CACHE_VARIABLE, json_text, locked, part_folder, read_json
 from clearway.progress import picture_progress
-from clearway.remote.address import COPIED_NS, ENTRY, MAX_RECORD_BYTES, RECORDS, fetched_folder, without_secrets
+from clearway.remote.address import (
+    COPIED_NS,
+    ENTRY,
+    MAX_RECORD_BYTES,
+    RECORDS,
+    entry_bytes,
+    fetched_folder,
+    is_whole,
+    without_secrets,
+)
 from clearway.remote.leases import lease_of, leased
 from clearway.remote.store import RemoteFile, Store
 
@@ -58,10 +67,11 @@ def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool
             _write_records(folder, files)
             stay = _stay(folder, list(places.values()), may_pass)
         if stay:
-            missing = {file: store for file, store in files.items() if not places[file].exists()}
+            missing = {file: store for file, store in files.items() if not is_whole(places[file])}
             _fetch(missing, folder, show_progress=len(missing) > 1)
         else:
-            told = f"{sum(file.size for file in files) / 1e9:,.3g} GB do not fit into a cache of {_limit() / 1e9:g} GB"
+            size_gb, limit_gb = sum(file.size for file in files) / 1e9, _limit() / 1e9
+            told = f"{size_gb:,.3g} GB do not fit into a cache of {limit_gb:g} GB, beside what others keep there"
             remedy = f"they are fetched as they are read, more than once. Set {LIMIT_VARIABLE} to more"
             warnings.warn(f"{without_secrets(addresses[0])}: {told}; {remedy}", CacheWarning, stacklevel=2)
     return [places[file] for some in found for file in some]
@@ -75,11 +85,11 @@ def fetch_again(places: Sequence[Path]) -> None:
     """
     folder = fetched_folder()
     with _faults_named(folder), locked(folder / ".passing"):
-        missing = dict.fromkeys(place for place in places if not place.exists())  # others have fetched some meanwhile
-        files = dict(_found_again(folder, place) for place in missing)
-        with locked(folder / ".cache"):
-            _make_room(folder, sum(file.size for file in files))
-        _fetch(files, folder, show_progress=False)
+        missing = list(dict.fromkeys(place for place in places if not is_whole(place)))  # others may have fetched some
+        with ThreadPoolExecutor(AT_ONCE) as asking:
+            files = dict(asking.map(lambda place: _found_again(folder, place), missing))
+        with _kept_meanwhile(folder, places):
+            _fetch(files, folder, show_progress=False)
 
 
 def groups(places: Iterable[Path]) -> Iterator[list[Path]]:
@@ -87,13 +97,25 @@ def groups(places: Iterable[Path]) -> Iterator[list[Path]]:
     group: list[Path] = []
     left = most = AHEAD * _limit()
     for place in places:
-        left -= _size(place.parent.name)
+        left -= entry_bytes(place.parent.name)
         if group and (left < 0 or len(group) == AT_ONCE):
             yield group
-            group, left = [], most - _size(place.parent.name)
+            group, left = [], most - entry_bytes(place.parent.name)
         group.append(place)
     if group:
         yield group
+
+
+@contextmanager
+def _kept_meanwhile(folder: Path, places: Sequence[Path]) -> Iterator[None]:
+    """Keep files, with room for them, while the block runs."""
+    with locked(folder / ".cache"):
+        _keep(folder, places)
+    try:
+        yield
+    finally:
+        with locked(folder / ".cache"):
+            lease_of(folder).drop([place.parent.name for place in places])
 
 
 @contextmanager
@@ -107,24 +129,28 @@ def _faults_named(folder: Path) -> Iterator[None]:
 
 
 def _stay(folder: Path, places: Sequence[Path], may_pass: bool) -> bool:
-    """Keep files for as long as this process lives, and make room for them; not where they may pass and do not fit."""
-    lease, entries = lease_of(folder), [place.parent.name for place in places]
-    kept = leased(folder) | set(entries)
-    if may_pass and sum(map(_size, kept)) > (1 - AHEAD) * _limit():  # the rest is for those that pass
+    """Keep files for as long as this process lives; not where they may pass and do not fit."""
+    kept = leased(folder) | {place.parent.name for place in places}
+    if may_pass and sum(map(entry_bytes, kept)) > (1 - AHEAD) * _limit():  # the rest is for those that pass
         return False
-    new = [entry for entry in dict.fromkeys(entries) if entry not in lease.entries]
-    lease.add(new)
+    _keep(folder, places)
+    return True
+
+
+def _keep(folder: Path, places: Sequence[Path]) -> None:
+    """Add files to the lease, remove what is damaged of them, and make room for all."""
+    lease, entries = lease_of(folder), [place.parent.name for place in places]
+    lease.add(entries)
     for entry, place in zip(entries, places, strict=True):
-        if place.exists() and place.stat().st_size != _size(entry):  # damaged since
-            shutil.rmtree(folder / entry)
+        if is_whole(place):
+            os.utime(folder / entry)  # used last
         elif place.exists():
-            os.utime(folder / entry)
+            shutil.rmtree(folder / entry)
     try:
         _make_room(folder)
     except ClearwayError:
-        lease.drop(new)
+        lease.drop(entries)
         raise
-    return True
 
 
 def _write_records(folder: Path, files: Iterable[RemoteFile]) -> None:
@@ -154,32 +180,34 @@ def _found_again(folder: Path, place: Path) -> tuple[RemoteFile, Store]:
         raise ClearwayError(f"{place}: {problem}. Begin again with the address that it came from") from fault
     store = Store(address)
     file = store.file(address)
-    if _entry(file) != entry:
+    if (_entry(file), file.name) != (entry, place.name):
         raise ClearwayError(f"{address}: has changed since it was first read. Begin again")
     return file, store
 
 
-def _make_room(folder: Path, more: int = 0) -> None:
-    """Remove files that nobody keeps until all others, those that are kept, and so many more bytes fit into the limit.
+def _make_room(folder: Path) -> None:
+    """Remove files that nobody keeps until all others and those that are kept fit into the limit.
 
     Raises:
         ClearwayError: those that are kept do not fit.
     """
-    limit, used = _limit(), leased(folder)
-    size = sum(map(_size, used)) + more
+    limit, kept = _limit(), leased(folder)
+    size = sum(map(entry_bytes, kept))
     if size > limit:
-        own = sum(map(_size, lease_of(folder).entries)) + more
+        own = sum(map(entry_bytes, lease_of(folder).uses))
         problem = f"{own / 1e9:,.3g} GB are to be kept here, {(size - own) / 1e9:,.3g} GB by others that run now"
         raise ClearwayError(f"{folder}: {problem}, the limit is {limit / 1e9:g} GB. Set {LIMIT_VARIABLE} to more")
-    free = [entry for entry in os.scandir(folder) if entry.name not in used and ENTRY.fullmatch(entry.name)]
-    size += sum(_size(entry.name) for entry in free)
+    free = [entry for entry in os.scandir(folder) if entry.name not in kept and ENTRY.fullmatch(entry.name)]
+    size += sum(entry_bytes(entry.name) for entry in free)
     if size <= limit:
         return
-    for entry in sorted(free, key=lambda entry: entry.stat().st_mtime):
-        shutil.rmtree(entry.path)
-        size -= _size(entry.name)
-        if size <= limit:
-            break
+    with part_folder(folder) as gone:
+        for entry in sorted(free, key=lambda entry: entry.stat().st_mtime):
+            if size <= limit:
+                break
+            with suppress(OSError):  # in use, on a system that lets no such file go: the next one
+                Path(entry.path).replace(gone / entry.name)
+                size -= entry_bytes(entry.name)
 
 
 def _limit() -> float:
@@ -211,6 +239,9 @@ def _fetch(files: Mapping[RemoteFile, Store], folder: Path, *, show_progress: bo
             new = part / _entry(file)
             new.mkdir()
             files[file].download(file, new / file.name)
+            if _entry(files[file].file(file.address)) != new.name:
+                problem = "has changed while it was fetched"
+                raise ClearwayError(f"{without_secrets(file.address)}: {problem}. Begin again")
             os.utime(new / file.name, ns=(COPIED_NS, COPIED_NS))
             try:
                 new.replace(folder / new.name)
@@ -232,7 +263,3 @@ def _entry(file: RemoteFile) -> str:
     """The name of a file's folder: what it is, and its bytes."""
     digest = hashlib.sha256(f"{file.address}\n{file.version}".encode()).hexdigest()
     return f"{digest[:32]}-{file.size}"
-
-
-def _size(entry: str) -> int:
-    return int(entry.partition("-")[2])

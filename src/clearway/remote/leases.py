@@ -9,6 +9,7 @@ import atexit
 import functools
 import os
 import threading
+from collections import Counter
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -27,7 +28,7 @@ class Lease:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / LEASES / f"{os.getpid()}-{os.urandom(4).hex()}"
-        self.entries: dict[str, None] = {}
+        self.uses: Counter[str] = Counter()
         self.process = os.getpid()
         self.lock = FileLock(self._lock_path)
         self.lock.acquire()
@@ -38,14 +39,13 @@ class Lease:
         return Path(f"{self.path}.lock")
 
     def add(self, entries: Iterable[str]) -> None:
-        """Write further entries down."""
-        self.entries.update(dict.fromkeys(entries))
+        """Keep some entries once more."""
+        self.uses.update(entries)
         self._write()
 
     def drop(self, entries: Iterable[str]) -> None:
-        """Give some entries back."""
-        for entry in entries:
-            del self.entries[entry]
+        """Give some entries back that were added."""
+        self.uses -= Counter(entries)
         self._write()
 
     def _write(self) -> None:
@@ -54,7 +54,7 @@ class Lease:
             self.lock.release(force=True)
             self.lock = FileLock(self._lock_path)
             self.lock.acquire()
-        self.path.write_text("".join(f"{entry}\n" for entry in self.entries), encoding="utf-8")
+        self.path.write_text("".join(f"{entry}\n" for entry in self.uses), encoding="utf-8")
 
     def end(self) -> None:
         """Give the lease back; a forked process has none of its own to give."""

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from clearway.regular_files import name_of_opened
-from clearway.remote.address import is_fetched
+from clearway.remote.address import is_fetched, is_whole
 
 TRIES = 20  # to open a file that others remove as soon as it has come
 
@@ -51,11 +51,11 @@ def bring(paths: Sequence[Path]) -> None:
     Raises:
         ClearwayError: as of `name_of_present`.
     """
-    missing = [path for path in paths if is_fetched(path) and not path.exists()]
-    if missing:
+    wanted = [path for path in paths if is_fetched(path)]
+    if not all(map(is_whole, wanted)):
         from clearway.remote.cache import fetch_again
 
-        fetch_again(missing)
+        fetch_again(wanted)
 
 
 def in_turn(paths: Sequence[Path]) -> Iterator[Path]:
