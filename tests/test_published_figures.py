@@ -208,6 +208,26 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
 
 
+def test_four_rooms_at_three_times_the_rate_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
+    records["unpack"](DOCS / "records" / "four-rooms-rate.tar.xz", tmp_path / "four")
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
+    trials = sorted((tmp_path / "four").glob("runs/*/trials/*.json"))
+    assert len(trials) == 4
+    for trial in trials:
+        content = json.loads(trial.read_text(encoding="utf-8"))
+        settings = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
+        reward, frames = settings["reward"]["name"], 5 if content["about"]["halfway"] else 10
+        assert settings["learner"]["lr_start"] == 0.0021
+        begin = f"| {reward}, 3 x rate | {frames} M | "
+        (line,) = [line for line in page.splitlines() if line.startswith(begin)]
+        steps, collisions, failed = line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
+        episodes = {name: np.array(column) for name, column in content["episodes"].items()}
+        expect(steps, episodes["steps"].mean(), begin)
+        expect(collisions, episodes["collisions"].mean(), begin)
+        assert failed == f"{len(set(episodes['target'][~episodes['reached'].astype(bool)].tolist()))} of 20"
+
+
 def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records, folder = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py")), tmp_path / "bedroom"
     records["unpack"](DOCS / "records" / "bedroom.tar.xz", folder)
@@ -395,7 +415,7 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
 def test_a_record_does_not_say_where_its_folder_lay(record: Path) -> None:
     with tarfile.open(record, "r:xz") as archive:
         settings = [member for member in archive if member.name.endswith(("run.json", "reproduction.json"))]
-        assert len(settings) > 10
+        assert len(settings) >= 2
         for member in settings:
             file = archive.extractfile(member)
             assert file is not None and not re.search(rb'(?:"| )/\w', file.read()), member.name
