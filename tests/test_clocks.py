@@ -18,6 +18,7 @@ KNOWN = {
     ("learn/tracking.py", "time.time"): "where TensorBoard draws a run on its axis of days",
     ("scenes/file_pictures.py", "st_mtime_ns"): "held against the one before, as equal or not",
     ("experiments/jobs.py", "st_mtime_ns"): "held against the one before, as equal or not",
+    ("remote/address.py", "st_mtime_ns"): "held against a constant that a whole copy is marked with, as equal or not",
     ("remote/cache.py", "os.utime"): "which file goes first from a full cache; those that are kept stay",
     ("remote/cache.py", "st_mtime"): "which file goes first from a full cache; those that are kept stay",
     ("remote/passing.py", "os.utime"): "which file goes first from a full cache; it is fetched again",
