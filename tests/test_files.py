@@ -5,10 +5,13 @@ import json
 import os
 import subprocess
 import sys
+import threading
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock, Timeout
 
 from clearway import files
 from clearway.errors import ClearwayError
@@ -169,3 +172,28 @@ def test_an_unfinished_folder_of_a_killed_process_goes(tmp_path: Path) -> None:
     with folder_written_whole(tmp_path / "other") as part:
         (part / "whole").touch()
     assert names(tmp_path) == ["other"]
+
+
+def test_who_waits_for_another_process_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "TOLD_AFTER_S", 0.01)
+    other = FileLock(tmp_path / "set.lock", thread_local=False)
+    other.acquire()
+    anyway = threading.Timer(5, other.release)
+    told = []
+
+    def let_go(text: str, *_: object, **__: object) -> None:
+        told.append(text)
+        other.release()
+
+    monkeypatch.setattr(warnings, "warn", let_go)
+    anyway.start()
+    with files.locked(tmp_path / "set"):
+        assert told == [f"{tmp_path}: waits for another process that is at work there"]
+    anyway.cancel()
+
+
+def test_who_need_not_wait_says_nothing(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    with files.locked(tmp_path / "new" / "set"), pytest.raises(Timeout):
+        FileLock(tmp_path / "new" / "set.lock").acquire(timeout=0)
+    FileLock(tmp_path / "new" / "set.lock").acquire(timeout=0)
+    assert not recwarn.list

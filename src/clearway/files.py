@@ -10,6 +10,7 @@ import platform
 import re
 import shutil
 import tempfile
+import warnings
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -23,6 +24,11 @@ T = TypeVar("T")
 CACHE_VARIABLE = "CLEARWAY_CACHE"
 PART_NAME = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})-(?P<process>[0-9]+)-\w+\.part")
 MAX_JSON_BYTES = 64 * 1024**2
+TOLD_AFTER_S = 5.0  # of waiting for another process
+
+
+class WaitsWarning(UserWarning):
+    """Another process is at work on the same files, and this one waits for it."""
 
 
 @contextmanager
@@ -213,15 +219,23 @@ def cache_dir() -> Path:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Hold the lock of `path` (a file `path`.lock beside it); others wait until it is released.
+    """Hold the lock of `path` (a file `path`.lock beside it); others wait until it is released, and say so in time.
 
     The operating system frees the lock when its holder dies, so a killed process blocks nobody.
     """
-    from filelock import FileLock
+    from filelock import FileLock, Timeout
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    with FileLock(f"{path}.lock"):
+    lock = FileLock(f"{path}.lock")
+    try:
+        lock.acquire(timeout=TOLD_AFTER_S)
+    except Timeout:
+        warnings.warn(f"{path.parent}: waits for another process that is at work there", WaitsWarning, stacklevel=3)
+        lock.acquire()
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def json_text(content: object) -> str:
