@@ -115,6 +115,24 @@ def test_an_agent_learns_from_a_set_that_does_not_fit(
     assert [scene_digest(scene) for scene in again] == [scene.digest for scene in record.scenes]
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_workers_on_ray_learn_from_a_set_that_does_not_fit(
+    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from helpers.on_ray import cluster_here  # where Ray is not installed, this test alone is skipped
+
+    limit = limit_to(1, scenes, monkeypatch)
+    learner = small_learner(frames=240)
+    clearway.train(scenes, algorithm=learner, workers=2, out=tmp_path / "here")
+    with cluster_here(2), pytest.warns(CacheWarning):
+        clearway.train(SET, algorithm=learner, workers=2, ray="local", out=tmp_path / "there")
+    folders = (RunFolder(tmp_path / name) for name in ("here", "there"))
+    ours, theirs = ([(row["loss"], row["steps"]) for row in folder.metrics()] for folder in folders)
+    assert theirs == ours and len(ours) == 3
+    assert 0 < kept_bytes() <= limit
+
+
 def test_threads_read_side_by_side(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is room for one file, and every one of them is wanted by several at once."""
     limit = limit_to(1, scenes, monkeypatch)
