@@ -171,7 +171,7 @@ def test_an_error_of_one_worker_ends_all_with_its_words(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_an_error_of_one_worker_is_heard_by_those_who_wait_for_it(tmp_path: Path) -> None:
     began = time.monotonic()
-    assert launched(OneFails(tmp_path, os.getpid(), 1, "cpu"), 2) == [WORDS, WORDS]
+    assert launched(OneFails(tmp_path, os.getpid(), 1, "cpu", {}), 2) == [WORDS, WORDS]
     assert time.monotonic() - began < PATIENCE_S
 
 

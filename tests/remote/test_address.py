@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from clearway.remote.address import address_of, file_name, origin, without_secrets
+from clearway.remote.address import address_of, file_name, without_secrets
+from clearway.remote.records import origin
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,9 @@ import pytest
 
 from clearway.errors import ClearwayError
 from clearway.remote import leases
-from clearway.remote.address import fetched_folder, origin
+from clearway.remote.address import fetched_folder
 from clearway.remote.cache import LIMIT_VARIABLE, fetched
+from clearway.remote.records import origin
 from clearway.remote.store import Store
 from helpers.servers_of_files import files_of, web_server
 

@@ -19,8 +19,9 @@ from clearway.errors import ClearwayError
 from clearway.learn.load import run_scenes
 from clearway.learn.run_folder import RunFolder
 from clearway.remote import passing
-from clearway.remote.address import RECORDS, fetched_folder, origin
+from clearway.remote.address import fetched_folder
 from clearway.remote.cache import AHEAD, LIMIT_VARIABLE, CacheWarning, fetched
+from clearway.remote.records import RECORDS, origin
 from clearway.remote.store import Store
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.thor_v1 import write_scene
@@ -125,8 +126,9 @@ def test_workers_on_ray_learn_from_a_set_that_does_not_fit(
     limit = limit_to(1, scenes, monkeypatch)
     learner = small_learner(frames=240)
     clearway.train(scenes, algorithm=learner, workers=2, out=tmp_path / "here")
-    with cluster_here(2), pytest.warns(CacheWarning):
-        clearway.train(SET, algorithm=learner, workers=2, ray="local", out=tmp_path / "there")
+    run: dict[str, Any] = {"algorithm": learner, "workers": 2, "ray": "local", "out": tmp_path / "there"}
+    with cluster_here(2), pytest.warns(CacheWarning):  # workers find an empty cache, as on another machine
+        clearway.train(SET, on_begin=lambda _: shutil.rmtree(fetched_folder()), **run)
     folders = (RunFolder(tmp_path / name) for name in ("here", "there"))
     ours, theirs = ([(row["loss"], row["steps"]) for row in folder.metrics()] for folder in folders)
     assert theirs == ours and len(ours) == 3

@@ -8,8 +8,8 @@ import pytest
 
 from clearway.errors import ClearwayError
 from clearway.remote import store
-from clearway.remote.address import RECORDS
 from clearway.remote.cache import fetched
+from clearway.remote.records import RECORDS
 from helpers.servers_of_files import CutShort, GoogleStore, Shrunk, files_of, silent_server, web_server
 
 SUFFIXES = (".h5",)

@@ -15,7 +15,7 @@ import tempfile
 import threading
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -49,12 +49,14 @@ class Task(ABC):
         parent: process that started the workers, with which they end.
         threads: of torch in each.
         device: of torch; each worker has a GPU of its own.
+        records: of files that were fetched, for other machines, see `remote.records`.
     """
 
     out: Path
     parent: int
     threads: int
     device: str
+    records: Mapping[str, str]
 
     @abstractmethod
     def do(self, peers: Peers) -> None:

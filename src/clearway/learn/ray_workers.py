@@ -13,12 +13,13 @@ from typing import Any
 
 import torch
 
-from clearway.errors import RunError
+from clearway.errors import ClearwayError, RunError
 from clearway.learn.crew import INTERRUPTED, PATIENCE, RESTARTS, Place, Task, done_by, given_up
 from clearway.learn.interruption import interruption
 from clearway.learn.peers import LostPeer
 from clearway.learn.provenance import package_versions
 from clearway.ray_cluster import connected
+from clearway.remote.records import take_records
 from clearway.spread.messages import from_message, to_message
 
 ROOM_S = 30.0  # for the cluster to find room for all workers
@@ -137,6 +138,10 @@ def _worker(message: list[Any], place: Place, meets: tuple[str, int], versions: 
         return (
             f"{task.out}: not there on the Ray node {ray.util.get_node_ip_address()}. Give an --out that all nodes see"
         )
+    try:
+        take_records(task.records)
+    except ClearwayError as error:
+        return f"{error}, on the Ray node {ray.util.get_node_ip_address()}"
     os.environ.pop("GLOO_SOCKET_IFNAME", None)
     try:
         store = dist.TCPStore(*meets, is_master=False, timeout=PATIENCE)

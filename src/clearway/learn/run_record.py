@@ -15,7 +15,7 @@ from clearway.learn.algorithms import algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
-from clearway.remote.address import origin
+from clearway.remote.records import origin
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.features import FileFeatures

@@ -31,6 +31,7 @@ from clearway.learn.train import (
     told_of_other_bits,
     train_part,
 )
+from clearway.remote.records import records_of
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,7 @@ def train_by_workers(
             os.getpid(),
             threads or (1 if ray else max(1, torch.get_num_threads() // workers)),
             read.device,
+            records_of((request.paths or {}).values()) if ray else {},
             request=replace(read, scenes=[scene.without_pictures() for scene in read.scenes]),
             show_progress=show_progress,
             until_solved=until_solved,

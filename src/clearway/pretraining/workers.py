@@ -20,6 +20,7 @@ from clearway.pretraining.pretrain import SECONDS_BETWEEN_CHECKPOINTS, pretrain_
 from clearway.pretraining.together import check_groups
 from clearway.pretraining.trainer import PretrainRequest
 from clearway.progress import picture_progress
+from clearway.remote.records import records_of
 from clearway.torch_device import usable_device
 
 
@@ -92,6 +93,7 @@ def pretrain_by_workers(
             os.getpid(),
             threads or (1 if ray else max(1, torch.get_num_threads() // workers)),
             request.device,
+            records_of(shard.path for shard in request.views.shards) if ray else {},
             request=request,
             track=track,
             show_progress=show_progress,

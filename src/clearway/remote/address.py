@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
-from clearway.files import cache_dir, read_json
+from clearway.files import cache_dir
 
-MAX_RECORD_BYTES = 64 * 1024
 EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to install, by scheme
-RECORDS = ".records"  # where every file came from that was fetched, by its entry's name
 COPIED_NS = 10**18  # time of change that every copy has, so that one that comes again is the same
 ENTRY = re.compile(r"[0-9a-f]{32}-(\d{1,20})")  # see `cache`
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
@@ -75,12 +72,3 @@ def file_bytes(path: Path) -> int:
         if is_fetched(own := path.resolve()):
             return entry_bytes(own.parent.name)
         raise
-
-
-def origin(path: Path) -> str:
-    """Where a file can be had again: the address of one that was fetched, where that is known; else the whole path."""
-    path = path.resolve()
-    if is_fetched(path):
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            return str(read_json(fetched_folder() / RECORDS / path.parent.name, MAX_RECORD_BYTES)["address"])
-    return str(path)

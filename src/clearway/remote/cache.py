@@ -2,7 +2,7 @@
 
 A file lies in a folder of its own in the cache folder, under `remote`, whose name, its entry, is made of its address,
 version and size: the same entry is the same file. What living processes keep stays (`leases`). Where it came from
-stands in its record, by which it is fetched again after it went (`passing`).
+stands in its record (`records`), by which it is fetched again after it went (`passing`).
 """
 
 from __future__ import annotations
@@ -18,19 +18,18 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from clearway.errors import ClearwayError
-from clearway.files import CACHE_VARIABLE, json_text, locked, part_folder, read_json
+from clearway.files import locked, part_folder
 from clearway.progress import picture_progress
 from clearway.remote.address import (
     COPIED_NS,
     ENTRY,
-    MAX_RECORD_BYTES,
-    RECORDS,
     entry_bytes,
     fetched_folder,
     is_whole,
     without_secrets,
 )
 from clearway.remote.leases import lease_of, leased
+from clearway.remote.records import faults_named, record_text, recorded_address, write_records
 from clearway.remote.store import RemoteFile, Store
 
 LIMIT_VARIABLE = "CLEARWAY_CACHE_GB"
@@ -61,10 +60,10 @@ def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool
     files = {file: stores[address] for address, some in zip(addresses, found, strict=True) for file in some}
     folder = fetched_folder()
     places = {file: folder / _entry(file) / file.name for file in files}
-    with _faults_named(folder):
+    with faults_named(folder):
         may_pass = may_pass and all(file.version and without_secrets(file.address) == file.address for file in files)
         with locked(folder / ".cache"):
-            _write_records(folder, files)
+            write_records(folder, {_entry(file): record_text(file.address, file.version) for file in files})
             stay = _stay(folder, list(places.values()), may_pass)
         if stay:
             missing = {file: store for file, store in files.items() if not is_whole(places[file])}
@@ -84,10 +83,10 @@ def fetch_again(places: Sequence[Path]) -> None:
         ClearwayError: one cannot be had again or is another one now, or the cache is too small for them together.
     """
     folder = fetched_folder()
-    with _faults_named(folder), locked(folder / ".passing"):
+    with faults_named(folder), locked(folder / ".passing"):
         missing = list(dict.fromkeys(place for place in places if not is_whole(place)))  # others may have fetched some
         with ThreadPoolExecutor(AT_ONCE) as asking:
-            files = dict(asking.map(lambda place: _found_again(folder, place), missing))
+            files = dict(asking.map(_found_again, missing))
         with _kept_meanwhile(folder, places):
             _fetch(files, folder, show_progress=False)
 
@@ -118,16 +117,6 @@ def _kept_meanwhile(folder: Path, places: Sequence[Path]) -> Iterator[None]:
             lease_of(folder).drop([place.parent.name for place in places])
 
 
-@contextmanager
-def _faults_named(folder: Path) -> Iterator[None]:
-    """Turn what goes wrong with the cache folder into one line."""
-    try:
-        yield
-    except OSError as fault:
-        remedy = f"Make room, or set {CACHE_VARIABLE} to another folder"
-        raise ClearwayError(f"{folder}: cannot keep what is fetched ({fault.strerror or fault}). {remedy}") from fault
-
-
 def _stay(folder: Path, places: Sequence[Path], may_pass: bool) -> bool:
     """Keep files for as long as this process lives; not where they may pass and do not fit."""
     kept = leased(folder) | {place.parent.name for place in places}
@@ -153,34 +142,16 @@ def _keep(folder: Path, places: Sequence[Path]) -> None:
         raise
 
 
-def _write_records(folder: Path, files: Iterable[RemoteFile]) -> None:
-    """Write down where files come from, but no secrets."""
-    records = folder / RECORDS
-    records.mkdir(parents=True, exist_ok=True)
-    known = {entry.name: entry.stat().st_size for entry in os.scandir(records)}
-    for file in files:
-        text = json_text({"address": without_secrets(file.address), "version": file.version}).encode()
-        if known.get(name := _entry(file)) != len(text):
-            part = records / ".part"
-            part.write_bytes(text)
-            part.replace(records / name)
-
-
-def _found_again(folder: Path, place: Path) -> tuple[RemoteFile, Store]:
+def _found_again(place: Path) -> tuple[RemoteFile, Store]:
     """A file that was fetched, and has gone since, and where it is.
 
     Raises:
         ClearwayError: it cannot be had again, or is another one now.
     """
-    entry = place.parent.name
-    try:
-        address = str(read_json(folder / RECORDS / entry, MAX_RECORD_BYTES)["address"])
-    except (OSError, ValueError, KeyError, TypeError) as fault:
-        problem = "has gone, and its record, too"
-        raise ClearwayError(f"{place}: {problem}. Begin again with the address that it came from") from fault
+    address = recorded_address(place)
     store = Store(address)
     file = store.file(address)
-    if (_entry(file), file.name) != (entry, place.name):
+    if (_entry(file), file.name) != (place.parent.name, place.name):
         raise ClearwayError(f"{address}: has changed since it was first read. Begin again")
     return file, store
 
