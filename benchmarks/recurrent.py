@@ -7,7 +7,8 @@ targets, reward and step limit. RecurrentPPO is given the batched environment, w
 target in the same table, so that it compares no pictures, and a network of the sizes of ours: two layers of 256, a
 memory of 256 (an LSTM, it has no other) shared by policy and critic, a layer of 256 before the actions. It has two
 numbers of environments and steps; the better one counts. Seconds are the process's own, so that other work on the
-machine counts for neither. Needs the extra sb3.
+machine counts for neither. Beside ours stand the operations of its matrix products a frame, and which share of the
+peak they come to: how far a faster program could go at all. Needs the extra sb3.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
+from torch.utils.flop_counter import FlopCounterMode
 
 from clearway.api.scenes import load_scenes
 from clearway.learn.provenance import hardware, package_versions
@@ -43,6 +45,7 @@ from clearway.world.world import World, make_world
 
 OURS = Recurrent(taught=0.0, frames=10**9)
 THEIRS = ((16, 128), (96, 32))  # environments, steps
+PEAK_SIZES = (512, 1024)
 ROUNDS = 3
 
 
@@ -174,6 +177,26 @@ def our_rate(trainer: RecurrentTrainer, seconds: float) -> float:
     return (trainer.frames - before) / (time.process_time() - started)
 
 
+def gflop_per_frame(trainer: RecurrentTrainer) -> float:
+    """Operations of the matrix products of an update, by the frames that it learns from."""
+    before = trainer.frames
+    with FlopCounterMode(display=False) as counted:
+        trainer.update()
+    return counted.get_total_flops() / (trainer.frames - before) / 1e9
+
+
+def peak_gflops() -> float:
+    """Best GFLOP/s of the process's own time of a product of square float32 matrices, on one thread."""
+    best = 0.0
+    for size in PEAK_SIZES:
+        left, right = torch.rand(2, size, size)
+        for _ in range(5):
+            started = time.process_time()
+            left @ right
+            best = max(best, 2 * size**3 / (time.process_time() - started) / 1e9)
+    return best
+
+
 def memory(world: World, trainer: RecurrentTrainer) -> dict[str, float]:
     """Bytes of this world's tables, and what 1,000 rooms of its mean size would take, in megabytes."""
     assert world.features is not None
@@ -203,21 +226,28 @@ def main() -> None:
         taught = replace(OURS, taught=1.0).trainer(world, COLLISION_AWARE, 0)
         paid = OURS.trainer(world, COLLISION_AWARE, 0)
         assert isinstance(taught, RecurrentTrainer) and isinstance(paid, RecurrentTrainer)
+        cost = {"ours": gflop_per_frame(paid), "ours, taught": gflop_per_frame(taught)}
         rates: dict[str, list[float]] = {}
+        peaks: list[float] = []
 
         def keep(name: str, rate: float) -> None:
             rates.setdefault(name, []).append(rate)
             print(f"{name}: {rate:,.0f} frames/s", flush=True)
 
         for _ in range(ROUNDS):
+            peaks.append(peak_gflops())
             keep("ours", our_rate(paid, asked.seconds))
             keep("ours, taught", our_rate(taught, asked.seconds))
             for envs, steps in THEIRS:
                 keep(f"RecurrentPPO, {envs} x {steps}", their_rate(world, paid, envs, steps, asked.seconds))
     medians = {name: statistics.median(found) for name, found in rates.items()}
     best = max(rate for name, rate in medians.items() if name.startswith("RecurrentPPO"))
+    peak = statistics.median(peaks)
     told = {
         "frames_per_second": medians,
+        "peak_gflops": peaks,
+        "gflop_per_frame": cost,
+        "share_of_peak": {name: medians[name] * gflop / peak for name, gflop in cost.items()},
         "rounds": rates,
         "ours_by_theirs": medians["ours"] / best,
         "memory": memory(world, paid),
@@ -227,6 +257,10 @@ def main() -> None:
     asked.out.write_text(json.dumps(told, indent=1) + "\n")
     for name, rate in medians.items():
         print(f"median, {name}: {rate:,.0f} frames/s")
+    print(f"peak of a product: {peak:.0f} GFLOP/s")
+    for name, gflop in cost.items():
+        share = medians[name] * gflop / peak
+        print(f"{name}: {1e3 * gflop:.1f} MFLOP a frame, {share:.0%} of the peak")
     print(f"ours by the best of theirs: {told['ours_by_theirs']:.1f}")
     print(told["memory"])
 

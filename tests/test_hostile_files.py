@@ -23,6 +23,7 @@ def summed_up(flips: int) -> str:
     return summary
 
 
+@pytest.mark.slow
 def test_a_hundred_flipped_bits_and_all_else_that_is_hostile() -> None:
     assert "faulty dumps" in summed_up(100)
 

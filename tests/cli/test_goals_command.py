@@ -167,6 +167,7 @@ def test_the_generalist_walks_to_goals_where_nothing_is_said_of_them(clearway, r
     assert clearway("evaluate", "nobody", "--rooms", "validation").refusal("nobody: no run here")
 
 
+@pytest.mark.slow
 def test_the_generalist_walks_off_the_grid(clearway, rooms):
     words = ("evaluate", "generalist", rooms, "--live", "--goals", 2, "--step-limit", 2)
     (found,) = clearway(*words, "--angle-noise", 5, "--json").json["results"]

@@ -125,6 +125,7 @@ def test_what_needs_a_run_folder_is_refused_beside_an_exported_file(clearway, tm
     assert clearway("evaluate", tmp_path / "agent.onnx", *words).refusal(words[0], "needs a run folder", "is a file")
 
 
+@pytest.mark.slow
 def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_before_it(clearway, runs, monkeypatch):
     def names() -> set[str]:
         return {path.name for path in runs.wary.iterdir() if path.name.startswith("live")}
@@ -182,6 +183,7 @@ def run_in_model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return train(request, folder / "run").path
 
 
+@pytest.mark.slow
 def test_a_run_in_a_mujoco_model_walks_there(clearway, run_in_model, tmp_path):
     short = ("evaluate", run_in_model, "--live", "--episodes", 1, "--step-limit", 2)
     answer = clearway(*short, "--distance-noise", 0.05, "--camera-height-jitter", 0.1, "--light", 0.3, "--json",

@@ -19,6 +19,7 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_views_become_an_encoder(clearway, trained, tmp_path, views):
     out = tmp_path / "eyes"
     answer = clearway("pretrain", views, "--out", out, "--pictures", 192, "--threads", 1, "--try-on", views, "--json")

@@ -60,6 +60,7 @@ def gone(navigator, start=8, target=30, steps=12):
     return told
 
 
+@pytest.mark.slow
 def test_the_file_sees_and_compares_as_the_eyes_do(one_file) -> None:
     """However many there are, none among them."""
     torch, onnx = one_file.generalist, one_file.onnx.generalist

@@ -96,6 +96,7 @@ def test_sb3_s_options_hold_for_the_next_reset_alone(sb3) -> None:
     assert envs.env_method("close", indices=[0, 2]) == [None, None]
 
 
+@pytest.mark.slow
 def test_the_example_trains_sb3_s_ppo(sb3, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     write_scene(corridor_scene(4), tmp_path / "corridor.h5")
     spec = importlib.util.spec_from_file_location("train_sb3_ppo", EXAMPLES / "train_sb3_ppo.py")

@@ -164,6 +164,7 @@ def test_a_scene_gives_its_request_back() -> None:
     assert request_of(floor_plan_scene(generated_plan(request), 4).made_by) is None
 
 
+@pytest.mark.slow
 def test_a_room_is_rendered_in_a_worker_of_its_own(tmp_path) -> None:
     request = min((Request("room", "train", 0, n) for n in range(3, 40, 4)), key=lambda r: len(generated_plan(r).cells))
     seen = Seen(("rgb", "depth"), (24, 32))

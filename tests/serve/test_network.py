@@ -44,6 +44,7 @@ def test_over_tls_an_episode_is_walked_and_plain_http_is_not_answered(tmp_path) 
             httpx.get(f"{url}/health", timeout=PATIENT_S)  # an authority that nobody knows
 
 
+@pytest.mark.slow
 def test_handshakes_that_do_not_end_are_few_and_short(tmp_path) -> None:
     """Nobody was told of them: they stayed for a minute, as many as there were files."""
     files = tuple(map(str, certified(tmp_path)))
@@ -238,6 +239,7 @@ def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
     assert service.bodies.taken == 0
 
 
+@pytest.mark.slow
 def test_it_ends_in_time_whatever_is_under_way_and_tells_who_waits() -> None:
     with running(seconds=300, deadline_s=1.0, idle_s=60) as service, service.client() as client:
         session = client.session()

@@ -91,6 +91,7 @@ def test_many_replicas_die_under_load() -> None:
         assert service.process.wait(PATIENT_S) == 0
 
 
+@pytest.mark.slow
 def test_a_stream_goes_on_in_another_replica_and_limits_hold_over_all(tmp_path: Path) -> None:
     with running(replicas=2, sessions=2) as service, service.client() as client:
         session = client.session(selection="argmax")
@@ -117,6 +118,7 @@ def test_a_stream_goes_on_in_another_replica_and_limits_hold_over_all(tmp_path: 
         assert service.process.wait(PATIENT_S) == 0
 
 
+@pytest.mark.slow
 def test_a_service_whose_replicas_are_all_dead_is_not_ready_until_the_next_are() -> None:
     with running(replicas=2, health=True) as service:
         url = f"http://127.0.0.1:{service.health_port}"

@@ -78,6 +78,7 @@ def pixels(page: Page) -> str:
     return page.locator("#map").evaluate("canvas => canvas.toDataURL()")
 
 
+@pytest.mark.slow
 def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -> None:
     page = opened("scene=corridor&seed=2")
     before = pixels(page)
