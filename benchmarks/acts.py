@@ -43,6 +43,7 @@ class Both:
         self, part: str, agents: tuple[Agent, Agent], scene: Scene, at: int, goal: int, steps: int
     ) -> tuple[State, State]:
         """Walk until the goal or so many steps, and keep what came of it; the states at the end."""
+        assert scene.observations is not None
         target = {RGB: scene.observations[goal : goal + 1]}
         states = [agent.reset(target, SEED) for agent in agents]
         same = []

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -38,7 +38,10 @@ from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
 
 STEP_LIMIT = 100
-WALKERS = {"shortest path": shortest_paths, "random walk": lambda world: RandomWalk()}
+WALKERS: dict[str, Callable[[World], Agent]] = {
+    "shortest path": shortest_paths,
+    "random walk": lambda world: RandomWalk(),
+}
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ def rates(scene: Scene, takes: Takes | None, walker: str, quantile: float, goals
     )
     assert table.false_arrivals is not None and table.told_arrival is not None
     wrong = table.false_arrivals > 0
-    steps = scene.distances_to(range(scene.state_count))  # (S, S), by target
+    steps = scene.distances_to(np.arange(scene.state_count))  # (S, S), by target
     far = {goal for pose, goal in agent.told if pose != goal and steps[goal, pose] > 1}
     goals_of = world.target_state.cpu().numpy()[table.target]
     beside = np.array([goal not in far for goal in goals_of.tolist()])

@@ -14,6 +14,7 @@ import argparse
 import statistics
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ from clearway.deploy.onnx_file import read_onnx
 from clearway.mapping.settings import MappingSettings
 from clearway.perception import eyes, random_resnet
 from clearway.perception.encode import encoder_from_record
-from clearway.perception.encoder import Encoder
+from clearway.perception.encoder import Encoder, NetworkEncoder
 from clearway.perception.preprocess import Preprocessing, to_pixels
 
 SIZE, BATCHES, PEAK_SIZES = (300, 400), (1, 64), (512, 1024)
@@ -63,6 +64,7 @@ def main() -> None:
     pictures = np.random.default_rng(0).integers(0, 256, (max(BATCHES), *SIZE, 3)).astype(np.uint8)
     own = eyes.from_record(eyes.find_record())
     resnet = encoder_from_record(random_resnet.fit_record([pictures[:16]], sample_pictures=16))
+    assert isinstance(resnet, NetworkEncoder)
     with tempfile.TemporaryDirectory() as folder:
         export_generalist(own, MappingSettings(), Path(folder) / "generalist.onnx")
         exported = exported_generalist(read_onnx(Path(folder) / "generalist.onnx", threads=1)).generalist.encoder
@@ -78,7 +80,7 @@ def main() -> None:
     for _ in range(options.rounds):
         peaks.append(max(matrix_peak("cpu", PEAK_SIZES, 3).values()))
         for (name, count), ms in found.items():
-            ms.append(cpu_ms(lambda seen=work[name][0], count=count: seen.encode(pictures[:count]), count))
+            ms.append(cpu_ms(partial(work[name][0].encode, pictures[:count]), count))
     print(f"torch {torch.__version__}, one thread; peak {max(peaks):.0f} GFLOP/s ({min(peaks):.0f} at least)\n")
     print("| encoder | pictures a batch | ms a picture | range | GFLOP | share of the peak |")
     print("| --- | --- | --- | --- | --- | --- |")

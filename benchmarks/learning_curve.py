@@ -12,8 +12,11 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import SC_STEPS
 from clearway.evaluation.quality import Criteria, Quality, quality
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
+from clearway.learn.learner import OnFeatures
+from clearway.learn.named_tensors import part_of
 from clearway.learn.running import Learning
 from clearway.learn.train import RunRequest
+from clearway.model.feature_map import FeatureMap
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 
@@ -129,13 +132,12 @@ def _checked(trainer: Learning, episodes: int) -> Quality:
 
 def agent_of(trainer: Learning) -> PoseAgent:
     """The agent as it stands, whichever algorithm trains it; training is none the wiser."""
-    world, learner, prefix = trainer.world, trainer.learner, "network."
-    assert world.features is not None
-    shape = NetworkShape(
-        learner.head_count(world.scene_count), trainer.feature_map.input_count, learner.width, learner.history_length
-    )
+    world, learner = trainer.world, trainer.learner
+    assert world.features is not None and isinstance(learner, OnFeatures)
+    feature_map = FeatureMap.from_tensors(part_of(trainer.fixed_tensors(), "features"))
+    heads = learner.head_count(world.scene_count)
+    shape = NetworkShape(heads, feature_map.input_count, learner.width, learner.history_length)
     network = SiameseActorCritic(shape).to(world.device)
-    tensors = trainer.tensors().items()
-    network.load_state_dict({name[len(prefix) :]: t for name, t in tensors if name.startswith(prefix)})
-    lookup = LookupNetwork(network, trainer.feature_map(world.features), world.target_state)
+    network.load_state_dict(part_of(trainer.tensors(), "network"))
+    lookup = LookupNetwork(network, feature_map(world.features), world.target_state)
     return network_on_poses(lookup, world, learner.reward_scale)

@@ -25,6 +25,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -92,7 +93,7 @@ def measure(rate: Callable[[float], float], seconds: float) -> Rate:
     return Rate(found, 1_000 * (processor_s() - before) / steps)
 
 
-def opened(room: str, count: int, size: Mapping[str, int], **how: str) -> gymnasium.vector.VectorEnv:
+def opened(room: str, count: int, size: Mapping[str, Any], **how: Any) -> gymnasium.vector.VectorEnv:
     """A batch that has taken its first steps."""
     envs = gymnasium.make_vec(LIVE_ENV_ID, num_envs=count, room=room, **how, **size)
     envs.reset(seed=0)

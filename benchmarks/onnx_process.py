@@ -28,7 +28,8 @@ PARTS = ("a picture of 160 x 120", "the places around one", "64 pairs", "512 pai
 def asked_of(part: str, features: int) -> tuple[str, dict[str, np.ndarray]]:
     """The output that a part is told by, and the inputs."""
     random, nothing = np.random.default_rng(0), np.zeros((0, features), np.float32)
-    given = {"picture": np.zeros((0, 4, 4, 3), np.uint8), "seen": nothing, "first": nothing, "second": nothing}
+    given: dict[str, np.ndarray] = {}
+    given |= {"picture": np.zeros((0, 4, 4, 3), np.uint8), "seen": nothing, "first": nothing, "second": nothing}
     if part == PARTS[0]:
         return "features", given | {"picture": random.integers(0, 256, (1, 120, 160, 3), np.uint8)}
     if part == PARTS[1]:

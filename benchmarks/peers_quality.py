@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
 from sb3 import SiamesePolicy, network_settings, policy_of, vec_env
 from scene_sets import ON_PREPARED, prepared, world_of
@@ -125,7 +126,8 @@ def tuned_ppo_outcome(world: World, scenes: Sequence[Scene], seed: int, cap_s: f
     """SB3's PPO with the values of our recipe."""
     recipe = DEFAULT
     scale = recipe.reward_scale
-    reward = COLLISION_AWARE.with_changes(**{name: scale * value for name, value in COLLISION_AWARE.parameters.items()})
+    scaled: dict[str, Any] = {name: scale * value for name, value in COLLISION_AWARE.parameters.items()}
+    reward = COLLISION_AWARE.with_changes(**scaled)
     with closing(vec_env("batched", scenes, recipe.envs, reward, recipe.step_limit)) as made:
         model = PPO(
             SiamesePolicy,

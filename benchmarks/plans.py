@@ -31,6 +31,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from clearway.choices import PlanKind, SplitName
 from clearway.generation.plans import draw_plan, draw_room, finished
 from clearway.generation.request import KINDS, ROOM_USES, SPLITS, Request
 from clearway.generation.split import canonical_hash
@@ -146,12 +147,13 @@ def shares(words: Iterable[str]) -> str:
     return ", ".join(f"{word} {count / counts.total():.0%}" for word, count in counts.most_common())
 
 
-def draw_sheet(real: Path, split: str, seed: int, path: Path) -> None:
+def draw_sheet(real: Path, split: SplitName, seed: int, path: Path) -> None:
     """Real plans, rooms and flats from above: floor by use, walls dark, furniture (and what is unknown) brown."""
     plans = np.load(real)
     names = [name for first in (0, 12, 24, 36) for name in plans.files[first : first + 3]]
     rows = [[on_coarse_grid(name, plans[name]) for name in names]]
-    for kind, count, across in (("room", 24, 12), ("flat", 8, 4)):
+    asked: tuple[tuple[PlanKind, int, int], ...] = (("room", 24, 12), ("flat", 8, 4))
+    for kind, count, across in asked:
         made = [draw_plan(Request(kind, split, seed, number)).plan for number in range(count)]
         rows += [made[start : start + across] for start in range(0, count, across)]
     tiles = [[drawn(plan, 8) for plan in row] for row in rows]

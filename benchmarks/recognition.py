@@ -23,11 +23,13 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
-from generalist import interval
+from by_scene import interval
 
 import clearway
 from clearway.api.takes import perturbations_asked
@@ -72,7 +74,7 @@ def encoders(scenes: Sequence[Scene], left_out: Sequence[str]) -> dict[str, Seen
         except EncoderError as fault:
             print(f"{name}: left out, {fault}", file=sys.stderr)
             continue
-        found[name] = described(encoder) if name == NAME else lambda seen, by=encoder: features_of(seen, by)
+        found[name] = described(encoder) if name == NAME else partial(features_of, encoder=encoder)
     return found
 
 
@@ -92,10 +94,16 @@ def recognised(scene: Scene, takes: np.ndarray, kept: np.ndarray, see: Seen, *, 
     return recognition(features, poses)
 
 
+def own_pictures(scene: Scene) -> np.ndarray:
+    """Of all poses."""
+    assert scene.observations is not None
+    return scene.observations[:]
+
+
 def in_rooms(scenes: Sequence[Scene], left_out: Sequence[str], seed: int) -> dict[str, dict[str, list[float]]]:
     """Shares recognised in each room, by condition and encoder."""
     seen_by = encoders(scenes, left_out)
-    own = {name: [see(scene.observations[:]) for scene in scenes] for name, see in seen_by.items()}
+    own = {name: [see(own_pictures(scene)) for scene in scenes] for name, see in seen_by.items()}
     found: dict[str, dict[str, list[float]]] = {}
     for condition in CONDITIONS:
         taken = grid_takes(scenes, perturbations_asked(condition), takes=TAKES, seed=seed, workers=1)
@@ -114,7 +122,7 @@ def seen_by_eyes(files: Sequence[Path], seed: int) -> dict[str, dict[str, list[f
     eyes, found = read_eyes(SHIPPED), {}
     for condition in CONDITIONS:
         with tempfile.TemporaryDirectory() as folder:
-            asked = {"poses": POSES, "takes": 2, "perturb": (condition,), "sensors": ("rgb", "depth")}
+            asked: dict[str, Any] = {"poses": POSES, "takes": 2, "perturb": (condition,), "sensors": ("rgb", "depth")}
             clearway.take_views(files, out=folder, seed=seed, workers=1, **asked)
             views = clearway.open_views(folder)
             told = judge_rooms(eyes, views, seed, relight=False)

@@ -60,10 +60,10 @@ class Rooms(VecEnv):
         self.navigation = Navigation(
             world, COLLISION_AWARE, torch.arange(count), choice=choice, step_limit=OURS.step_limit, history_length=1
         )
-        self.table, self.own, self.last = table, torch.zeros(count, dtype=torch.int64), torch.zeros(count, LAST_COUNT)
+        self.table, self.last = table, torch.zeros(count, LAST_COUNT)
 
     def _seen(self) -> torch.Tensor:
-        pairs = self.table(self.navigation.target, self.navigation.state, self.own)
+        pairs = self.table(self.navigation.target, self.navigation.sighting)
         return torch.cat([pairs, self.last], dim=1)
 
     def reset(self) -> np.ndarray:
@@ -78,9 +78,9 @@ class Rooms(VecEnv):
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """One step of all; episodes that end begin anew."""
-        before = self.navigation.state
+        before = self.navigation.sighting
         step = self.navigation.step(self.actions)
-        last = last_step(self.actions, self.table.likeness((step.state, self.own), (before, self.own)))
+        last = last_step(self.actions, self.table.likeness(self.navigation.sighting, before))
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self.last = last
         if step.truncated.any():

@@ -141,8 +141,8 @@ class Update:
         rate = statistics.median(one[0]["frames"] / s for one, s in zip(repeats, longest, strict=True))
         talk_s = statistics.median(min(worker["waited_s"] for worker in one) for one in repeats)
         last = repeats[-1][0]
-        counts = (last[name] / updates for name in ("messages", "gathered", "bytes"))
-        return cls(rate, statistics.median(longest) / updates, *counts, talk_s / updates)
+        messages, gathered, size = (last[name] / updates for name in ("messages", "gathered", "bytes"))
+        return cls(rate, statistics.median(longest) / updates, messages, gathered, size, talk_s / updates)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import argparse
 from statistics import mean
+from typing import Any
 
 from scaling_worker import scenes_of
 
 import clearway
 
-CASES: dict[str, dict[str, object]] = {
+CASES: dict[str, dict[str, Any]] = {
     "float32, 8 steps an update": {},
     "bfloat16, 8 steps": {"sent_gradients": "bfloat16"},
     "float32, 4 steps, 1.4 times the learning rate": {"minibatches": 2, "lr_start": 7e-4, "lr_end": 7e-5},

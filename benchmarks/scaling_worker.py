@@ -79,6 +79,7 @@ def main() -> None:
         )
         peers = CountedPeers(dist.group.WORLD)
     trainer = request.trainer(peers)
+    assert isinstance(trainer, Trainer)
     print(json.dumps({"envs": trainer.env_count, "states": sum(s.state_count for s in scenes)}), flush=True)
     for line in sys.stdin:
         what, number = line.split()

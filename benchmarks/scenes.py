@@ -43,6 +43,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from clearway.choices import FeatureStore
 from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
@@ -62,7 +63,7 @@ class Size:
     """What is measured: so many rooms, the store of their features, the learner."""
 
     rooms: int
-    store: str
+    store: FeatureStore
     learner: OnPolicy
 
 
@@ -270,7 +271,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     options = parser.parse_args()
     base = replace(DEFAULT, frames=ENDLESS, envs=options.envs, rollout_steps=options.steps, feature_basis=options.basis)
-    rows = []
+    rows: list[Costs] = []
     with tempfile.TemporaryDirectory() as folder:
         paths = written_rooms(Path(folder), options.files, options.states, options.features)
         for heads in options.heads:

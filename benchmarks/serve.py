@@ -20,7 +20,7 @@ import asyncio
 import io
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"| {clients} | {figures} |")
 
 
-def print_backends(backends: dict[str, Agent], batches: Sequence[int] = (1, 4, 16), repeats: int = 7) -> None:
+def print_backends(backends: Mapping[str, Agent], batches: Sequence[int] = (1, 4, 16), repeats: int = 7) -> None:
     """Processor time of the whole agent, milliseconds a picture."""
     import torch
 
@@ -136,7 +136,7 @@ async def opened(http: httpx.AsyncClient, target: bytes) -> str:
 
 async def walked(http: httpx.AsyncClient, path: str, files: Sequence[bytes], until: float) -> list[float]:
     """Seconds that each step of a session took."""
-    found = []
+    found: list[float] = []
     while (begun := time.perf_counter()) < until:
         answer = await http.post(f"{path}/steps", content=files[len(found) % len(files)])
         answer.raise_for_status()

@@ -21,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -29,7 +30,7 @@ import clearway
 from clearway.views.stream import Views
 
 BATCH = 256
-PACKINGS = {
+PACKINGS: dict[str, dict[str, Any]] = {
     "none": {},
     "lzf": {"compression": "lzf"},
     "shuffle, lzf": {"compression": "lzf", "shuffle": True},

@@ -33,8 +33,8 @@ def main() -> None:
     asked = {"goals": args.goals, "seed": args.seed}
     found: dict[str, GoalEvaluation] = {}
     for run in args.runs:
-        own, *others = clearway.evaluate_goals(clearway.load_agent(run), files, **asked)
-        found |= {run.name: own} | {other.agent: other for other in others}
+        own, *beside = clearway.evaluate_goals(clearway.load_agent(run), files, **asked)
+        found |= {run.name: own} | {other.agent: other for other in beside}
     print_table(found)
     first, *others = (run.name for run in args.runs)
     for other in others:
