@@ -19,7 +19,7 @@ from helpers.by_workers import by_workers
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, GRID_TARGETS, small_learner
 
-UPDATES = 10
+UPDATES = 20
 Told = list[dict[str, float]]
 
 

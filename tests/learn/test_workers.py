@@ -1,5 +1,6 @@
 """Workers that are killed: training goes on, nothing is learnt twice, and no process is left."""
 
+import logging
 import os
 import random
 import signal
@@ -16,7 +17,7 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
-from clearway.learn.crew import launched
+from clearway.learn.crew import INTERFACE, launched
 from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
@@ -25,6 +26,8 @@ from helpers import killed_workers
 from helpers.crew_processes import PATIENCE_S, wait_until, workers_of
 from helpers.made import corridor_scene
 from helpers.one_fails import WORDS, OneFails
+from helpers.one_is_late import LOST, OneIsLate
+from helpers.one_is_late import PATIENCE_S as LATE_AFTER_S
 from helpers.small_runs import equal_bits, small_learner, small_request, small_scenes
 
 KILLS = int(os.environ.get("CLEARWAY_KILLS", "5"))
@@ -173,6 +176,19 @@ def test_an_error_of_one_worker_is_heard_by_those_who_wait_for_it(tmp_path: Path
     began = time.monotonic()
     assert launched(OneFails(tmp_path, os.getpid(), 1, "cpu", {}), 2) == [WORDS, WORDS]
     assert time.monotonic() - began < PATIENCE_S
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("late", "outcome"), [("reads_s", None), ("thinks_s", LOST)])
+def test_who_reads_for_long_is_waited_for_and_who_does_not_answer_is_not(
+    tmp_path: Path, late: str, outcome: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(INTERFACE, raising=False)
+    seconds = {"reads_s": 0.0, "thinks_s": 0.0} | {late: 2.5 * LATE_AFTER_S}
+    assert launched(OneIsLate(tmp_path, os.getpid(), 1, "cpu", {}, **seconds), 2)[1] == outcome
+    assert INTERFACE not in os.environ
+    elastic = [name for name in logging.root.manager.loggerDict if name.startswith("torch.distributed.elastic")]
+    assert elastic and not all(logging.getLogger(name).level == logging.CRITICAL for name in elastic)
 
 
 @pytest.mark.slow

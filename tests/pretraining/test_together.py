@@ -33,7 +33,7 @@ from helpers.crew_processes import wait_until, workers_of
 from helpers.killed_pretraining import SETTINGS, made
 from helpers.small_runs import equal_bits
 
-UPDATES = 8
+UPDATES = 20
 ONE_AT_A_TIME = threading.Lock()
 SETTINGS_OF_ONE = replace(SETTINGS, pictures=24)
 
@@ -68,7 +68,7 @@ def trained(request: PretrainRequest, peers: Peers) -> tuple[list[dict[str, floa
     return figures, {name: tensor.clone() for name, tensor in (trainer.eyes.state_dict() | trainer.tensors()).items()}
 
 
-@pytest.mark.parametrize("kept", [False, True])
+@pytest.mark.parametrize("kept", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_workers_together_learn_what_one_learns_alone(tmp_path: Path, doubles: PretrainRequest, kept: bool) -> None:
     """Three groups of pictures by one worker, by two of unequal parts, and by three."""
     request = doubles

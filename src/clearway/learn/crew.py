@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 RESTARTS = 100  # of one task, after which it is given up
 PATIENCE = timedelta(minutes=5)  # for another worker to answer, after which it counts as lost
+READING = timedelta(hours=6)  # the same while it reads what it learns from, which may come from elsewhere
+INTERFACE = "GLOO_SOCKET_IFNAME"  # variable: the network interface that gloo sends by
 FAILED = "failed"  # key of the store under which an error's words are told to the others
 INTERRUPTED = "interrupted"
 LOST, ENDED = 3, 130  # exit codes
@@ -120,11 +122,6 @@ def launched(task: Task, workers: int) -> list[str | None]:
     from torch.distributed.elastic.multiprocessing.errors import ChildFailedError
     from torch.distributed.launcher.api import LaunchConfig, elastic_launch
 
-    for name in logging.root.manager.loggerDict:  # each has a level of its own, and tells of deaths at length
-        if name.startswith("torch.distributed.elastic"):
-            logging.getLogger(name).setLevel(logging.CRITICAL)
-    if sys.platform == "linux":
-        os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")  # nothing leaves this machine
     if threading.current_thread() is not threading.main_thread():
         raise RunError(f"{task.out}: several workers are started by the main thread alone. Start them there, or one")
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -155,7 +152,7 @@ def launched(task: Task, workers: int) -> list[str | None]:
         try:
             if before[signal.SIGINT] is not signal.SIG_IGN:
                 signal.signal(signal.SIGINT, told)
-            with all_children_end():
+            with all_children_end(), _on_loopback(), _without_elastic_log():
                 outcomes = elastic_launch(config, work)(Sent(task))
         except SignalException as error:
             raise KeyboardInterrupt from error
@@ -167,6 +164,33 @@ def launched(task: Task, workers: int) -> list[str | None]:
             for number, handler in before.items():
                 signal.signal(number, handler)
     return [outcomes[rank] for rank in sorted(outcomes)]
+
+
+@contextmanager
+def _on_loopback() -> Iterator[None]:
+    """Have workers that are started meanwhile send nothing out of this machine, unless the user chose otherwise."""
+    if sys.platform != "linux" or INTERFACE in os.environ:
+        yield
+        return
+    os.environ[INTERFACE] = "lo"
+    try:
+        yield
+    finally:
+        del os.environ[INTERFACE]
+
+
+@contextmanager
+def _without_elastic_log() -> Iterator[None]:
+    """Silence the elastic agent, which tells of deaths at length."""
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("torch.distributed.elastic")]
+    before = {name: logging.getLogger(name).level for name in names}  # each has one of its own
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)
 
 
 def ended_well(outcomes: Sequence[str | None]) -> None:
@@ -241,11 +265,12 @@ def done_by(task: Task, place: Place, server: dist.Store) -> str | None:
         dist.init_process_group(
             "nccl" if cuda else "gloo", store=store, rank=place.rank, world_size=place.count, timeout=PATIENCE
         )
+        patient = dist.new_group(timeout=READING)
     except RuntimeError as error:  # of whatever backend
         raise LostPeer(str(error)) from error
     name = f"{socket.gethostname()}, process {os.getpid()}"
     try:
-        task.do(Peers(dist.group.WORLD, device, name))
+        task.do(Peers(dist.group.WORLD, device, name, patient))
     except KeyboardInterrupt:
         return INTERRUPTED
     except LostPeer:

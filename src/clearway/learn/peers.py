@@ -25,6 +25,7 @@ class Peers:
         group: the process group; None: this worker is alone.
         device: where tensors lie that the group's backend can send.
         name: where this worker is found, for people.
+        patient: the same workers' group that waits longer, used until all are `ready`; None: there is no other.
 
     Attributes:
         rank: number of this worker, from 0.
@@ -34,8 +35,15 @@ class Peers:
         waited_s: seconds spent on it so far, those of waiting for the others among them.
     """
 
-    def __init__(self, group: Any | None = None, device: torch.device | str = "cpu", name: str = "here") -> None:
+    def __init__(
+        self,
+        group: Any | None = None,
+        device: torch.device | str = "cpu",
+        name: str = "here",
+        patient: Any | None = None,
+    ) -> None:
         self.group, self.device, self.name = group, torch.device(device), name
+        self._used = patient or group
         self.rank: int = 0 if group is None else group.rank()
         self.count: int = 1 if group is None else group.size()
         self.messages, self.sent_bytes, self.waited_s = 0, 0, 0.0
@@ -44,6 +52,11 @@ class Peers:
     def leads(self) -> bool:
         """This worker writes files and tells the user."""
         return self.rank == 0
+
+    def ready(self) -> None:
+        """Wait until all have read what they learn from; who does not answer from now on is soon lost."""
+        self.told(0.0)
+        self._used = self.group
 
     def add_up(self, *tensors: Tensor, sent_as: torch.dtype | None = None) -> None:
         """Replace tensors of one dtype, in place, by their sums over all workers, as one message.
@@ -112,8 +125,8 @@ class Peers:
 
     @property
     def _group(self) -> Any:
-        assert self.group is not None
-        return self.group
+        assert self._used is not None
+        return self._used
 
     def _exchange(self, message: Tensor, begin: Callable[[], Any]) -> None:
         """Wait for a message.

@@ -14,7 +14,7 @@ from typing import Any
 import torch
 
 from clearway.errors import ClearwayError, RunError
-from clearway.learn.crew import INTERRUPTED, PATIENCE, RESTARTS, Place, Task, done_by, given_up
+from clearway.learn.crew import INTERFACE, INTERRUPTED, PATIENCE, RESTARTS, Place, Task, done_by, given_up
 from clearway.learn.interruption import interruption
 from clearway.learn.peers import LostPeer
 from clearway.learn.provenance import package_versions
@@ -142,7 +142,7 @@ def _worker(message: list[Any], place: Place, meets: tuple[str, int], versions: 
         take_records(task.records)
     except ClearwayError as error:
         return f"{error}, on the Ray node {ray.util.get_node_ip_address()}"
-    os.environ.pop("GLOO_SOCKET_IFNAME", None)
+    os.environ.pop(INTERFACE, None)
     try:
         store = dist.TCPStore(*meets, is_master=False, timeout=PATIENCE)
     except RuntimeError as error:

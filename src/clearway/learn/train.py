@@ -219,6 +219,7 @@ def train_part(
     if len(set(found)) > 1:
         problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
         raise RunError(f"{problem}. Give a folder that all machines share as --out")
+    peers.ready()
     with (
         progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
         interruption(of_several=True) as interrupted,

@@ -92,6 +92,7 @@ def pretrain_part(
         seconds = _resumed(trainer, folder)
     elif peers.leads:
         folder.forget_metrics_after(-1)
+    peers.ready()
     _run(trainer, folder, done, seconds, track, checkpoint_s)
     if peers.leads:
         folder.write_eyes(trainer.eyes, trainer.pictures)
