@@ -1,15 +1,22 @@
 """Scenes in an object store or on a web server are given where a path may stand."""
 
 import shutil
+import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
+import gymnasium
 import pytest
 
 import clearway
 from clearway.cli.main import main
+from clearway.cli.run_names import longer
+from clearway.envs.registration import ENV_ID, LIVE_ENV_ID
+from clearway.errors import ClearwayError, EnvError
 from clearway.learn.load import run_scenes
 from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.remote.address import fetched_folder
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.thor_v1 import write_scene
@@ -17,7 +24,7 @@ from clearway.views.stream import views_in
 from helpers.made import corridor_scene
 from helpers.made_views import write_made
 from helpers.servers_of_files import files_of, web_server
-from helpers.small_runs import small_learner
+from helpers.small_runs import small_learner, small_request
 
 
 @pytest.fixture
@@ -71,3 +78,23 @@ def test_a_damaged_scene_elsewhere_is_refused(
         main(["scenes", "inspect", "s3://rooms/set/one.h5"])
     assert ended.value.code == 2
     assert "cannot be opened as HDF5" in capsys.readouterr().err
+
+
+def test_environments_take_addresses(s3: Callable[[str, bytes], None], files: Path) -> None:
+    for path in files.iterdir():
+        s3(f"set/{path.name}", path.read_bytes())
+    with closing(gymnasium.make(ENV_ID, scenes="s3://rooms/set/one.h5", observations="pictures")) as env:
+        env.reset(seed=0)
+    with pytest.raises(EnvError, match=r"s3://rooms/set: a folder of 2 scenes\. Name one file"):
+        gymnasium.make(ENV_ID, scenes="s3://rooms/set", observations="pictures")
+    with pytest.raises(ClearwayError, match="one: there is no room to walk in"):
+        gymnasium.make(LIVE_ENV_ID, room="s3://rooms/set/one.h5")
+
+
+@pytest.mark.parametrize("word", ["{0}", "--scenes={0}"])
+def test_commands_are_kept_and_told_without_secrets(word: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["train", word.format("https://user:pass@host/a.h5?signature=secret"), "--frames", "9"]
+    monkeypatch.setattr(sys, "argv", ["clearway", *words])
+    plain = ("clearway", "train", word.format("https://host/a.h5"), "--frames", "9")
+    assert record_of(small_request()).command == plain
+    assert longer(words, Path("r"), 9) == " ".join([*plain, "--out r --resume"])

@@ -7,6 +7,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+from clearway.remote.address import text_without_secrets
+
 RUNS = Path("runs")
 
 
@@ -28,7 +30,7 @@ def free_run_folder(files: Sequence[Path], reward: str, algorithm: str, seed: in
 
 
 def longer(words: Sequence[str], out: Path, frames: int) -> str:
-    """The command, fit for a shell, that trains on from a `clearway train` until so many frames.
+    """The command, fit for a shell, that trains on from a `clearway train` until so many frames; without secrets.
 
     Args:
         words: of the training, without the program's name.
@@ -40,7 +42,7 @@ def longer(words: Sequence[str], out: Path, frames: int) -> str:
         words.remove("--no-resume")
     if "--resume" not in words:
         words.append("--resume")
-    return shlex.join(["clearway", *words])
+    return shlex.join(["clearway", *map(text_without_secrets, words)])
 
 
 def _with_option(words: Sequence[str], option: str, value: str) -> list[str]:

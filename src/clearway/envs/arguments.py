@@ -12,8 +12,10 @@ from gymnasium.vector import AutoresetMode
 from clearway.choices import HELD_OUT
 from clearway.envs.render import RENDER_MODES
 from clearway.errors import EnvError
+from clearway.remote.address import address_of, without_secrets
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
+from clearway.scenes.scene_files import scene_files
 from clearway.scenes.targets import default_held_out_targets, default_targets
 
 SceneSource = Scene | str | Path
@@ -30,13 +32,23 @@ def loaded_scenes(scenes: SceneSource | Sequence[SceneSource]) -> list[Scene]:
     for source in sources:
         if not isinstance(source, (Scene, str, Path)):
             raise EnvError(f"scenes: {source!r:.80} is neither a scene nor a file's path. Give one of them, or several")
-    return [source if isinstance(source, Scene) else _read(source) for source in sources]
+    return [source if isinstance(source, Scene) else scene_of_file(source) for source in sources]
 
 
-def _read(path: str | Path) -> Scene:
+def scene_of_file(path: str | Path) -> Scene:
+    """The scene of a file, which may lie elsewhere.
+
+    Raises:
+        ClearwayError: it is no scene, or cannot be had.
+    """
     from clearway.scenes.thor_v1 import read_scene
 
-    return read_scene(Path(path))
+    if (address := address_of(path)) is None:
+        return read_scene(Path(path))
+    found = scene_files([Path(path)])
+    if len(found) > 1:
+        raise EnvError(f"{without_secrets(address)}: a folder of {len(found)} scenes. Name one file in it")
+    return read_scene(found[0])
 
 
 def check_numbers(num_envs: int, history_length: int, max_episode_steps: int | None, render_mode: str | None) -> None:

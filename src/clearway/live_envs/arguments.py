@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.choices import MODEL_SUFFIXES
+from clearway.envs.arguments import scene_of_file
 from clearway.errors import EnvError
 from clearway.live.conditions import MOST, Perturbations
 from clearway.live.live_room import LiveRoom, live_room, live_room_named
@@ -61,9 +62,7 @@ def opened_room(room: RoomSource, seed: int, *, small: bool, loose: bool) -> Liv
     if Path(room).suffix.lower() in PLAN_SUFFIXES:
         remedy = f"Import it with clearway scenes import floor-plan {room} --out scenes, and name the file in scenes"
         raise EnvError(f"room='{room}': a floor plan, no scene yet. {remedy}")
-    from clearway.scenes.thor_v1 import read_scene
-
-    return live_room(read_scene(Path(room)), small=small, loose=loose)
+    return live_room(scene_of_file(room), small=small, loose=loose)
 
 
 def checked_sensors(names: Sequence[str], height_px: int, width_px: int) -> tuple[Sensor, ...]:

@@ -14,6 +14,8 @@ COPIED_NS = 10**18  # time of change that every copy has, so that one that comes
 ENTRY = re.compile(r"[0-9a-f]{32}-(\d{1,20})")  # see `cache`
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
 
+_WEB = re.compile(r"https?://\S+")
+
 
 def address_of(path: str | os.PathLike[str]) -> str | None:
     """The address that a path stands for; None for one on this machine. `Path` makes one slash of an address's two."""
@@ -35,6 +37,11 @@ def without_secrets(address: str) -> str:
     scheme, _, rest = address.partition("?")[0].partition("://")
     host, slash, path = rest.partition("/")
     return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
+
+
+def text_without_secrets(text: str) -> str:
+    """A text in which web addresses, up to a blank, are `without_secrets`."""
+    return _WEB.sub(lambda found: without_secrets(found[0]), text)
 
 
 def fetched_folder() -> Path:
