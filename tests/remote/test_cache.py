@@ -11,7 +11,7 @@ from clearway.errors import ClearwayError
 from clearway.remote import leases
 from clearway.remote.address import fetched_folder
 from clearway.remote.cache import LIMIT_VARIABLE, fetched
-from clearway.remote.records import origin
+from clearway.remote.records import RECORDS, origin
 from clearway.remote.store import Store
 from helpers.servers_of_files import files_of, web_server
 
@@ -134,6 +134,27 @@ def test_who_emptied_the_cache_has_taken_no_lease(web: str, monkeypatch: pytest.
     assert kept() == "b"
     end_process()
     mine.end()
+
+
+@pytest.mark.parametrize("damage", [b"e3b0c44298fc1c14", b"\xff\xfe", b"0" * 32 + b"-1\n../../elsewhere-5\n"])
+def test_a_damaged_lease_ends_nobody(damage: bytes, web: str) -> None:
+    fetched([f"{web}/a.h5"], SUFFIXES)
+    mine = leases.lease_of(fetched_folder())
+    mine.path.write_bytes(damage)
+    leases._made.cache_clear()  # as if of another process
+    fetched([f"{web}/b.h5"], SUFFIXES)
+    assert kept() == "ab"
+    end_process()
+    mine.end()
+
+
+def test_a_record_is_written_to_no_file_that_a_link_leads_to(web: str, tmp_path: Path) -> None:
+    (records := fetched_folder() / RECORDS).mkdir(parents=True)
+    (tmp_path / "mine").write_text("mine")
+    (records / ".part").symlink_to(tmp_path / "mine")
+    fetched([f"{web}/a.h5"], SUFFIXES)
+    assert (tmp_path / "mine").read_text() == "mine"
+    end_process()
 
 
 @pytest.mark.parametrize("words", ["much", "0", "-1", "nan"])

@@ -17,6 +17,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from clearway.regular_files import read_text
+from clearway.remote.address import ENTRY
 
 MAX_LIST_BYTES = 64 * 1024**2  # of the entries that a process keeps
 LEASES = ".leases"
@@ -54,7 +55,9 @@ class Lease:
             self.lock.release(force=True)
             self.lock = FileLock(self._lock_path)
             self.lock.acquire()
-        self.path.write_text("".join(f"{entry}\n" for entry in self.uses), encoding="utf-8")
+        part = Path(f"{self.path}.part")
+        part.write_text("".join(f"{entry}\n" for entry in self.uses), encoding="utf-8")
+        part.replace(self.path)
 
     def end(self) -> None:
         """Give the lease back; a forked process has none of its own to give."""
@@ -81,13 +84,13 @@ def leased(folder: Path) -> set[str]:
     own = lease_of(folder)
     (folder / LEASES).mkdir(parents=True, exist_ok=True)
     for path in (folder / LEASES).iterdir():
-        if path.suffix == ".lock":
+        if path.suffix in (".lock", ".part"):
             continue
         if path != own.path and _is_free(Path(f"{path}.lock")):
             path.unlink(missing_ok=True)
             continue
-        with suppress(FileNotFoundError):  # its process has given it back meanwhile
-            entries.update(read_text(path, MAX_LIST_BYTES).split())
+        with suppress(OSError, ValueError):  # given back meanwhile, or damaged: who reads what goes has it come again
+            entries.update(filter(ENTRY.fullmatch, read_text(path, MAX_LIST_BYTES).split()))
     return entries
 
 

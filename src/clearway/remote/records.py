@@ -41,7 +41,9 @@ def write_records(folder: Path, texts: Mapping[str, str]) -> None:
         content = text.encode()
         if known.get(entry) != len(content):
             part = records / ".part"
-            part.write_bytes(content)
+            part.unlink(missing_ok=True)  # of one who was killed; it may even lead elsewhere
+            with part.open("xb") as file:
+                file.write(content)
             part.replace(records / entry)
 
 
