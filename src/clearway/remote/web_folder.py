@@ -1,0 +1,89 @@
+"""The files in a folder of a web server, as the page says that lists them.
+
+What a page says is not trusted: it is read up to a limit, and only files of that very folder count.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from html.parser import HTMLParser
+from typing import Any
+from urllib.parse import SplitResult, urljoin, urlsplit
+
+MAX_PAGE_BYTES = 8 * 1024**2
+MAX_LINKS = 100_000
+PIECE = 64 * 1024  # characters that are looked through at a time
+
+
+class PageTooLong(OSError):
+    """A page says more than is read."""
+
+
+async def files_of_page(system: Any, folder: str) -> list[dict[str, Any]]:
+    """What a folder holds directly.
+
+    Args:
+        system: fsspec's for the web.
+        folder: its address, with a slash at the end.
+
+    Returns:
+        Of each file its address, `name`; how large it is, is not known yet, so that `size` is None.
+
+    Raises:
+        FileNotFoundError: there is no such page.
+        PageTooLong: it is larger than 8 MiB, or has more than 100,000 links.
+        Exception: the server cannot be asked, as fsspec says it.
+    """
+    session = await system.set_session()
+    async with session.get(system.encode_url(folder), **system.kwargs) as answer:
+        system._raise_not_found_for_status(answer, folder)
+        page = bytearray()
+        async for block in answer.content.iter_any():
+            page += block
+            if len(page) > MAX_PAGE_BYTES:
+                raise PageTooLong(f"its page of files is larger than {MAX_PAGE_BYTES // 1024**2} MiB")
+    files = FilesOfPage(folder, str(answer.url))
+    text = page.decode("utf-8", "replace")
+    for start in range(0, len(text), PIECE):
+        files.feed(text[start : start + PIECE])
+        await asyncio.sleep(0)  # whoever waits may give it up
+    return [{"name": name, "size": None} for name in files.found]
+
+
+class FilesOfPage(HTMLParser):
+    """Collects the files directly in a folder that a page links to.
+
+    Args:
+        folder: its address, as it was asked for.
+        page: where the page was found, to which its links refer.
+
+    Attributes:
+        found: their addresses, each once.
+    """
+
+    def __init__(self, folder: str, page: str) -> None:
+        super().__init__()
+        self._page, self._places = page, {_place(folder), _place(page)}
+        self._seen: set[str] = set()
+        self.found: dict[str, None] = {}
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """See `HTMLParser`. Raises PageTooLong."""
+        links = {value for name, value in attrs if name == "href" and value} if tag == "a" else set()
+        for link in links - self._seen:
+            self._seen.add(link)
+            if len(self._seen) > MAX_LINKS:
+                raise PageTooLong(f"its page of files has more than {MAX_LINKS:,} links")
+            with suppress(ValueError):  # it is no address
+                self._keep(urlsplit(urljoin(self._page, link)))
+
+    def _keep(self, parts: SplitResult) -> None:
+        if parts.path.rpartition("/")[2] and _place(parts.geturl()) in self._places:
+            self.found[parts._replace(fragment="").geturl()] = None
+
+
+def _place(address: str) -> tuple[str, str, str]:
+    """Scheme, host with port, and folder of an address."""
+    parts = urlsplit(address)
+    return parts.scheme, parts.netloc.rpartition("@")[2], parts.path.rpartition("/")[0]

@@ -1,0 +1,61 @@
+"""Pages that list the files of a web server's folder are not trusted."""
+
+import time
+
+import pytest
+
+from clearway.remote import web_folder
+from clearway.remote.web_folder import PIECE, FilesOfPage, PageTooLong
+
+FOLDER = "https://host/rooms/"
+
+
+def found(page: str, where: str = FOLDER) -> list[str]:
+    files = FilesOfPage(FOLDER, where)
+    for start in range(0, len(page), PIECE):
+        files.feed(page[start : start + PIECE])
+    return list(files.found)
+
+
+@pytest.mark.parametrize(
+    ("link", "address"),
+    [
+        ("a.h5", f"{FOLDER}a.h5"),
+        ("./a.h5", f"{FOLDER}a.h5"),
+        ("/rooms/a.h5?version=1#top", f"{FOLDER}a.h5?version=1"),
+        ("https://host/rooms/a.h5", f"{FOLDER}a.h5"),
+        ("a%20b.h5", f"{FOLDER}a%20b.h5"),
+        ("../a.h5", None),
+        ("deeper/a.h5", None),
+        ("?C=N;O=D", None),
+        ("http://host/rooms/a.h5", None),
+        ("//other/rooms/a.h5", None),
+        ("https://host:8443/rooms/a.h5", None),
+        ("file:///rooms/a.h5", None),
+        ("https://[::1/a.h5", None),
+    ],
+)
+def test_links_count_that_lead_into_the_folder_itself(link: str, address: str | None) -> None:
+    assert found(f'<p><a class="file" href="{link}">a</a> <a href="{link}">again</a>') == [address] * (
+        address is not None
+    )
+
+
+def test_a_folder_that_moved_is_followed() -> None:
+    assert found('<a href="a.h5">', "https://other/new/") == ["https://other/new/a.h5"]
+
+
+@pytest.mark.parametrize(
+    "page", ["<a" + " " * 4_000_000, "<a" * 100_000, "<!--" * 100_000, "<a href=x.h5>" * 100_000, "<a href='" * 100_000]
+)
+def test_hostile_pages_end_soon(page: str) -> None:
+    began = time.process_time()
+    found(page)
+    assert time.process_time() - began < 10
+
+
+def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(web_folder, "MAX_LINKS", 3)
+    assert len(found("<a href=1><a href=2><a href=3><a href=3>")) == 3
+    with pytest.raises(PageTooLong, match="more than 3 links"):
+        found("<a href=1><a href=2><a href=3><a href=4>")
