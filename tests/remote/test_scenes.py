@@ -77,7 +77,9 @@ def test_a_damaged_scene_elsewhere_is_refused(
     with pytest.raises(SystemExit) as ended:
         main(["scenes", "inspect", "s3://rooms/set/one.h5"])
     assert ended.value.code == 2
-    assert "cannot be opened as HDF5" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert told.startswith("error: s3://rooms/set/one.h5: cannot be opened as HDF5")
+    assert str(fetched_folder()) not in told
 
 
 def test_environments_take_addresses(s3: Callable[[str, bytes], None], files: Path) -> None:

@@ -169,5 +169,9 @@ def _drop_unprinted() -> None:
 
 def _refused(message: str) -> int:
     """Say what was wrong in one line; returns the exit code."""
+    if "/remote/" in message:  # perhaps a file of the cache, whose place there tells the user nothing
+        from clearway.remote.records import with_origins
+
+        message = with_origins(message)
     print("error:", " ".join(message.split()), file=sys.stderr)
     return 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from clearway.errors import ClearwayError
 from clearway.files import CACHE_VARIABLE, json_text, locked, read_json
 from clearway.regular_files import read_text
-from clearway.remote.address import fetched_folder, is_fetched, without_secrets
+from clearway.remote.address import ENTRY, fetched_folder, is_fetched, without_secrets
 
 RECORDS = ".records"  # in the cache folder, by the entry's name
 MAX_RECORD_BYTES = 64 * 1024
@@ -63,6 +64,12 @@ def origin(path: Path) -> str:
         with suppress(*_NO_RECORD):
             return _address(path)
     return str(path)
+
+
+def with_origins(text: str) -> str:
+    """A text in which files that were fetched are named by their addresses."""
+    place = re.compile(rf"{re.escape(str(fetched_folder()))}/{ENTRY.pattern}/[^\s:]+")
+    return place.sub(lambda found: origin(Path(found[0])), text)
 
 
 def records_of(paths: Iterable[Path]) -> dict[str, str]:
