@@ -90,6 +90,16 @@ def files_of(folder: Path, kind: type[_Files] = _Files) -> Callable[..., BaseHTT
     return partial(kind, directory=str(folder))
 
 
+class Unwilling(_Files):
+    """Answers every request for a file with the status that its name says, and tells the size of none."""
+
+    def do_HEAD(self) -> None:
+        self.send_response(int(Path(urlsplit(self.path).path).stem))
+        self.end_headers()
+
+    do_GET = do_HEAD
+
+
 class CutShort(_Files):
     """Says that a file has ten bytes, and sends four."""
 

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from clearway.remote.address import address_of, file_name, without_secrets
+from clearway.remote.address import address_of, addresses_without_secrets, file_name, without_secrets
 from clearway.remote.records import origin
 
 
@@ -25,6 +25,21 @@ def test_names_are_last_parts() -> None:
     assert without_secrets("https://example.org/a.h5?signature=c") == "https://example.org/a.h5"
     assert without_secrets("https://me:secret@example.org/@/a.h5") == "https://example.org/@/a.h5"
     assert without_secrets("s3://rooms/what?.h5") == "s3://rooms/what?.h5"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("404, url='https://a.org/b.h5?signature=c'", "404, url='https://a.org/b.h5'"),
+        (
+            "(https://me:secret@a.org/b.h5), see (http://b.org/?c=d(e)f'g).",
+            "(https://a.org/b.h5), see (http://b.org/).",
+        ),
+        ("nothing at https://a.org/b.h5", "nothing at https://a.org/b.h5"),
+    ],
+)
+def test_addresses_in_words_tell_no_secrets(words: str, told: str) -> None:
+    assert addresses_without_secrets(words) == told
 
 
 def test_a_file_of_this_machine_comes_from_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

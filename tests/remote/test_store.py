@@ -10,7 +10,7 @@ from clearway.errors import ClearwayError
 from clearway.remote import store
 from clearway.remote.cache import fetched
 from clearway.remote.records import RECORDS
-from helpers.servers_of_files import CutShort, GoogleStore, Shrunk, files_of, silent_server, web_server
+from helpers.servers_of_files import CutShort, GoogleStore, Shrunk, Unwilling, files_of, silent_server, web_server
 
 SUFFIXES = (".h5",)
 
@@ -84,10 +84,37 @@ def test_half_a_file_is_none(handler: type[CutShort], tmp_path: Path) -> None:
     assert not list((tmp_path / "cache/remote").rglob("a.h5"))
 
 
-def test_signatures_are_not_told(tmp_path: Path) -> None:
-    with web_server(files_of(tmp_path)) as address, pytest.raises(ClearwayError) as caught:
-        fetched([f"{address}/a.h5?signature=secret"], SUFFIXES)
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("200.h5", "its server does not say how large it is"),
+        ("400.h5", r"cannot be reached or read \(400, message='Bad Request', url=.http://127.0.0.1:\d+/400.h5.\)"),
+        ("403.h5", r"may not be opened \(403, message='Forbidden'"),
+        ("404.h5", "there is nothing there"),
+        ("200", "no file ending in .h5 there"),
+    ],
+)
+def test_secrets_are_not_told(name: str, expected: str) -> None:
+    with web_server(Unwilling) as address, pytest.raises(ClearwayError, match=expected) as caught:
+        fetched([f"{address.replace('://', '://me:secret@')}/{name}?signature=secret&more=it's%20secret"], SUFFIXES)
     assert "secret" not in str(caught.value)
+    assert str(caught.value).startswith(f"{address}/{name}: ")
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a"])
+def test_secrets_are_not_told_by_a_server_that_is_not_there(name: str) -> None:
+    with silent_server() as address:
+        pass
+    with pytest.raises(ClearwayError, match="Cannot connect to host") as caught:
+        fetched([f"{address}/{name}?signature=secret"], SUFFIXES)
+    assert "secret" not in str(caught.value)
+
+
+def test_a_folder_is_named_without_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
+    there = store.Store("http://127.0.0.1/")
+    monkeypatch.setattr(store.Store, "_ask", lambda *_: {"type": "directory"})
+    with pytest.raises(ClearwayError, match=r"^http://127.0.0.1/a.h5: a folder, expected a file"):
+        there.file("http://me:secret@127.0.0.1/a.h5?signature=secret")
 
 
 def test_google_s_store(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,9 +129,11 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    assert told("https://127.0.0.1/a.h5") == (
-        "https:// needs another package. Install it: pip install 'clearway[https]'"
-    )
+    needs = "https:// needs another package. Install it: pip install 'clearway[https]'"
+    assert told("https://127.0.0.1/a.h5") == needs
+    with pytest.raises(ClearwayError) as caught:
+        fetched(["https://127.0.0.1/a.h5?signature=secret"], SUFFIXES)
+    assert str(caught.value) == f"https://127.0.0.1/a.h5: {needs}"
 
 
 def test_a_version_is_the_best_that_a_server_tells_alone() -> None:

@@ -14,7 +14,7 @@ from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
 from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, say
 from clearway.errors import ClearwayError
-from clearway.remote.address import text_without_secrets
+from clearway.remote.address import addresses_without_secrets
 
 if TYPE_CHECKING:
     from clearway.experiments.reproduce import Reproduction
@@ -91,7 +91,7 @@ class Reproduce:
             workers=self.workers,
             threads=self.threads,
             ray=self.ray,
-            commands=(shlex.join(["clearway", *map(text_without_secrets, sys.argv[1:])]),),
+            commands=(shlex.join(["clearway", *map(addresses_without_secrets, sys.argv[1:])]),),
         )
         _write(reproduce(request, show_progress=True, tell=say), self.out, self.json)
 

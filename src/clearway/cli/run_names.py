@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from clearway.remote.address import text_without_secrets
+from clearway.remote.address import addresses_without_secrets
 
 RUNS = Path("runs")
 
@@ -42,7 +42,7 @@ def longer(words: Sequence[str], out: Path, frames: int) -> str:
         words.remove("--no-resume")
     if "--resume" not in words:
         words.append("--resume")
-    return shlex.join(["clearway", *map(text_without_secrets, words)])
+    return shlex.join(["clearway", *map(addresses_without_secrets, words)])
 
 
 def _with_option(words: Sequence[str], option: str, value: str) -> list[str]:

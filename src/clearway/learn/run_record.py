@@ -15,7 +15,7 @@ from clearway.learn.algorithms import algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
-from clearway.remote.address import text_without_secrets
+from clearway.remote.address import addresses_without_secrets
 from clearway.remote.records import origin
 from clearway.reward import Reward, reward_from_json
 from clearway.scenes.digest import scene_digest
@@ -116,7 +116,7 @@ def record_of(request: RunRequest) -> RunRecord:
         ),
         versions=package_versions(),
         hardware=hardware(request.device) | {"feature_store": request.feature_store},
-        command=tuple(map(text_without_secrets, sys.argv)),
+        command=tuple(map(addresses_without_secrets, sys.argv)),
         takes=request.takes_made,
     )
 

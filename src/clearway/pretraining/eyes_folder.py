@@ -22,7 +22,7 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.learn.run_folder import RunFolder
 from clearway.perception.eyes import EyesCard, card_of, is_eyes, write_eyes
 from clearway.perception.eyes_network import Eyes
-from clearway.remote.address import text_without_secrets
+from clearway.remote.address import addresses_without_secrets
 
 if TYPE_CHECKING:
     from clearway.pretraining.trainer import PretrainRequest
@@ -42,7 +42,7 @@ def record_of(request: PretrainRequest) -> dict[str, Any]:
         "views": {"rooms": len(views.rooms), "pictures": len(views), "digest": digest, **views.settings.to_json()},
         "versions": package_versions(),
         "hardware": hardware(request.device),
-        "command": [*map(text_without_secrets, sys.argv)],
+        "command": [*map(addresses_without_secrets, sys.argv)],
     }
 
 

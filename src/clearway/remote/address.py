@@ -13,8 +13,9 @@ EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to 
 COPIED_NS = 10**18  # time of change that every copy has, so that one that comes again is the same
 ENTRY = re.compile(r"[0-9a-f]{32}-(\d{1,20})")  # see `cache`
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
-
-_WEB = re.compile(r"https?://\S+")
+_IN_WORDS = re.compile(
+    r"https?://\S+?(?=['\")\]>.,;]*(?:\s|$))"
+)  # up to a blank, less what closes a bracket or sentence
 
 
 def address_of(path: str | os.PathLike[str]) -> str | None:
@@ -39,9 +40,9 @@ def without_secrets(address: str) -> str:
     return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
 
 
-def text_without_secrets(text: str) -> str:
-    """A text in which web addresses, up to a blank, are `without_secrets`."""
-    return _WEB.sub(lambda found: without_secrets(found[0]), text)
+def addresses_without_secrets(words: str) -> str:
+    """Words with every web address in them as `without_secrets` has it."""
+    return _IN_WORDS.sub(lambda found: without_secrets(found[0]), words)
 
 
 def fetched_folder() -> Path:

@@ -17,7 +17,7 @@ from typing import Any
 import fsspec
 
 from clearway.errors import ClearwayError
-from clearway.remote.address import EXTRAS, file_name, without_secrets
+from clearway.remote.address import EXTRAS, addresses_without_secrets, file_name, without_secrets
 
 CONNECT_S = 10  # for a connection
 SILENCE_S = 20  # for the next bytes
@@ -65,7 +65,7 @@ class Store:
                 self.system = fsspec.filesystem(self.scheme, **_options(self.scheme))
             except ImportError as error:
                 extra = EXTRAS[self.scheme]
-                told = f"{address}: {self.scheme}:// needs another package"
+                told = f"{without_secrets(address)}: {self.scheme}:// needs another package"
                 raise ClearwayError(f"{told}. Install it: pip install 'clearway[{extra}]'") from error
         if hasattr(self.system, "retries"):
             self.system.retries = TRIES
@@ -84,7 +84,8 @@ class Store:
             listed = self._ask(self.system._ls, folder, detail=True)
         found = [entry for entry in listed if file_name(entry["name"]).endswith(tuple(suffixes))]
         if not found:
-            raise ClearwayError(f"{address}: no file ending in {' or '.join(suffixes)} there. Check the address")
+            told = f"no file ending in {' or '.join(suffixes)} there"
+            raise ClearwayError(f"{without_secrets(address)}: {told}. Check the address")
         return sorted((self._described(entry) for entry in found), key=lambda file: file.name)
 
     def file(self, address: str) -> RemoteFile:
@@ -92,9 +93,10 @@ class Store:
         with _faults_named(address):
             entry = self._ask(self.system._info, self.system._strip_protocol(address))
         if entry["type"] == "directory":
-            raise ClearwayError(f"{address}: a folder, expected a file. Check the address")
+            raise ClearwayError(f"{without_secrets(address)}: a folder, expected a file. Check the address")
         if entry.get("size") is None:
-            raise ClearwayError(f"{address}: its server does not say how large it is. Download it by hand")
+            problem = "its server does not say how large it is"
+            raise ClearwayError(f"{without_secrets(address)}: {problem}. Download it by hand")
         return RemoteFile(address, int(entry["size"]), _version(entry))
 
     def download(self, file: RemoteFile, path: Path) -> None:
@@ -179,14 +181,16 @@ def _faults_named(address: str) -> Iterator[None]:
     except ClearwayError:
         raise
     except Exception as fault:  # each store's library has a hundred kinds of its own, without a common base
-        raise ClearwayError(f"{without_secrets(address)}: {_told(fault, time.monotonic() - began)}") from fault
+        told = _told(fault, address, time.monotonic() - began)
+        raise ClearwayError(f"{without_secrets(address)}: {told}") from fault
 
 
-def _told(fault: Exception, seconds: float) -> str:
-    """What went wrong, and the remedy."""
+def _told(fault: Exception, address: str, seconds: float) -> str:
+    """What went wrong, and the remedy; without secrets, which the library's words may repeat."""
     hidden = isinstance(fault, FileNotFoundError) and str(fault).startswith("http")  # whatever happened, fsspec says so
     cause = fault.__cause__ or fault if hidden else fault
-    reason = " ".join(str(cause).split())[:200] or type(cause).__name__
+    words = addresses_without_secrets(str(cause).replace(address, without_secrets(address)))
+    reason = " ".join(words.split())[:200] or type(cause).__name__
     kind = type(cause).__name__
     if isinstance(cause, FileNotFoundError) or getattr(cause, "status", None) == 404:
         return "there is nothing there. Check the address"
