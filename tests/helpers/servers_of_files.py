@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
+from threading import Barrier, BrokenBarrierError, Thread
+from time import sleep
 from urllib.parse import unquote, urlsplit
 from urllib.request import Request, urlopen
 
@@ -122,6 +123,65 @@ class Shrunk(CutShort):
         self.send_header("Content-Length", "4")
         self.end_headers()
         self.wfile.write(b"four")
+
+
+class Trickling(CutShort):
+    """Sends slow.h5 byte by byte, 6 s long, after it has told so, and cuts others short."""
+
+    on_first_byte: Callable[[], None] = staticmethod(lambda: None)
+
+    def do_GET(self) -> None:
+        if not self.path.endswith("slow.h5"):
+            super().do_GET()
+            return
+        self.do_HEAD()
+        for number in range(10):
+            with suppress(OSError):  # who asked has gone
+                self.wfile.write(b"s")
+            if number == 0:
+                type(self).on_first_byte()
+            sleep(0.6)
+
+
+class Failing(_Files):
+    """Fails requests of some methods in its own ways, one after the other, then serves files."""
+
+    methods: tuple[str, ...] = ("GET", "HEAD")
+    failures: list[int | str]  # statuses, "cut off" or "silent"
+    asked: list[str]  # methods of all requests
+
+    def do_GET(self) -> None:
+        self.asked.append(self.command)
+        if self.command not in self.methods or not self.failures:
+            super().do_GET() if self.command == "GET" else super().do_HEAD()
+            return
+        failure = self.failures.pop(0)
+        if isinstance(failure, int):
+            content = b"<Error><Code>SlowDown</Code><Message>Reduce your request rate</Message></Error>"
+            self.send_response(failure)
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content if self.command == "GET" else b"")
+            return
+        if failure == "silent":
+            sleep(0.4)
+        self.close_connection = True
+
+    do_HEAD = do_GET
+
+
+class Meeting(_Files):
+    """Answers the first questions about files once as many are asked as `expected` waits for."""
+
+    expected: Barrier
+    left: int
+
+    def do_HEAD(self) -> None:
+        if type(self).left:
+            type(self).left -= 1
+            with suppress(BrokenBarrierError):
+                self.expected.wait()
+        super().do_HEAD()
 
 
 class GoogleStore(_Files):

@@ -1,8 +1,12 @@
 """What is said of servers that fail, and how soon."""
 
+import os
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 
@@ -10,7 +14,18 @@ from clearway.errors import ClearwayError
 from clearway.remote import store
 from clearway.remote.cache import fetched
 from clearway.remote.records import RECORDS
-from helpers.servers_of_files import CutShort, GoogleStore, Shrunk, Unwilling, files_of, silent_server, web_server
+from helpers.servers_of_files import (
+    CutShort,
+    Failing,
+    GoogleStore,
+    Meeting,
+    Shrunk,
+    Trickling,
+    Unwilling,
+    files_of,
+    silent_server,
+    web_server,
+)
 
 SUFFIXES = (".h5",)
 
@@ -18,6 +33,7 @@ SUFFIXES = (".h5",)
 @pytest.fixture(autouse=True)
 def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(store, "PAUSE_S", 0.02)
     yield
     left = [path for path in (tmp_path / "cache/remote").glob("*") if not path.name.startswith(".")]
     assert all((path.parent / RECORDS / path.name).exists() for path in left)
@@ -115,6 +131,100 @@ def test_a_folder_is_named_without_secrets(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(store.Store, "_ask", lambda *_: {"type": "directory"})
     with pytest.raises(ClearwayError, match=r"^http://127.0.0.1/a.h5: a folder, expected a file"):
         there.file("http://me:secret@127.0.0.1/a.h5?signature=secret")
+
+
+@pytest.mark.parametrize("failure", [503, 429, 500, "cut off", "silent"])
+@pytest.mark.parametrize("of", ["question", "download"])
+def test_what_fails_for_the_moment_is_tried_again(
+    of: str, failure: int | str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "SILENCE_S", 0.1)
+    (tmp_path / "a.h5").write_bytes(b"there")
+    asked, counts = [], {"question": 4, "download": 2}  # a question is two requests, HEAD and then GET
+    handler = type(
+        "Twice",
+        (Failing,),
+        {
+            "failures": [failure] * counts[of],
+            "asked": asked,
+            "methods": ("GET",) if of == "download" else ("GET", "HEAD"),
+        },
+    )
+    with web_server(files_of(tmp_path, handler)) as address:
+        (path,) = fetched([f"{address}/a.h5"], SUFFIXES)
+    assert path.read_bytes() == b"there"
+    assert asked.count("GET") == 3
+
+
+@pytest.mark.parametrize(("failure", "tries"), [(503, store.TRIES), (400, 1), (416, 1)])
+@pytest.mark.parametrize("scheme", ["http", "s3"])
+def test_tries_are_not_multiplied(
+    scheme: str,
+    failure: int,
+    tries: int,
+    s3: Callable[[str, bytes], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from s3fs import S3FileSystem
+
+    S3FileSystem.clear_instance_cache()
+    asked: list[str] = []
+    handler = type("Always", (Failing,), {"failures": [failure] * 20, "asked": asked})
+    with web_server(files_of(tmp_path, handler)) as address:
+        monkeypatch.setenv("AWS_ENDPOINT_URL", address)
+        file = store.RemoteFile("s3://rooms/a.h5" if scheme == "s3" else f"{address}/a.h5", 1, "")
+        with pytest.raises(ClearwayError):
+            store.Store(file.address).download(file, tmp_path / "a.h5")
+    assert asked == ["GET"] * tries
+
+
+def test_files_of_a_folder_are_asked_about_together(tmp_path: Path) -> None:
+    for number in range(4):
+        (tmp_path / f"{number}.h5").write_bytes(b"there")
+    four = Barrier(4, timeout=1)
+    handler = type("Four", (Meeting,), {"expected": four, "left": 4})
+    with web_server(files_of(tmp_path, handler)) as address:
+        assert [path.name for path in fetched([address], SUFFIXES)] == [f"{number}.h5" for number in range(4)]
+    assert not four.broken
+
+
+def threads_of_pools() -> list[str]:
+    return [thread.name for thread in threading.enumerate() if "ThreadPoolExecutor" in thread.name]
+
+
+def test_a_file_that_fails_ends_the_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with web_server(Trickling) as address:
+        began = time.monotonic()
+        with pytest.raises(ClearwayError, match="payload is not completed"):
+            fetched([f"{address}/slow.h5", f"{address}/b.h5"], SUFFIXES)
+        assert time.monotonic() - began < 2
+    assert not threads_of_pools()
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("server", ["silent", "slow"])
+def test_ctrl_c_ends_what_is_under_way(
+    server: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pressed: list[float] = []
+
+    def press() -> None:
+        pressed.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(store, "SILENCE_S", 6)
+    monkeypatch.setattr(Trickling, "on_first_byte", staticmethod(press))
+    later = threading.Timer(0.3, press)
+    with web_server(Trickling) if server == "slow" else silent_server() as address:
+        if server == "silent":
+            later.start()
+        with pytest.raises(KeyboardInterrupt):
+            fetched([f"{address}/slow.h5"], SUFFIXES)
+        later.cancel()
+        assert time.monotonic() - pressed[0] < 1.5
+    assert not threads_of_pools()
+    assert capfd.readouterr().err == ""
 
 
 def test_google_s_store(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,9 +13,7 @@ EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to 
 COPIED_NS = 10**18  # time of change that every copy has, so that one that comes again is the same
 ENTRY = re.compile(r"[0-9a-f]{32}-(\d{1,20})")  # see `cache`
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
-_IN_WORDS = re.compile(
-    r"https?://\S+?(?=['\")\]>.,;]*(?:\s|$))"
-)  # up to a blank, less what closes a bracket or sentence
+_IN_WORDS = re.compile(r"https?://\S+?(?=['\")\]>.,;]*(?:\s|$))")  # less what closes a bracket or sentence
 
 
 def address_of(path: str | os.PathLike[str]) -> str | None:

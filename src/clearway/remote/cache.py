@@ -11,9 +11,9 @@ import hashlib
 import math
 import os
 import shutil
+import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -31,10 +31,10 @@ from clearway.remote.address import (
 from clearway.remote.leases import lease_of, leased
 from clearway.remote.records import faults_named, record_text, recorded_address, write_records
 from clearway.remote.store import RemoteFile, Store
+from clearway.remote.together import AT_ONCE, together
 
 LIMIT_VARIABLE = "CLEARWAY_CACHE_GB"
 LIMIT_GB = 50.0
-AT_ONCE = 16  # files that are fetched at a time
 AHEAD = 1 / 8  # of the limit, for files that pass, and that as many may have as are fetched together
 
 
@@ -55,9 +55,10 @@ def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool
         ClearwayError: nothing is there, it cannot be had, or the cache is too small.
     """
     stores = {address: Store(address) for address in addresses}
-    with ThreadPoolExecutor(AT_ONCE) as asking:
-        found = list(asking.map(lambda address: stores[address].files(address, suffixes), addresses))
-    files = {file: stores[address] for address, some in zip(addresses, found, strict=True) for file in some}
+    listed = together(lambda address, stop: stores[address].listed(address, suffixes, stop), addresses)
+    entries = [(stores[address], entry) for address, some in zip(addresses, listed, strict=True) for entry in some]
+    found = together(lambda one, stop: one[0].described(one[1], stop), entries)
+    files = {file: store for (store, _), file in zip(entries, found, strict=True)}
     folder = fetched_folder()
     places = {file: folder / _entry(file) / file.name for file in files}
     with faults_named(folder):
@@ -73,7 +74,7 @@ def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool
             told = f"{size_gb:,.3g} GB do not fit into a cache of {limit_gb:g} GB, beside what others keep there"
             remedy = f"they are fetched as they are read, more than once. Set {LIMIT_VARIABLE} to more"
             warnings.warn(f"{without_secrets(addresses[0])}: {told}; {remedy}", CacheWarning, stacklevel=2)
-    return [places[file] for some in found for file in some]
+    return [places[file] for file in found]
 
 
 def fetch_again(places: Sequence[Path]) -> None:
@@ -85,8 +86,7 @@ def fetch_again(places: Sequence[Path]) -> None:
     folder = fetched_folder()
     with faults_named(folder), locked(folder / ".passing"):
         missing = list(dict.fromkeys(place for place in places if not is_whole(place)))  # others may have fetched some
-        with ThreadPoolExecutor(AT_ONCE) as asking:
-            files = dict(asking.map(_found_again, missing))
+        files = dict(together(_found_again, missing))
         with _kept_meanwhile(folder, places):
             _fetch(files, folder, show_progress=False)
 
@@ -142,7 +142,7 @@ def _keep(folder: Path, places: Sequence[Path]) -> None:
         raise
 
 
-def _found_again(place: Path) -> tuple[RemoteFile, Store]:
+def _found_again(place: Path, stop: threading.Event) -> tuple[RemoteFile, Store]:
     """A file that was fetched, and has gone since, and where it is.
 
     Raises:
@@ -150,7 +150,7 @@ def _found_again(place: Path) -> tuple[RemoteFile, Store]:
     """
     address = recorded_address(place)
     store = Store(address)
-    file = store.file(address)
+    file = store.file(address, stop)
     if (_entry(file), file.name) != (place.parent.name, place.name):
         raise ClearwayError(f"{address}: has changed since it was first read. Begin again")
     return file, store
@@ -199,18 +199,16 @@ def _fetch(files: Mapping[RemoteFile, Store], folder: Path, *, show_progress: bo
     """Download files; each appears in its place once it is whole."""
     if not files:
         return
-
     with (
         part_folder(folder) as part,
         picture_progress("fetching", len(files), show_progress, unit="files") as show_done,
-        ThreadPoolExecutor(AT_ONCE) as pool,
     ):
 
-        def fetch(file: RemoteFile) -> None:
+        def fetch(file: RemoteFile, stop: threading.Event) -> None:
             new = part / _entry(file)
             new.mkdir()
-            files[file].download(file, new / file.name)
-            if _entry(files[file].file(file.address)) != new.name:
+            files[file].download(file, new / file.name, stop)
+            if _entry(files[file].file(file.address, stop)) != new.name:
                 problem = "has changed while it was fetched"
                 raise ClearwayError(f"{without_secrets(file.address)}: {problem}. Begin again")
             os.utime(new / file.name, ns=(COPIED_NS, COPIED_NS))
@@ -220,14 +218,7 @@ def _fetch(files: Mapping[RemoteFile, Store], folder: Path, *, show_progress: bo
                 if not (folder / new.name / file.name).exists():  # else another process or thread was faster
                     raise
 
-        waiting = [pool.submit(fetch, file) for file in files]
-        try:
-            for done, future in enumerate(waiting, 1):
-                future.result()
-                show_done(done)
-        finally:
-            for future in waiting:
-                future.cancel()
+        together(fetch, list(files), show_done)
 
 
 def _entry(file: RemoteFile) -> str:

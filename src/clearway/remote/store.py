@@ -1,14 +1,16 @@
 """The way to files elsewhere, by fsspec: which there are, and what goes wrong as one line.
 
-A server that sends nothing for `SILENCE_S` is asked once more, Google's up to six times; then it is given up.
+What fails for the moment is tried up to `TRIES` times, with Google's up to six times; then it is given up.
 Credentials are those of the machine, as AWS's and Google's own tools read them.
 """
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +24,23 @@ from clearway.remote.address import EXTRAS, addresses_without_secrets, file_name
 CONNECT_S = 10  # for a connection
 SILENCE_S = 20  # for the next bytes
 ANSWER_S = 60  # for a question about one file or folder, tries together
-TRIES = 2
+TRIES = 3
+PAUSE_S = 0.5  # before the second try; twice as long before the next one
+LOOK_S = 0.1  # how often is looked whether a task is to stop
+STOPPING_S = 1  # that a task is given to end
+NEVER = threading.Event()  # stops nothing
 WRITABLE = ("s3", "gs")
 _VERSIONS = ("ETag", "etag", "generation", "Content-MD5", "LastModified", "Last-Modified", "mtime", "updated")
 _CREDENTIALS = ("Credential", "Permission", "Refresh", "Profile", "Token", "Forbidden")  # in names of errors
+_FOR_THE_MOMENT = {  # names of errors and of their bases, since no package of theirs need be installed
+    "TimeoutError",
+    "ConnectionError",
+    "ClientConnectionError",  # aiohttp's
+    "ClientPayloadError",
+    "HTTPClientError",  # botocore's, and the next
+    "IncompleteRead",
+    "ResponseParserError",
+}
 
 
 @dataclass(frozen=True)
@@ -67,31 +82,40 @@ class Store:
                 extra = EXTRAS[self.scheme]
                 told = f"{without_secrets(address)}: {self.scheme}:// needs another package"
                 raise ClearwayError(f"{told}. Install it: pip install 'clearway[{extra}]'") from error
-        if hasattr(self.system, "retries"):
-            self.system.retries = TRIES
+        if self.scheme == "s3":
+            self.system.retries = 1  # `_tried` tries again
+        self.tries = 1 if self.scheme == "gs" else TRIES  # Google's package tries again by itself
 
-    def files(self, address: str, suffixes: Sequence[str]) -> list[RemoteFile]:
-        """The files that an address names: itself if it ends like one, else those of the folder, by name.
+    def listed(self, address: str, suffixes: Sequence[str], stop: threading.Event = NEVER) -> list[dict[str, Any]]:
+        """What `described` tells more of: what the address names if it ends like a file, else the folder's, by name.
 
         Raises:
             ClearwayError: there is none, or the server cannot be asked.
         """
         if file_name(address).endswith(tuple(suffixes)):
-            return [self.file(address)]
+            return [{"name": address}]
         with _faults_named(address):
             path = self.system._strip_protocol(address)
             folder = path.rstrip("/") + ("/" if self.scheme.startswith("http") else "")
-            listed = self._ask(self.system._ls, folder, detail=True)
+            listed = self._ask(self.system._ls, folder, stop, detail=True)
         found = [entry for entry in listed if file_name(entry["name"]).endswith(tuple(suffixes))]
         if not found:
             told = f"no file ending in {' or '.join(suffixes)} there"
             raise ClearwayError(f"{without_secrets(address)}: {told}. Check the address")
-        return sorted((self._described(entry) for entry in found), key=lambda file: file.name)
+        return sorted(found, key=lambda entry: file_name(entry["name"]))
 
-    def file(self, address: str) -> RemoteFile:
+    def described(self, entry: dict[str, Any], stop: threading.Event = NEVER) -> RemoteFile:
+        """A file of `listed`; it is asked for where the listing did not tell its size. Raises as `file`."""
+        name = entry["name"]
+        address = name if "://" in name else f"{self.scheme}://{name}"
+        if entry.get("size") is None:
+            return self.file(address, stop)
+        return RemoteFile(address, int(entry["size"]), _version(entry))
+
+    def file(self, address: str, stop: threading.Event = NEVER) -> RemoteFile:
         """A file as it is now. Raises ClearwayError where it is not there, or its server cannot be asked."""
         with _faults_named(address):
-            entry = self._ask(self.system._info, self.system._strip_protocol(address))
+            entry = self._ask(self.system._info, self.system._strip_protocol(address), stop)
         if entry["type"] == "directory":
             raise ClearwayError(f"{without_secrets(address)}: a folder, expected a file. Check the address")
         if entry.get("size") is None:
@@ -99,14 +123,14 @@ class Store:
             raise ClearwayError(f"{without_secrets(address)}: {problem}. Download it by hand")
         return RemoteFile(address, int(entry["size"]), _version(entry))
 
-    def download(self, file: RemoteFile, path: Path) -> None:
-        """Write a file to `path`, not checked further than by its size.
+    def download(self, file: RemoteFile, path: Path, stop: threading.Event = NEVER) -> None:
+        """Write a file to `path`, not checked further than by its size; given up soon after `stop` is set.
 
         Raises:
             ClearwayError: it cannot be had whole.
         """
         with _faults_named(file.address):
-            self.system.get_file(self.system._strip_protocol(file.address), str(path))
+            self._tried(self.system._get_file, self.system._strip_protocol(file.address), str(path), stop=stop)
         if (size := path.stat().st_size) != file.size:
             problem = f"{size:,} of {file.size:,} bytes came"
             raise ClearwayError(f"{without_secrets(file.address)}: {problem}. Try again; the file there may be damaged")
@@ -120,7 +144,7 @@ class Store:
         with _faults_named(address):
             path = self.system._strip_protocol(address)
             try:
-                listed = self._ask(self.system._ls, path, detail=True)
+                listed = self._ask(self.system._ls, path, NEVER, detail=True)
             except FileNotFoundError:
                 return []
         return sorted(file_name(entry["name"].rstrip("/")) for entry in listed)
@@ -132,23 +156,67 @@ class Store:
             ClearwayError: the server cannot be written to.
         """
         with _faults_named(address):
-            self.system.put_file(str(path), self.system._strip_protocol(address))
+            self._tried(self.system._put_file, str(path), self.system._strip_protocol(address))
 
     def remove(self, address: str) -> None:
         """Remove a file, if it is there. Raises ClearwayError as `upload` does."""
         with _faults_named(address), suppress(FileNotFoundError):
-            self.system.rm_file(self.system._strip_protocol(address))
+            self._tried(self.system._rm_file, self.system._strip_protocol(address))
 
-    def _described(self, entry: dict[str, Any]) -> RemoteFile:
-        """A file of a listing; web servers list names alone."""
-        name = entry["name"]
-        address = name if "://" in name else f"{self.scheme}://{name}"
-        if entry.get("size") is None:
-            return self.file(address)
-        return RemoteFile(address, int(entry["size"]), _version(entry))
+    def _ask(self, question: Callable[..., Any], path: str, stop: threading.Event, **options: Any) -> Any:
+        return self._tried(question, path, stop=stop, limit_s=ANSWER_S, **options)
 
-    def _ask(self, question: Any, path: str, **options: Any) -> Any:
-        return fsspec.asyn.sync(self.system.loop, question, path, timeout=ANSWER_S, **options)
+    def _tried(
+        self,
+        task: Callable[..., Coroutine[Any, Any, Any]],
+        *given: str,
+        stop: threading.Event = NEVER,
+        limit_s: float | None = None,
+        **options: Any,
+    ) -> Any:
+        """Result of one of fsspec's tasks, begun anew where it fails for the moment."""
+
+        async def tries() -> Any:
+            for before in range(self.tries):
+                try:
+                    return await task(*given, **options)
+                except Exception as fault:
+                    if before + 1 == self.tries or not _is_for_the_moment(fault):
+                        raise
+                await asyncio.sleep(PAUSE_S * 2**before)
+
+        return _result(tries(), self.system.loop, stop, limit_s)
+
+
+def _result(
+    task: Coroutine[Any, Any, Any], loop: asyncio.AbstractEventLoop, stop: threading.Event, limit_s: float | None
+) -> Any:
+    """Result of a task that another thread's loop runs.
+
+    Raises:
+        ClearwayError: `stop` was set; the task has ended, too.
+        TimeoutError: it took longer than the limit, likewise.
+    """
+    ended = threading.Event()
+
+    async def until_ended() -> Any:
+        try:
+            return await task
+        finally:
+            ended.set()
+
+    began, future = time.monotonic(), asyncio.run_coroutine_threadsafe(until_ended(), loop)
+    try:
+        while not ended.wait(LOOK_S):
+            if stop.is_set():
+                raise ClearwayError("stopped")
+            if limit_s is not None and time.monotonic() - began > limit_s:
+                raise TimeoutError
+    except BaseException:
+        future.cancel()
+        ended.wait(STOPPING_S)
+        raise
+    return future.result()
 
 
 def _version(entry: dict[str, Any]) -> str:
@@ -187,8 +255,7 @@ def _faults_named(address: str) -> Iterator[None]:
 
 def _told(fault: Exception, address: str, seconds: float) -> str:
     """What went wrong, and the remedy; without secrets, which the library's words may repeat."""
-    hidden = isinstance(fault, FileNotFoundError) and str(fault).startswith("http")  # whatever happened, fsspec says so
-    cause = fault.__cause__ or fault if hidden else fault
+    cause = _cause(fault)
     words = addresses_without_secrets(str(cause).replace(address, without_secrets(address)))
     reason = " ".join(words.split())[:200] or type(cause).__name__
     kind = type(cause).__name__
@@ -199,3 +266,23 @@ def _told(fault: Exception, address: str, seconds: float) -> str:
     if isinstance(cause, TimeoutError) or "Timeout" in kind:
         return f"no answer in {seconds:.0f} s. Check the network and the server, then try again"
     return f"cannot be reached or read ({reason}). Check the address and the network, then try again"
+
+
+def _cause(fault: BaseException) -> BaseException:
+    """What a fault is about: of web servers fsspec says that a file is not there, whatever happened."""
+    hidden = isinstance(fault, FileNotFoundError) and str(fault).startswith("http")
+    return fault.__cause__ or fault if hidden else fault
+
+
+def _is_for_the_moment(fault: BaseException) -> bool:
+    """Whether the next try may do: silence, a connection that broke, or a server that is too busy or has failed."""
+    cause = _cause(fault)
+    status = _status(cause.__cause__ or cause)  # s3fs has translated what botocore raised
+    return status == 429 or status >= 500 or not _FOR_THE_MOMENT.isdisjoint(kind.__name__ for kind in type(cause).mro())
+
+
+def _status(fault: BaseException) -> int:
+    """The status with which a server answered; 0 where it did not."""
+    answer = getattr(fault, "response", None)
+    metadata = answer.get("ResponseMetadata", {}) if isinstance(answer, dict) else {}
+    return int(metadata.get("HTTPStatusCode") or getattr(fault, "status", None) or 0)
