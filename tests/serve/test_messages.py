@@ -11,17 +11,19 @@ from unittest.mock import Mock
 
 import pytest
 import uvicorn
+from uvicorn.protocols.utils import ClientDisconnected
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from clearway.serve.admitted import Admitted
 from clearway.serve.connections import Strangers
 from clearway.serve.handshakes import Handshakes
 from clearway.serve.limits import Limits
-from clearway.serve.messages import MOST_FRAGMENTS, impatient
+from clearway.serve.messages import MOST_FRAGMENTS, ImpatientSocket, impatient
 from clearway.serve.shares import Places
 from clearway.serve.tokens import KNOWN
 from helpers.running import PATIENT_S, Running, running
-from helpers.serving import OWNER, TOKEN, grey
+from helpers.serving import OWNER, TOKEN, TOKENS, grey
 
 BINARY, CONTINUED, LAST = 0x02, 0x00, 0x80
 
@@ -74,26 +76,32 @@ def test_a_message_in_too_many_parts_is_given_up() -> None:
         assert close_code(stream) == 1009
 
 
+def asked_for(app, places: Places) -> tuple[ImpatientSocket, Mock]:
+    """A connection that asks for a stream, and what it writes to."""
+    config = uvicorn.Config(app)
+    config.load()
+    kind = impatient(Limits(), places, places, Admitted(TOKENS), Strangers(1, None), Handshakes(1, 1.0, None))[1]
+    connection = kind(config, uvicorn.server.ServerState(), {})
+    transport = Mock(get_extra_info=lambda name, default=None: None, is_closing=lambda: False)
+    connection.connection_made(transport)
+    lines = ("GET / HTTP/1.1", "Host: x", "Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13")
+    connection.data_received("\r\n".join((*lines, f"Sec-WebSocket-Key: {22 * 'A'}==", "", "")).encode())
+    return connection, transport
+
+
 def test_nothing_is_read_before_the_token_was_right_and_all_is_given_back_at_the_end() -> None:
     async def asked() -> tuple[list[str], int, int]:
         known = asyncio.Event()
 
         async def app(scope, receive, send) -> None:
             await known.wait()
-            scope["state"][KNOWN](OWNER)
+            scope["state"][KNOWN](OWNER, TOKEN)
             await receive()
             await send({"type": "websocket.accept"})
             await asyncio.Event().wait()
 
-        config = uvicorn.Config(app)
-        config.load()
         places = Places(1000, lambda: {OWNER})
-        kind = impatient(Limits(), places, places, Strangers(1, None), Handshakes(1, 1.0, None))[1]
-        connection = kind(config, uvicorn.server.ServerState(), {})
-        transport = Mock(get_extra_info=lambda name, default=None: None, is_closing=lambda: False)
-        connection.connection_made(transport)
-        lines = ("GET / HTTP/1.1", "Host: x", "Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13")
-        connection.data_received("\r\n".join((*lines, f"Sec-WebSocket-Key: {22 * 'A'}==", "", "")).encode())
+        connection, transport = asked_for(app, places)
         await asyncio.sleep(0.01)
         before = [name for name, *_ in transport.method_calls if "reading" in name]
         known.set()
@@ -105,3 +113,23 @@ def test_nothing_is_read_before_the_token_was_right_and_all_is_given_back_at_the
 
     before, during, after = asyncio.run(asked())
     assert (before, after) == (["pause_reading"], 0) and during >= 100
+
+
+def test_an_answer_to_a_stream_that_was_given_up_says_that_nobody_is_there() -> None:
+    """Over TLS a connection can be there for some time yet."""
+
+    async def asked() -> bytes:
+        async def app(scope, receive, send) -> None:
+            scope["state"][KNOWN](OWNER, TOKEN)
+            await receive()
+            await send({"type": "websocket.accept"})
+            await asyncio.Event().wait()
+
+        connection, transport = asked_for(app, Places(1000, lambda: {OWNER}))
+        await asyncio.sleep(0.01)
+        connection.revoke()
+        with pytest.raises(ClientDisconnected):
+            await connection.send({"type": "websocket.send", "text": "an answer"})
+        return transport.write.call_args.args[0]
+
+    assert asyncio.run(asked())[2:4] == struct.pack("!H", 1008)

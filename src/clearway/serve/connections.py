@@ -14,6 +14,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from clearway.serve.admitted import Admitted
 from clearway.serve.handshakes import Handshakes
 from clearway.serve.shares import Places
 from clearway.serve.tokens import KNOWN
@@ -71,6 +72,7 @@ class Impatient(asyncio.Protocol):
     app_state: dict[str, Any]
     patience_s: float
     places: Places
+    admitted: Admitted
     owner: str | None = None  # once a right token has come
     _unread: asyncio.TimerHandle | None = None
 
@@ -80,11 +82,17 @@ class Impatient(asyncio.Protocol):
         transport.set_write_buffer_limits(1)  # asyncio's TLS takes 0 for always too much
         self.app_state = {**self.app_state, KNOWN: self.become_known}
 
-    def become_known(self, owner: str) -> bool:
+    def become_known(self, owner: str, token: str) -> bool:
         """Take a place for the connection once a right token has come; False where its owner has too many."""
         if self.owner is None and self.places.take(owner):
             self.owner = owner
+        if self.owner is not None:
+            self.admitted.add(self, owner, token)
         return self.owner is not None
+
+    def revoke(self) -> None:
+        """End the connection, whose token is taken back."""
+        raise NotImplementedError
 
     def pause_writing(self) -> None:
         """Begin to wait for the client to read."""
@@ -103,6 +111,7 @@ class Impatient(asyncio.Protocol):
         super().connection_lost(exc)
 
     def _give_place_back(self) -> None:
+        self.admitted.remove(self)
         if self.owner is not None:
             self.places.free(self.owner)
             self.owner = None
@@ -141,12 +150,17 @@ class ImpatientHttp(Impatient, H11Protocol):
         elif self._headers is None and self.conn.trailing_data[0]:
             self._await_headers()
 
-    def become_known(self, owner: str) -> bool:
+    def become_known(self, owner: str, token: str) -> bool:
         """Be no stranger any more, where there is a place."""
-        known = super().become_known(owner)
+        known = super().become_known(owner, token)
         if known:
             self.strangers.remove(self)
         return known
+
+    def revoke(self) -> None:
+        """End the connection; a request that is under way is answered before."""
+        if not self.transport.is_closing():
+            self.shutdown()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing any more."""

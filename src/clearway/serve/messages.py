@@ -9,9 +9,11 @@ import asyncio
 from collections import deque
 from typing import Any
 
+from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from clearway.serve.connections import Impatient, ImpatientHttp, Strangers
+from clearway.serve.admitted import Admitted
+from clearway.serve.connections import Impatient, ImpatientHttp, Strangers, reset
 from clearway.serve.faults import AGAIN, POLICY, TOO_BIG
 from clearway.serve.handshakes import Handshakes
 from clearway.serve.limits import Limits
@@ -31,6 +33,7 @@ class ImpatientSocket(Impatient, WebSocketsSansIOProtocol):
     bodies: Places
     message_s: float
     _held = 0  # bytes that have taken places
+    _given_up = False
     _rest: asyncio.TimerHandle | None = None
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -79,7 +82,13 @@ class ImpatientSocket(Impatient, WebSocketsSansIOProtocol):
         return message
 
     async def send(self, message: Any) -> None:
-        """Pass a message on; a refusal completes the handshake, of which uvicorn would complain."""
+        """Pass a message on; a refusal completes the handshake, of which uvicorn would complain.
+
+        Raises:
+            ClientDisconnected: the connection was given up.
+        """
+        if self._given_up:
+            raise ClientDisconnected
         await super().send(message)
         self.handshake_complete = self.handshake_complete or self.close_sent
 
@@ -130,8 +139,16 @@ class ImpatientSocket(Impatient, WebSocketsSansIOProtocol):
             self._rest.cancel()
             self._rest = None
 
+    def revoke(self) -> None:
+        """End the stream, or the handshake."""
+        if self.handshake_complete and not self.transport.is_closing():
+            self._give_up(POLICY, "the token is no longer taken")
+        else:
+            reset(self.transport)
+
     def _give_up(self, code: int, reason: str) -> None:
         """End the connection, and tell the client why."""
+        self._given_up = True
         self.conn.fail(code, reason)
         self.close_sent = True
         self.queue.put_nowait({"type": "websocket.disconnect", "code": code, "reason": reason})
@@ -143,12 +160,13 @@ def impatient(
     limits: Limits,
     places: Places,
     bodies: Places,
+    admitted: Admitted,
     strangers: Strangers,
     handshakes: Handshakes,
     health_port: int | None = None,
 ) -> tuple[type[asyncio.Protocol], type[asyncio.Protocol]]:
     """The classes for HTTP and for WebSockets with those limits, and places for connections and for bytes under way."""
-    both = {"patience_s": limits.patience_s, "places": places}
+    both = {"patience_s": limits.patience_s, "places": places, "admitted": admitted}
     before = {"strangers": strangers, "handshakes": handshakes, "health_port": health_port}
     return (
         type("ImpatientHttp", (ImpatientHttp,), {**both, **before}),

@@ -228,7 +228,7 @@ def _owner(scope: Scope, service: Service) -> str:
     if owner is None:
         raise _unauthorised()
     known = scope.get("state", {}).get(KNOWN)
-    if known and not known(owner):
+    if known and not known(owner, token):
         raise Fault("overloaded", "too many connections of this token are open. Close one, or try again later")
     return owner
 

@@ -15,6 +15,7 @@ from clearway.deploy.agent import DeployedAgent
 from clearway.deploy.navigator import open_agent
 from clearway.errors import ClearwayError
 from clearway.serve.access_log import AccessLog, Sparing
+from clearway.serve.admitted import Admitted
 from clearway.serve.app import make_app
 from clearway.serve.connections import Strangers
 from clearway.serve.handshakes import Door, Handshakes
@@ -143,7 +144,8 @@ def run_service(
     strangers = Strangers(limits.strangers, network.proxy)
     handshakes = Handshakes(limits.strangers, limits.patience_s, network.proxy)
     connections = allowed_connections(limits.connections)
-    http, sockets = impatient(limits, service.places(connections), service.bodies, strangers, handshakes, health_port)
+    shared = (service.places(connections), service.bodies, Admitted(tokens))
+    http, sockets = impatient(limits, *shared, strangers, handshakes, health_port)
     tls = network.tls()
     listeners = [Door(listener, handshakes) if tls else listener for listener in network.listeners()]
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.WARNING)

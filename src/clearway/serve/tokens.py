@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from clearway.errors import ClearwayError
@@ -13,7 +13,7 @@ from clearway.web.guard import same_token
 
 OWNER = "clearway.owner"  # in the scope of a request: the name of its token
 ANSWERED = "clearway.answered"  # in the scope of a WebSocket: to be called of every answer
-KNOWN = "clearway.known"  # in the state of a request: told the owner once its token was right; False: too many
+KNOWN = "clearway.known"  # in the state of a request: told the owner and its token once that was right; False: too many
 ALONE = "default"  # the owner where there is one token
 FEWEST_LETTERS = 16
 MOST_NAME_LETTERS = 100  # which every record of a session holds
@@ -28,12 +28,19 @@ class Tokens:
     """
 
     def __init__(self, named: Sequence[tuple[str, str]]) -> None:
-        self._named = tuple(named)
+        self._named, self._all = tuple(named), frozenset(named)
         self.owners = frozenset(name for name, _ in named)
+        self._told: Callable[[], object] | None = None
+
+    def when_replaced(self, tell: Callable[[], object]) -> None:
+        """Let this be called whenever others have taken their place."""
+        self._told = tell
 
     def replace(self, other: Tokens) -> None:
         """Take another's instead of the own."""
-        self._named, self.owners = other._named, other.owners
+        self._named, self._all, self.owners = other._named, other._all, other.owners
+        if self._told is not None:
+            self._told()
 
     def owner_of(self, given: str) -> str | None:
         """The name of a token's owner, None where there is no such token; how long it takes tells nothing of them."""
@@ -42,6 +49,10 @@ class Tokens:
             if same_token(given, token):
                 found = name
         return found
+
+    def has(self, owner: str, token: str) -> bool:
+        """Whether a token that was right is the owner's still."""
+        return (owner, token) in self._all
 
 
 def checked_token(token: str, what: str) -> str:
