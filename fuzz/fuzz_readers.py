@@ -22,6 +22,8 @@ from pathlib import Path
 import atheris
 
 with atheris.instrument_imports(include=["clearway"]):
+    from clearway.cli.config import with_config
+    from clearway.cli.main import Command
     from clearway.deploy.agent import MAX_PICTURE_SIDE
     from clearway.deploy.onnx_file import check_seal, sealed
     from clearway.deploy.onnx_graph_check import problem_of
@@ -40,7 +42,6 @@ with atheris.instrument_imports(include=["clearway"]):
     from clearway.scenes.thor_v1 import read_scene, write_scene
     from clearway.serve.decoding import Bounds, Refused, decoded
     from clearway.serve.limits import Limits
-    from clearway.settings_file import read_settings
 
 import numpy as np
 from PIL import Image
@@ -82,6 +83,11 @@ def read_picture(path: Path) -> None:
     """A picture of a client of the service."""
     with contextlib.suppress(Refused):
         decoded(path.read_bytes(), BOUNDS)
+
+
+def read_config(path: Path) -> None:
+    """Settings of a training."""
+    with_config(["train", "x.h5", "--config", str(path)], Command)
 
 
 def picture_bytes(kind: str) -> bytes:
@@ -186,7 +192,8 @@ READERS: tuple[tuple[str, Callable[[Path], object], Callable[[], bytes]], ...] =
     ("seen.jpg", read_picture, lambda: picture_bytes("JPEG")),
     ("seen.png", read_picture, lambda: picture_bytes("PNG")),
     ("seen.webp", read_picture, lambda: picture_bytes("WEBP")),
-    ("run.yaml", read_settings, lambda: b"frames: 6e5\nset: {envs: 10}\n"),
+    ("run.yaml", read_config, lambda: b"frames: 6e5\nset: {envs: 10}\n"),
+    ("other.yaml", read_config, lambda: b'frames: 1:30\nseed: !!bool "zzz"\nout: 2020-12-24\n'),
 )
 
 

@@ -1,9 +1,11 @@
 """Every hostile file is refused in one good line, or read without harm: `hostile` is the corpus and what reads it."""
 
 import sys
+import time
 
 import pytest
 
+from hostile import child, settings_files
 from hostile.summary import results, table
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="a process's peak of memory is told by /proc")
@@ -21,6 +23,16 @@ def summed_up(flips: int) -> str:
     assert flipped.count("read") > 0  # what no reader looks at: unused space
     assert {result.outcome for result in found if result.group.startswith("hostile")} == {"refused"}
     return summary
+
+
+def test_settings_that_are_hostile() -> None:
+    """They gave tracebacks, or took minutes."""
+    before = child.memory("VmRSS")
+    for case in settings_files.cases():
+        if case.group == "hostile settings":
+            begun = time.process_time()
+            assert child.tried(case, before)[:2] == ("refused", ""), case.name
+            assert time.process_time() - begun < 3, case.name
 
 
 @pytest.mark.slow

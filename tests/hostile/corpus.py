@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hostile import odd_files, other_files, scene_files
+from hostile import odd_files, other_files, scene_files, settings_files
 from hostile.cases import Case
 
 
@@ -12,4 +12,5 @@ def cases(flips: int) -> Iterator[Case]:
     """Every case; `flips` is the number of bits flipped in a scene file of ours, one a file."""
     yield from scene_files.cases(flips)
     yield from other_files.cases(flips)
+    yield from settings_files.cases()
     yield from odd_files.cases()
