@@ -5,17 +5,20 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import closing
 from typing import TypeVar
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from clearway.serve.decoders import Decoders, Standing
+from clearway.serve.decoder import ANSWER, PIXELS, REFUSED
+from clearway.serve.decoders import Decoder, Decoders, Standing, _Ended
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
@@ -105,6 +108,37 @@ def test_memory_is_bounded() -> None:
         assert caught.value.code == "unreadable_picture"
 
     with_decoders(Limits(picture_pixels=4000 * 4000, decoder_bytes=90 << 20), task)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        ANSWER.pack(PIXELS, 2**32 - 1, 2**32 - 1),
+        ANSWER.pack(PIXELS, 11, 10) + bytes(330),
+        ANSWER.pack(PIXELS, 5000, 0),
+        ANSWER.pack(7, 1, 1) + bytes(3),
+        ANSWER.pack(REFUSED, 2**32 - 1, 0) + bytes(1000),
+        ANSWER.pack(REFUSED, 4, 0) + b"nope",
+        ANSWER.pack(REFUSED, 10, 0) + b'["no", ""]',
+        ANSWER.pack(REFUSED, 2, 0) + b"[]",
+    ],
+    ids=["huge", "too many pixels", "too long", "of no kind", "a long refusal", "no JSON", "of no code", "empty"],
+)
+def test_a_decoder_whose_answer_is_none_is_ended(answer: bytes) -> None:
+    """Its numbers were believed: 12 bytes could ask for all memory there is."""
+
+    async def task() -> bool:
+        decoder, process = Decoder(Limits(picture_pixels=100), 0), Mock(poll=lambda: None)
+        ours, theirs = socket.socketpair()
+        ours.setblocking(False)
+        decoder._process, decoder._connection = process, ours
+        with theirs:
+            theirs.sendall(answer)
+            with pytest.raises(_Ended):
+                await decoder.decode(b"a file", 1.0, 0.5)
+        return process.kill.called
+
+    assert asyncio.run(task())
 
 
 def test_a_stalled_decoder_is_noticed_ended_and_replaced() -> None:

@@ -16,20 +16,20 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from typing import cast
 
 import numpy as np
 
 from clearway.children import command_of
 from clearway.deploy.agent import MAX_PICTURE_SIDE
-from clearway.serve.decoder import ANSWER, ASKED, BUFFER_BYTES, REFUSED
+from clearway.serve.decoder import ANSWER, ASKED, BUFFER_BYTES, PIXELS, REFUSED
 from clearway.serve.decoding import Bounds
-from clearway.serve.faults import Code, Fault
+from clearway.serve.faults import STATUS, Fault
 from clearway.serve.limits import Limits
 from clearway.serve.shares import FairTurns, Shares
 
 NICENESS, SLOW_NICENESS = 5, 19  # yields to the agent; to all others
 SUSPECT_S = 60.0  # for which the pictures of a session are decoded slowly, one of which has overrun
+MOST_REFUSAL_BYTES = 500  # of a decoder's
 MOST_OVERRUNS_S = 1.0  # of decoding lately in vain for a token, beyond which its new sessions are decoded slowly
 
 
@@ -59,8 +59,8 @@ class Decoder:
     """
 
     def __init__(self, limits: Limits, niceness: int) -> None:
-        bounds = Bounds(limits.picture_pixels, MAX_PICTURE_SIDE, limits.picture_scans)
-        job = {"bounds": asdict(bounds), "memory_bytes": limits.decoder_bytes, "nice": niceness}
+        self._bounds = Bounds(limits.picture_pixels, MAX_PICTURE_SIDE, limits.picture_scans)
+        job = {"bounds": asdict(self._bounds), "memory_bytes": limits.decoder_bytes, "nice": niceness}
         self._job, self.niceness = json.dumps(job), niceness
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
@@ -115,7 +115,8 @@ class Decoder:
 
         Raises:
             Fault: it is refused.
-            _Ended: the process has ended, for lack of time or otherwise; another one is to be started.
+            _Ended: the process has ended, or was ended for lack of time or a senseless answer; another one is to be
+                started.
             OSError: no process can be started.
         """
         self.start()
@@ -123,7 +124,7 @@ class Decoder:
         try:
             async with asyncio.timeout(patience_s):
                 return await self._answered(content, seconds)
-        except (TimeoutError, EOFError, ConnectionError) as fault:
+        except (TimeoutError, EOFError, ConnectionError, ValueError) as fault:
             self.end()
             raise _Ended from fault
         except asyncio.CancelledError:  # its answer would be taken for the next picture's
@@ -133,12 +134,14 @@ class Decoder:
             self.begun_s = None
 
     async def _answered(self, content: bytes, seconds: float) -> np.ndarray:
+        """The answer of a process that strangers' pictures may have taken over. Raises ValueError where it is none."""
         loop = asyncio.get_running_loop()
         await loop.sock_sendall(self._connection, ASKED.pack(len(content), round(1000 * seconds)) + content)
         kind, first, second = ANSWER.unpack(await self._received(ANSWER.size))
-        if kind == REFUSED:
-            code, message = json.loads(bytes(await self._received(first)))
-            raise Fault(cast(Code, code), message)
+        if kind == REFUSED and first <= MOST_REFUSAL_BYTES:
+            raise _refusal(bytes(await self._received(first)))
+        if kind != PIXELS or first * second > self._bounds.pixels or max(first, second) > self._bounds.side:
+            raise ValueError("more than was asked for")
         pixels = await self._received(first * second * 3)
         return np.frombuffer(pixels, np.uint8).reshape(first, second, 3)
 
@@ -151,6 +154,14 @@ class Decoder:
                 raise EOFError
             have += more
         return found
+
+
+def _refusal(told: bytes) -> Fault:
+    """A decoder's refusal. Raises ValueError where it is none."""
+    match json.loads(told):
+        case [str(code), str(message)] if code in STATUS:
+            return Fault(code, message)
+    raise ValueError("no refusal")
 
 
 class Lane:
