@@ -8,6 +8,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import TypeVar
 
+from clearway.serve.addresses import counted_as
+
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 MINUTE_S = 60.0
@@ -15,7 +17,7 @@ MOST_KEPT = 10_000  # addresses, and tokens that were right
 
 
 class Attempts:
-    """Counts the wrong tokens of every address; a minute forgives as many as are allowed in it.
+    """Counts the wrong tokens of every address, see `counted_as`; a minute forgives as many as are allowed in it.
 
     Args:
         most: in a minute.
@@ -29,10 +31,12 @@ class Attempts:
 
     def may_try(self, address: str, token: str) -> bool:
         """Whether a token of this address is to be looked at."""
+        address = counted_as(address)
         return self._count(address) + 1 <= self._most or (address, _digest(token)) in self._right
 
     def note(self, address: str, token: str, right: bool) -> None:
         """Keep what came of it."""
+        address = counted_as(address)
         if right:
             _keep(self._right, (address, _digest(token)), None)
         else:

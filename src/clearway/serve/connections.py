@@ -14,6 +14,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from clearway.serve.addresses import counted_as
 from clearway.serve.admitted import Admitted
 from clearway.serve.handshakes import Handshakes
 from clearway.serve.shares import Places
@@ -24,14 +25,14 @@ KEEP_ALIVE_S = 75  # of an idle connection; longer than clients and proxies comm
 
 def reset(transport: asyncio.Transport) -> None:
     """Cut a connection off and let the system forget what it still had to send, which it would else keep trying to."""
-    plug = transport.get_extra_info("socket")
-    if plug is not None and not transport.is_closing():
+    plug = None if transport.is_closing() else transport.get_extra_info("socket")  # of TLS, closed twice, knows nothing
+    if plug is not None:
         plug.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     transport.abort()
 
 
 class Strangers:
-    """Connections on which no right token has come yet, by address.
+    """Connections on which no right token has come yet, by address, see `counted_as`.
 
     Args:
         most: of an address.
@@ -46,7 +47,7 @@ class Strangers:
         """Count a new connection; the oldest of its address is cut off where there are too many."""
         if connection.address == self._trusted:
             return
-        found = self._open.setdefault(connection.address, {})
+        found = self._open.setdefault(counted_as(connection.address), {})
         found[connection] = None
         oldest = next((other for other in found if other.owner is None), None)
         if len(found) > self._most and oldest is not None:
@@ -55,10 +56,11 @@ class Strangers:
 
     def remove(self, connection: ImpatientHttp) -> None:
         """Count it no more: it is closed, or a right token has come."""
-        found = self._open.get(connection.address, {})
+        address = counted_as(connection.address)
+        found = self._open.get(address, {})
         found.pop(connection, None)
         if not found:
-            self._open.pop(connection.address, None)
+            self._open.pop(address, None)
 
 
 class Impatient(asyncio.Protocol):
@@ -177,7 +179,7 @@ class ImpatientHttp(Impatient, H11Protocol):
 
     def timeout_keep_alive_handler(self) -> None:
         """Uvicorn calls it `patience_s` after an answer: who has left it unread is cut off, owners may stay idle."""
-        if self.transport.get_write_buffer_size():
+        if self.transport.is_closing() or self.transport.get_write_buffer_size():
             reset(self.transport)
         elif self.owner is None:
             super().timeout_keep_alive_handler()

@@ -7,9 +7,11 @@ import socket
 from contextlib import suppress
 from typing import Any
 
+from clearway.serve.addresses import counted_as
+
 
 class Handshakes:
-    """Keeps those connections few for each address, and short.
+    """Keeps those connections few for each address, see `counted_as`, and short.
 
     Args:
         most: of an address; the oldest makes room for the next.
@@ -23,14 +25,16 @@ class Handshakes:
 
     def begin(self, plug: socket.socket, address: str) -> None:
         """Count a connection that was just taken; call it from the event loop."""
+        is_trusted, address = address == self._trusted, counted_as(address)
         open_ones = [other for other in self._open.get(address, []) if other.fileno() >= 0]
         self._open[address] = [*open_ones, plug]
-        if len(open_ones) >= self._most and address != self._trusted:
+        if len(open_ones) >= self._most and not is_trusted:
             self._end(open_ones[0], address)
         asyncio.get_running_loop().call_later(self._patience_s, self._end, plug, address)
 
     def done(self, number: int, address: str) -> None:
         """Count a connection no more, by the number of its file."""
+        address = counted_as(address)
         self._keep(address, [plug for plug in self._open.get(address, []) if plug.fileno() not in (number, -1)])
 
     def _end(self, plug: socket.socket, address: str) -> None:

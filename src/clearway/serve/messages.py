@@ -76,7 +76,7 @@ class ImpatientSocket(Impatient, WebSocketsSansIOProtocol):
             self._hold()
         message = await super().receive()
         self._answering = message["type"] == "websocket.receive"
-        if not self.writable.is_set():
+        if not self.writable.is_set() and not self.transport.is_closing():
             self.transport.pause_reading()
         self._hold()
         return message
@@ -100,7 +100,7 @@ class ImpatientSocket(Impatient, WebSocketsSansIOProtocol):
     def resume_writing(self) -> None:
         """Read on, unless a message waits for the application."""
         super().resume_writing()
-        if not self.read_paused:
+        if not self.read_paused and not self.transport.is_closing():
             self.transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:
