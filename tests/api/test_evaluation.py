@@ -55,6 +55,18 @@ def test_its_tables_and_files(trained, tmp_path, capfd) -> None:
         result.markdown("target")
 
 
+def test_its_text_is_what_the_command_prints(trained, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    result = clearway.evaluate(trained, episodes=3, step_limit=20)
+    lines = [line.rstrip() for line in result.text().splitlines()]
+    assert max(map(len, lines)) <= 80
+    assert not [line for line in lines if "argmax" in line or line.startswith(" optimum")]
+    assert "4 more rows, of other ways of acting and exact optima: text(all=True)." in lines
+    every = result.text(all=True)
+    assert "argmax" in every and " optimum" in every and "more rows" not in every
+    assert max(len(line.rstrip()) for line in every.splitlines()) <= 80
+
+
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -174,3 +175,24 @@ def test_the_seed_is_that_of_the_bootstrap_too():
     first, again, other = (summarise(world, table, "a", "e", Protocol(30, 400, seed, "sampled")) for seed in (0, 0, 1))
     assert first.average.values == other.average.values
     assert first.average.intervals == again.average.intervals != other.average.intervals
+
+
+def printed(evaluations: list[Evaluation], levels: list[str]) -> str:
+    console = Console(width=80, file=io.StringIO())
+    console.print(rich_tables(evaluations, levels, every=False, rest="elsewhere"))
+    return console.file.getvalue()
+
+
+def test_of_several_agents_the_main_rows_show_each_once(evaluations):
+    shown = printed(evaluations, ["average"])
+    names = [line.split("  ")[0].strip() for line in shown.splitlines() if re.match(r" [a-z].*/5", line)]
+    assert names == ["first", "second", "random", "shortest path"]
+    assert "4 more rows, of other ways of acting and exact optima: elsewhere." in shown
+
+
+def test_ranges_are_explained_only_where_they_are_shown(evaluations):
+    one_scene = [replace(evaluation, scenes=evaluation.scenes[:1]) for evaluation in evaluations]
+    for which, levels in [(evaluations, ["scenes"]), (evaluations, ["targets"]), (one_scene, ["scenes"])]:
+        shown = printed(which, levels)
+        assert ("Ranges: 95 %" in shown) == ("–" in shown) == (which is one_scene)
+    assert "Ranges: 95 %" in printed(evaluations, ["targets", "average"])

@@ -98,6 +98,7 @@ def test_the_demo_leaves_a_page_with_its_pictures(first):
     check_demo(out)
     for agent in AGENTS:
         assert agent in answer.out
+    assert "argmax" not in answer.out and f"--all, or {out / 'evaluation.md'}." in answer.out
     assert answer.err.splitlines()[-1] == f"open {out / 'index.html'}"
 
 

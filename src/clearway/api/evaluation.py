@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,16 +87,25 @@ class EvaluateResult:
         as_choice("width", width, get_args(Width))
         return markdown_table(self.evaluations, level, width=width)
 
-    def text(self, level: Level = "average") -> str:
-        """The table as `clearway evaluate` prints it, without colours. Raises ArgumentError: no such level."""
+    def text(self, level: Level = "average", *, all: bool = False) -> str:
+        """The table as `clearway evaluate` prints it, as wide as the terminal, without colours.
+
+        Args:
+            level: a row an agent ("average"), or one for each of its "scenes" or "targets".
+            all: a row for each way of acting and the exact optima too.
+
+        Raises:
+            ArgumentError: there is no such level.
+        """
         from rich.console import Console
 
         from clearway.evaluation.tables import rich_tables
 
         as_choice("level", level, get_args(Level))
-        console = Console(width=TEXT_WIDTH, color_system=None, markup=False, legacy_windows=False)
+        width = shutil.get_terminal_size().columns
+        console = Console(width=width, color_system=None, markup=False, legacy_windows=False)
         with console.capture() as captured:
-            console.print(rich_tables(self.evaluations, [level]))
+            console.print(rich_tables(self.evaluations, [level], every=all, rest="text(all=True)"))
         return captured.get()
 
     def to_json(self) -> dict[str, object]:
@@ -118,9 +128,6 @@ class EvaluateResult:
 
     def _repr_markdown_(self) -> str:
         return self.markdown()
-
-
-TEXT_WIDTH = 120  # columns
 
 
 def is_exported(source: Path) -> bool:

@@ -29,6 +29,9 @@ class Demo:
     """Of a room in which the generalist, which comes with clearway, walks before anything is trained."""
     encoder: str = "auto"
     """As for clearway scenes build."""
+    all: bool = False
+    """Print a row for each way of acting, and for the exact optima; by default for both agents, a random walk and
+    shortest paths. evaluation.md in the folder holds all."""
     json: bool = False
     """Print the evaluations as JSON instead of a table."""
 
@@ -50,7 +53,8 @@ class Demo:
             return
         from clearway.evaluation.tables import rich_tables
 
-        stdout_console().print(rich_tables(result.evaluations, ["scenes"]))
+        rest = f"--all, or {result.out / 'evaluation.md'}"
+        stdout_console().print(rich_tables(result.evaluations, ["average"], every=self.all, rest=rest))
         say(f"open {page}")
 
     def _command(self) -> str:

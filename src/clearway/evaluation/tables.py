@@ -86,7 +86,9 @@ COLUMNS = (
 )
 
 
-def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all") -> TableText:
+def table_text(
+    evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all", ranges: bool = True
+) -> TableText:
     """The rows of a table of one or more evaluations.
 
     Args:
@@ -94,10 +96,10 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, w
         level: one row an evaluation ("average"), or one for each of its "scenes" or "targets"; a single scene is the
             average.
         width: which columns.
+        ranges: the notes say what ranges are.
     """
     assert evaluations, "a table needs at least one evaluation"
-    if level == "scenes" and len(evaluations[0].scenes) == 1:
-        level = "average"
+    level = _level(evaluations, level)
     columns = [column for column in COLUMNS if WIDTHS.index(column.least) <= WIDTHS.index(width)]
     where = () if level == "average" else ("scene",)
     headings = (*where, "agent", "solved", *(column.heading for column in columns))
@@ -111,7 +113,7 @@ def table_text(evaluations: Sequence[Evaluation], level: Level = "average", *, w
         )
         for result, evaluation in _results(evaluations, level)
     )
-    return TableText(headings, rows, tuple(_notes(evaluations)))
+    return TableText(headings, rows, tuple(_notes(evaluations, ranges)))
 
 
 def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all") -> str:
@@ -121,31 +123,35 @@ def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", 
     return "\n".join([*lines, "", *(f"{note}  " for note in table.notes)]) + "\n"
 
 
-def rich_tables(evaluations: Sequence[Evaluation], levels: Sequence[Level], *, every: bool = True) -> Group:
+def rich_tables(
+    evaluations: Sequence[Evaluation], levels: Sequence[Level], *, every: bool = True, rest: str = "--all"
+) -> Group:
     """The main figures for the terminal, a table a level: intervals dim, failures in red, notes at the end.
 
     Args:
         evaluations: that of the agent first.
         levels: of the tables.
-        every: show all evaluations. Else the agent by its first way of acting, and others to compare with, without
-            exact optima.
+        every: show all evaluations. Else each agent by its first way of acting, without exact optima.
+        rest: how to see those that are not shown.
     """
     from rich.console import Group
 
     shown = evaluations if every else main_rows(evaluations)
-    contents = [table_text(shown, level, width="terminal") for level in levels]
-    *tables, last = (_rich(content, level == "average") for content, level in zip(contents, levels, strict=True))
+    with_ranges = [_level(evaluations, level) == "average" for level in levels]
+    contents = [table_text(shown, level, width="terminal", ranges=any(with_ranges)) for level in levels]
+    *tables, last = (_rich(content, ranges) for content, ranges in zip(contents, with_ranges, strict=True))
     left = len(evaluations) - len(shown)
-    more = [f"{left} more row{'s' * (left > 1)}, of other ways of acting and exact optima: --all."] if left else []
+    more = [f"{left} more row{'s' * (left > 1)}, of other ways of acting and exact optima: {rest}."] if left else []
     return Group(*tables, noted(last, [*contents[-1].notes, *more]))
 
 
 def main_rows(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
-    """The agent by its first way of acting, and other agents without the exact optima."""
-    first, *others = evaluations
+    """Each agent by its first way of acting, without the exact optima."""
+    way = evaluations[0].protocol.action_selection
     return [
-        first,
-        *(one for one in others if one.agent != first.agent and not one.agent.startswith(tuple(REFERENCES))),
+        one
+        for one in evaluations
+        if one.protocol.action_selection == way and not one.agent.startswith(tuple(REFERENCES))
     ]
 
 
@@ -182,6 +188,11 @@ def _results(evaluations: Sequence[Evaluation], level: Level) -> list[tuple[Resu
     return [pair for place in zip(*by_agent, strict=True) for pair in zip(place, evaluations, strict=True)]
 
 
+def _level(evaluations: Sequence[Evaluation], level: Level) -> Level:
+    """The level of a table: with a single scene, its row is the average."""
+    return "average" if level == "scenes" and len(evaluations[0].scenes) == 1 else level
+
+
 def _place(result: Result, level: Level) -> tuple[Cell, ...]:
     if level == "average":
         return ()
@@ -198,14 +209,14 @@ def _solved(result: Result) -> Cell:
     return Cell(f"{MARK} {text}" if failed else text, failed=failed)
 
 
-def _notes(evaluations: Sequence[Evaluation]) -> list[str]:
+def _notes(evaluations: Sequence[Evaluation], ranges: bool) -> list[str]:
     protocol = evaluations[0].protocol
     encoders = ", ".join(dict.fromkeys(evaluation.encoder for evaluation in evaluations))
     notes = [
         f"Encoder: {encoders}.",
         *dict.fromkeys(f"{found.agent}: {found.trained}." for found in evaluations if found.trained),
         f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_limit:,} "
-        f"steps, seed {protocol.seed}. Ranges: 95 % bootstrap intervals over episodes.",
+        f"steps, seed {protocol.seed}.{' Ranges: 95 % bootstrap intervals over episodes.' if ranges else ''}",
     ]
     for name, meaning in REFERENCES.items():
         if any(evaluation.agent.startswith(name) for evaluation in evaluations):
