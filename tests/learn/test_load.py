@@ -15,6 +15,7 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.running import save
 from clearway.learn.train import RunRequest, train
+from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.world import make_world
@@ -104,6 +105,19 @@ def test_files_given_replace_those_recorded_in_the_run_s_order(tmp_path: Path) -
         run_scenes(record, [moved / "corridor.h5"])
     scenes = run_scenes(record, [moved / "grid.h5", moved / "corridor.h5"])
     assert [scene.name for scene in scenes] == ["corridor", "grid"]
+
+
+def test_a_renamed_file_is_known_by_what_it_holds(tmp_path: Path) -> None:
+    request = request_with_files(tmp_path)
+    record = train(request, tmp_path / "run").read_record()
+    other = tmp_path / "other-grid.h5"
+    write_scene(changed(request.scenes[1]), other)
+    renamed = [(tmp_path / f"{name}.h5").rename(tmp_path / f"my-{name}.h5") for name in ("grid", "corridor")]
+    scenes = run_scenes(record, renamed)
+    assert [scene.name for scene in scenes] == ["corridor", "grid"]
+    assert [scene_digest(scene) for scene in scenes] == [scene.digest for scene in record.scenes]
+    with pytest.raises(RunError, match=r"scene grid .* given \(other-grid, my-corridor\), by name or by what"):
+        run_scenes(record, [other, renamed[1]])
 
 
 def test_a_scene_made_in_memory_has_no_file_to_come_back_from(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -17,7 +17,7 @@ from clearway.learn.described import described
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder
-from clearway.learn.run_record import RunRecord
+from clearway.learn.run_record import RunRecord, SceneRecord
 from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
@@ -28,6 +28,8 @@ from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES
 from clearway.scenes.thor_v1 import read_scene
 from clearway.world.world import World, make_world, scene_tables
+
+TOLD_SCENES = 10  # names in a refusal, at most
 
 
 @runtime_checkable
@@ -156,22 +158,24 @@ def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tenso
 def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -> list[Scene]:
     """The scenes of a run, in its order, from the files it names or from what is given: files, or scenes themselves.
 
+    What is given may have another name, as a renamed file has; it gets the run's.
+
     Raises:
         RunError: a scene is missing or is not the one the run was trained on.
     """
-    loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given or ()]
-    by_name = {scene.name: scene for scene in loaded} if given else None
-    places = {} if given else _places(record)
-    scenes = []
-    for wanted in record.scenes:
-        scene = _found(wanted.name, places.get(wanted.path or "", wanted.path), by_name)
+    if given:
+        loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given]
+        found = [_among(loaded, wanted) for wanted in record.scenes]
+    else:
+        places = _places(record)
+        found = [_in_file(wanted.name, places.get(wanted.path or "", wanted.path)) for wanted in record.scenes]
+    for scene, wanted in zip(found, record.scenes, strict=True):
         if scene_digest(scene) != wanted.digest:
             raise RunError(
                 f"{wanted.path or wanted.name}: not the scene that the run was trained on (graph or features differ). "
                 "Give the right file with --scenes"
             )
-        scenes.append(scene)
-    return scenes
+    return found
 
 
 def _places(record: RunRecord) -> dict[str, str]:
@@ -184,11 +188,20 @@ def _places(record: RunRecord) -> dict[str, str]:
     return dict(zip(addresses, map(str, fetched(addresses, SCENE_SUFFIXES, may_pass=True)), strict=True))
 
 
-def _found(name: str, path: str | None, given: Mapping[str, Scene] | None) -> Scene:
-    if given is not None:
-        if name not in given:
-            raise RunError(f"scene {name} of the run is not among the files given. Add it to --scenes")
-        return given[name]
+def _among(given: Sequence[Scene], wanted: SceneRecord) -> Scene:
+    """The scene of a run among some: by its name, else by what it holds."""
+    by_name = {scene.name: scene for scene in given}
+    if wanted.name in by_name:
+        return by_name[wanted.name]
+    for scene in given:
+        if scene_digest(scene) == wanted.digest:
+            return replace(scene, name=wanted.name)
+    others = ", ".join(list(by_name)[:TOLD_SCENES]) + ",..." * (len(by_name) > TOLD_SCENES)
+    problem = f"scene {wanted.name} of the run is not among the files given ({others}), by name or by what they hold"
+    raise RunError(f"{problem}. Add it to --scenes")
+
+
+def _in_file(name: str, path: str | None) -> Scene:
     if path is None or not (Path(path).exists() or is_fetched(Path(path))):
         raise RunError(f"{path or name}: the run's scene file is missing. Give it with --scenes")
     return read_scene(Path(path), name=name)
