@@ -29,7 +29,7 @@ def test_a_dump_is_imported_as_it_is(clearway, dump, tmp_path, feature_axis, unr
     source = dump(tmp_path / "kitchen_02.h5", feature_axis=feature_axis, unreachable=unreachable)
     answer = clearway("scenes", "import", "thor-v1", source, "--out", tmp_path / "scenes")
     assert (answer.code, answer.out) == (0, "")
-    assert answer.err == f"{tmp_path / 'scenes' / 'kitchen_02.h5'}: 76 states, 19 cells\n"
+    assert answer.err == f"{tmp_path / 'scenes' / 'kitchen_02.h5'}: 76 states, 19 cells of 0.5 m, 5 x 5 m\n"
     original, imported = read_scene(source), read_scene(tmp_path / "scenes" / "kitchen_02.h5")
     assert np.array_equal(original.graph, imported.graph)
     assert np.array_equal(original.features, imported.features)
@@ -51,7 +51,7 @@ def test_names_in_files_and_folders_are_shown_as_they_are(clearway, dump, tmp_pa
     assert encoder_names([read_scene(tmp_path / "named.h5")]) == shown(name)
     folder = tmp_path / f"sc{name.replace('/', '')}"
     answer = clearway("scenes", "import", "thor-v1", tmp_path / "kitchen_02.h5", "--out", folder)
-    assert answer.err == f"{shown(str(folder / 'kitchen_02.h5'))}: 76 states, 19 cells\n"
+    assert answer.err == f"{shown(str(folder / 'kitchen_02.h5'))}: 76 states, 19 cells of 0.5 m, 5 x 5 m\n"
     answer = clearway("oracle", (tmp_path / "named.h5").rename(tmp_path / "n[b].h5"), "--targets", 1)
     assert "n[b]" in answer.out
 
@@ -143,8 +143,9 @@ def test_scenes_may_have_moved(clearway, trained, dump, tmp_path):
     moved = dump(tmp_path / "moved" / "bathroom_02.h5")
     words = ("evaluate", trained.run, "--episodes", 1, "--step-limit", 5, "--json", "--scenes")
     assert clearway(*words, moved.parent).code == 0
-    elsewhere = dump(tmp_path / "moved" / "attic.h5")
-    assert clearway(*words, elsewhere).refusal("bathroom_02", "--scenes")
+    assert clearway(*words, dump(tmp_path / "renamed" / "attic.h5")).code == 0
+    other = dump(tmp_path / "other" / "attic.h5", feature_axis=9)
+    assert clearway(*words, other).refusal("bathroom_02", "attic", "--scenes")
 
 
 def test_a_run_goes_on_only_when_asked_to(clearway, trained, small):
