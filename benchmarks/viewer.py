@@ -32,7 +32,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "hall.txt").write_text("\n".join("." * SIDE for _ in range(SIDE)) + "\n")
-        clearway("scenes", "import", "floor-plan", folder / "hall.txt", "--features", FEATURES, "--out", folder)
+        words = ("--cell-size", 0.25, "--features", FEATURES, "--out", folder)
+        clearway("scenes", "import", "floor-plan", folder / "hall.txt", *words)
         clearway("train", folder / "hall.h5", "--out", folder / "run", "--frames", 8_000)
         stage = run_stage([folder / "run"])
         poses = stage.scenes[0].state_count

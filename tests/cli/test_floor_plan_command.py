@@ -17,7 +17,7 @@ def test_a_plan_becomes_a_furnished_room(clearway, tmp_path, monkeypatch):
     words = ("--cell-size", 0.5, "--sensors", "rgb", "depth")
     answer = clearway("scenes", "import", "floor-plan", tmp_path / "nook.txt", *words, "--out", tmp_path / "scenes")
     assert answer.code == 0, answer
-    assert "nook.h5: 12 states, 3 cells" in answer.err
+    assert "nook.h5: 12 states, 3 cells of 0.5 m, 1 x 1 m" in answer.err
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "nook.h5", "--json").json
     assert (found["states"], found["encoder"], found["source"]) == (12, "clearway", "floor_plan")
     assert found["picture_size"] == [300, 400]
@@ -70,6 +70,19 @@ def test_some_plans_with_another_size_and_seed(clearway, plans, tmp_path):
     assert [path.name for path in (tmp_path / "scenes").iterdir()] == ["ell.h5"]
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "ell.h5", "--json").json
     assert (found["feature_count"], found["seed"], found["mean_degree"]) == (8, 4, pytest.approx(4 / 3))
+
+
+def test_a_plan_drawn_by_hand_has_larger_cells_than_published_ones(clearway, plans, tmp_path):
+    (tmp_path / "office.txt").write_text("....\n.#..\n")
+    (tmp_path / "list.csv").write_text("x,z\n0,0\n1,0\n")
+    told = {
+        "office.txt": "office.h5: 28 states, 7 cells of 0.5 m, 2 x 1 m",
+        "list.csv": "list.h5: 8 states, 2 cells of 0.5 m, 1 x 0.5 m",
+        "plans.npz": "hall.h5: 12 states, 3 cells of 0.25 m, 0.25 x 0.75 m",
+    }
+    for name, said in told.items():
+        answer = clearway("scenes", "import", "floor-plan", tmp_path / name, "--features", 8, "--out", tmp_path / "out")
+        assert said in answer.err
 
 
 def test_parts_that_cannot_be_reached_are_reported(clearway, tmp_path):

@@ -31,6 +31,7 @@ MAX_BYTES = 8 * 1024**2  # of a text file, or of an unpacked array
 PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")  # of a plan, which becomes the name of a file
 WHOLE_NUMBER = re.compile(r"-?[0-9]{1,9}")
 NPY = ".npy"
+DRAWN_CELL_SIZE_M = 0.5  # of maps that are drawn by hand
 PACKING = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # what `zipfile` unpacks piece by piece
 _FAULTS = (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, MemoryError, ArithmeticError)
 
@@ -51,13 +52,13 @@ def floor_plan_names(path: Path) -> tuple[str, ...]:
     return names
 
 
-def read_floor_plan(path: Path, name: str | None = None, *, cell_size_m: float = CELL_SIZE_M) -> FloorPlan:
+def read_floor_plan(path: Path, name: str | None = None, *, cell_size_m: float | None = None) -> FloorPlan:
     """A plan from a .npz, .csv or .txt file (formats: see the top of this file).
 
     Args:
         path: the file.
         name: of the plan; may be left out where the file holds one.
-        cell_size_m: side of a cell, metres.
+        cell_size_m: side of a cell, metres; None: 0.5, of plans in .npz 0.25, as the published ones have.
 
     Raises:
         SceneError: there is no such file or plan, it cannot be read, or it is no plan.
@@ -69,13 +70,15 @@ def read_floor_plan(path: Path, name: str | None = None, *, cell_size_m: float =
     return plan
 
 
-def read_floor_plans(path: Path, names: Sequence[str] = (), *, cell_size_m: float = CELL_SIZE_M) -> list[FloorPlan]:
+def read_floor_plans(path: Path, names: Sequence[str] = (), *, cell_size_m: float | None = None) -> list[FloorPlan]:
     """Several plans from a file, which is opened once; all of them where no names are given.
 
     Raises:
         SceneError: see `read_floor_plan`.
     """
     held = floor_plan_names(path)
+    if cell_size_m is None:
+        cell_size_m = CELL_SIZE_M if path.suffix == ".npz" else DRAWN_CELL_SIZE_M
     with ExitStack() as stack:
         archive = None
         if path.suffix == ".npz":

@@ -39,8 +39,8 @@ class ImportFloorPlan:
     Scenes of one number and seed can be trained together."""
     seed: int = 0
     """With the plan's name: of the furniture, colours and textures, or of the made-up features."""
-    cell_size: float = 0.25
-    """Side of a cell, metres."""
+    cell_size: float | None = None
+    """Side of a cell, metres; by default 0.5, of plans in .npz 0.25, as the published ones have."""
     sensors: tuple[SensorName, ...] = ("rgb",)
     """What takes the pictures: rgb, or rgb depth (metres, kept in the file beside the colour pictures)."""
     encoding: Encoding = field(default_factory=Encoding)

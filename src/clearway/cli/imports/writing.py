@@ -80,7 +80,9 @@ def write_and_say(scene: Scene, path: Path) -> None:
 
     said = replaces(path)
     write_scene(scene, path)
-    say(f"{path}: {scene.state_count} states, {scene.cell_count} cells{said}")
+    width_m, depth_m = scene.locations_m.max(axis=0) - scene.locations_m.min(axis=0) + scene.cell_size_m
+    cells = f"{scene.cell_count} cells of {scene.cell_size_m:.3g} m, {width_m:.3g} x {depth_m:.3g} m"
+    say(f"{path}: {scene.state_count} states, {cells}{said}")
 
 
 def replaces(path: Path) -> str:
