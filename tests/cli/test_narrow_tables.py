@@ -49,10 +49,11 @@ def test_inspect_rounds(narrow, trained):
     assert not [line for line in lines if re.search(r"\d\.0*[1-9]\d{4,}", line)]
 
 
-def test_oracle_and_comparisons_fit(narrow, trained, tmp_path):
+def test_oracle_and_comparisons_fit(narrow, trained, tmp_path, monkeypatch):
     assert any("shortest" in line for line in narrow("oracle", trained.scene))
-    runs = [tmp_path / name for name in ("bathroom-collision-aware-ppo-s0", "bathroom-collision-aware-ppo-s1-2")]
+    monkeypatch.chdir(tmp_path)
+    runs = ["bathroom-collision-aware-ppo-s0", "bathroom-collision-aware-ppo-s1-2"]
     for run in runs:
         shutil.copytree(trained.run, run)
-    narrow("runs", "compare", *runs)
-    narrow("runs", "list", tmp_path)
+    assert set(runs) < set(narrow("runs", "compare", *runs))
+    assert set(runs) < set(narrow("runs", "list", "."))

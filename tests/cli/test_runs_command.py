@@ -111,9 +111,21 @@ def test_a_run_that_trains_is_left_alone(clearway, runs):
     assert files_below(runs) == before
 
 
-def test_the_list_fits_on_80_columns(clearway, runs, monkeypatch):
+def test_on_80_columns_a_long_name_stays_whole(clearway, runs, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    (runs / "a").rename(runs / "bathroom-collision-aware-alpha-0.02-gamma-0.015-ppo-s0")
-    lines = clearway("runs", "list").out.splitlines()
-    assert lines[0].split()[-1] == "collisions" and len(lines[0].split()) == 8
+    long = runs / "bathroom-collision-aware-alpha-0.02-gamma-0.015-ppo-s0"
+    (runs / "a").rename(long)
+    lines = [line.rstrip() for line in clearway("runs", "list").out.splitlines()]
+    assert (lines[0], lines[1].split()[0], lines[1].split()[-1], lines[2]) == ("run", "reward", "collisions", str(long))
     assert max(map(len, lines)) <= 80
+    assert "runs/sub/b" in lines and any(line.split()[:2] == ["shortest", "ppo"] for line in lines)
+
+
+def test_compared_runs_of_long_names_are_numbered(clearway, runs, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    long = runs / f"bathroom-{'x' * 80}"
+    (runs / "a").rename(long)
+    lines = [line.rstrip() for line in clearway("runs", "compare", long, "runs/sub/b").out.splitlines()]
+    assert lines.index(f"1  {long}") + 1 == lines.index("2  runs/sub/b")
+    assert ["differs", "in", "1", "2"] in [line.split() for line in lines]
+    assert ["frames", "640", "1280"] in [line.split() for line in lines]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from clearway.learn.runs import RunSummary
 
 CURVES_AT_MOST = 8  # runs in one picture
-NARROW = ("algorithm", "solved", "success", "steps", "collisions")  # columns that are not broken
+HEADINGS = ("run", "reward", "algorithm", "frames", "solved", "success", "steps", "collisions")
+INDENT = 2  # of a run's figures below its folder
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class CompareRuns:
             print_json({"runs": [summary.to_json() for summary in found], "differences": differ})
             return
         _print_runs(found)
-        _print_table(["differs in", *(str(summary.path) for summary in found)], [[k, *v] for k, v in differ.items()])
+        _print_differences([str(summary.path) for summary in found], differ)
 
 
 @dataclass(frozen=True)
@@ -144,8 +145,54 @@ class Runs:
 
 
 def _print_runs(runs: Sequence[RunSummary]) -> None:
-    names = ("run", "reward", "algorithm", "frames", "solved", "success", "steps", "collisions")
-    _print_table(names, [_row(summary) for summary in runs])
+    """Print a row a run; where the rows are too wide, each run's folder on a line of its own, its figures below it."""
+    rows = [_row(summary) for summary in runs]
+    if _width([max(map(len, column)) for column in zip(HEADINGS, *rows, strict=True)]) <= stdout_console().width:
+        _print_table(HEADINGS, rows)
+        return
+    widths = _widths_below([HEADINGS[1:], *(row[1:] for row in rows)])
+    for row in (HEADINGS, *rows):
+        _print_whole(row[0])
+        _print_below(row[1:], widths)
+
+
+def _widths_below(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Of columns below a name; the first, of rewards, is broken between words where there is too little room."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    over = INDENT + _width(widths) - stdout_console().width
+    longest = max(len(word) for row in rows for word in row[0].split())
+    return [max(longest, widths[0] - max(over, 0)), *widths[1:]]
+
+
+def _print_below(cells: Sequence[str], widths: Sequence[int]) -> None:
+    from rich.padding import Padding
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, padding=(0, 1, 0, 0), show_header=False)
+    for width in widths:
+        table.add_column(width=width)
+    table.add_row(*(Text(printable(cell)) for cell in cells))
+    stdout_console().print(Padding(table, (0, 0, 0, INDENT)))
+
+
+def _print_differences(names: Sequence[str], differ: Mapping[str, Sequence[str]]) -> None:
+    """Print a column a run, under its folder; where these are too wide, under numbers, and the folders first."""
+    first = max(map(len, ("differs in", *differ)))
+    if differ and _width([first, *map(len, names)]) > stdout_console().width:
+        for number, name in enumerate(names, 1):
+            _print_whole(f"{number}  {name}")
+        names = [str(number) for number in range(1, len(names) + 1)]
+    _print_table(["differs in", *names], [[name, *values] for name, values in differ.items()])
+
+
+def _width(columns: Sequence[int]) -> int:
+    return sum(columns) + len(columns)
+
+
+def _print_whole(text: str) -> None:
+    """Print a line that is never broken, so that a name in it can be copied."""
+    stdout_console().print(printable(text), soft_wrap=True, highlight=False)
 
 
 def _row(summary: RunSummary) -> list[str]:
@@ -170,7 +217,7 @@ def _print_table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         return
     table = Table(box=None, padding=(0, 1, 0, 0), header_style="bold")
     for name in names:
-        table.add_column(printable(name), overflow="fold", no_wrap=name in NARROW)
+        table.add_column(printable(name), overflow="fold")
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
     stdout_console().print(table)
