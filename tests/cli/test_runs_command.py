@@ -95,6 +95,16 @@ def test_old_checkpoints_go_only_with_yes(clearway, runs):
     assert clearway("runs", "clean").err == "0 old checkpoints, 0.0 MB\n"
 
 
+def test_looking_writes_nothing(clearway, runs):
+    for lock in runs.rglob(".lock"):
+        lock.unlink()
+    (runs / "sub/b/.run.json.x.part").touch()
+    before = {path: path.stat().st_mtime_ns for path in runs.rglob("*")}
+    for words in (("list",), ("clean",), ("compare", "runs/a", "runs/sub/b"), ("clean", "runs/a", "--yes")):
+        assert clearway("runs", *words).code == 0
+    assert {path: path.stat().st_mtime_ns for path in runs.rglob("*")} == before
+
+
 def test_the_newest_checkpoint_that_can_be_read_stays(clearway, runs):
     newest = newest_checkpoint(runs / "sub" / "b" / "checkpoints")
     (newest / "network.safetensors").write_bytes(b"broken")

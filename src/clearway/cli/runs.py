@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -110,7 +111,8 @@ class CleanRuns:
         total = count = 0
         for folder in find_runs(self.folder):
             try:
-                with folder.held():  # none that is being written
+                removes = self.yes and old_checkpoints(folder)
+                with folder.held() if removes else nullcontext():  # none that is being written; looking leaves no lock
                     for path in old_checkpoints(folder):
                         size = size_of(path)
                         if self.yes:
