@@ -25,6 +25,12 @@ def test_help_speaks_of_no_types(clearway, words):
     assert not re.search(r"\{None\}|None|\bINT\b|\bFLOAT\b|\bSTR\b|\[\[|\(default: \)|\(default: False\)", answer.out)
 
 
+@pytest.mark.parametrize("words", [("train",), ("runs", "list"), ("scenes", "build")])
+def test_a_run_s_settings_are_offered_to_train_alone(clearway, words):
+    text = clearway(*words, "--help").out
+    assert "YAML file" in text and ("run.yaml" in text) == (words == ("train",))
+
+
 def test_choices_stand_in_the_order_written(clearway):
     assert "{bathroom,bedroom,living_room,kitchen,all}" in clearway("scenes", "build", "--help").out
 

@@ -21,13 +21,13 @@ from tyro.constructors import (
 )
 
 from clearway.cli.known import subcommands
+from clearway.cli.train import Train
 from clearway.spelling import whole_number
 
 PLACEHOLDERS = {int: "N", float: "X", str: "WORD", Path: "PATH"}  # of an option's value in help
 
-CONFIG_HELP = (
-    "Take options from a YAML file, such as a run's run.yaml, a name and a value a line. The command line goes before."
-)
+CONFIG_HELP = "Take options from a YAML file, a name and a value a line. The command line goes before."
+CONFIG_HELP_OF_TRAIN = CONFIG_HELP.replace("YAML file,", "YAML file, such as a run's run.yaml,")
 
 
 def reading() -> ConstructorRegistry:
@@ -49,15 +49,17 @@ def reading() -> ConstructorRegistry:
             busy.remove(info.type)
         assert isinstance(found, StructConstructorSpec)
         plain = replace(found, fields=tuple(map(_told_plainly, found.fields)))
-        return _with_config(plain) if hasattr(info.type, "run") and not subcommands(info.type) else plain
+        if not hasattr(info.type, "run") or subcommands(info.type):
+            return plain
+        return _with_config(plain, CONFIG_HELP_OF_TRAIN if info.type is Train else CONFIG_HELP)
 
     return rules
 
 
-def _with_config(command: StructConstructorSpec) -> StructConstructorSpec:
+def _with_config(command: StructConstructorSpec, told: str) -> StructConstructorSpec:
     """The command with the option --config, which `config.with_config` has done away with before anything is read."""
     kind = Annotated[Path | None, tyro.conf.arg(metavar=PLACEHOLDERS[Path], help_behavior_hint=_default_told)]
-    option = StructFieldSpec("config", kind, None, helptext=CONFIG_HELP)  # type: ignore[arg-type]  # Annotated
+    option = StructFieldSpec("config", kind, None, helptext=told)  # type: ignore[arg-type]  # Annotated
 
     def made(**values: Any) -> Any:
         values.pop("config", None)
