@@ -122,7 +122,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def write_settings(path: Path, settings: Mapping[str, Any], head: str) -> None:
-    """Write settings, plain values by key, under a comment of one line."""
+    """Write settings, plain values by key, under a comment."""
     text = yaml.dump(dict(settings), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
     with written_whole(path) as part:
-        part.write_text(f"# {head}\n{text}", encoding="utf-8")
+        part.write_text("".join(f"# {line}\n" for line in head.splitlines()) + text, encoding="utf-8")

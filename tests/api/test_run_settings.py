@@ -1,5 +1,7 @@
 """A run's settings as a file, from Python."""
 
+import pytest
+
 from clearway.api.run_settings import reward_options
 from clearway.api.training import train
 from clearway.learn.run_folder import RunFolder
@@ -35,3 +37,16 @@ def test_a_training_from_files_leaves_its_settings_and_one_from_memory_none(tmp_
     assert settings["targets"] == {name: list(states) for name, states in targets.items()}
     train(scene, out=tmp_path / "other", **SMALL)
     assert not (tmp_path / "other" / "run.yaml").exists()
+
+
+def test_a_lengthened_run_s_settings_say_so(tmp_path):
+    write_scene(small_scenes()[0], tmp_path / "a.h5")
+    out = tmp_path / "run"
+    train(tmp_path / "a.h5", out=out, **SMALL)
+    assert "it was lengthened" not in (out / "run.yaml").read_text()
+    with pytest.warns(UserWarning, match="goes on to 640"):
+        train(tmp_path / "a.h5", out=out, resume=True, **{**SMALL, "frames": 640})
+    train(tmp_path / "a.h5", out=out, resume=True, **{**SMALL, "frames": 640})
+    told = [line for line in (out / "run.yaml").read_text().splitlines() if "it was lengthened" in line]
+    assert told == ["# But it was lengthened from 320 frames: a run of 640 frames at once differs"]
+    assert read_settings(out / "run.yaml")["frames"] == 640

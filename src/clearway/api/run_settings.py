@@ -14,11 +14,14 @@ from typing import Any
 from clearway.errors import ClearwayError
 from clearway.learn.run_folder import SETTINGS_FILE, RunFolder
 from clearway.learn.run_record import RunRecord
+from clearway.regular_files import read_text
 from clearway.reward import REWARDS, Reward
-from clearway.settings_file import write_settings
+from clearway.settings_file import MAX_BYTES, read_settings, write_settings
 
 OPTIONS = ("frames", "feature_basis", "goals")  # settings of algorithms that have options of their own
 HEAD = "The settings of this run. To repeat it: clearway train --config run.yaml --out ANOTHER_FOLDER"
+
+LENGTHENED = "But it was lengthened from"
 
 
 def leave_settings(folder: Path, reward: Mapping[str, Any] | None, **further: object) -> None:
@@ -32,7 +35,9 @@ def leave_settings(folder: Path, reward: Mapping[str, Any] | None, **further: ob
     record = RunFolder(folder).read_record()
     if reward is None or any(scene.path is None for scene in record.scenes):
         return
-    write_settings(folder / SETTINGS_FILE, {**_of_record(record), **reward, **_given(further)}, HEAD)
+    path = folder / SETTINGS_FILE
+    head = "\n".join([HEAD, *_lengthened(path, record.learner.frames)])
+    write_settings(path, {**_of_record(record), **reward, **_given(further)}, head)
 
 
 def reward_options(reward: str | Reward) -> dict[str, Any] | None:
@@ -49,6 +54,21 @@ def reward_options(reward: str | Reward) -> dict[str, Any] | None:
     except ClearwayError:
         return None
     return {"reward": name, **changed} if same else None
+
+
+def _lengthened(path: Path, frames: int) -> list[str]:
+    """Lines on what a run was lengthened from, by the settings that it has left before."""
+    if not path.exists():
+        return []
+    try:
+        before = read_settings(path).get("frames")
+        lines = read_text(path, MAX_BYTES).splitlines()
+    except (ClearwayError, OSError):
+        return []
+    told = [line.removeprefix("# ") for line in lines if line.startswith(f"# {LENGTHENED}")]
+    if isinstance(before, int) and before < frames:
+        told.append(f"{LENGTHENED} {before:,} frames: a run of {frames:,} frames at once differs")
+    return told
 
 
 def _of_record(record: RunRecord) -> dict[str, Any]:
