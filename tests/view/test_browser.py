@@ -27,11 +27,12 @@ def opened(browser: Browser, address: str) -> Iterator[Callable[..., Page]]:
     """Opens the viewer's page at an episode."""
     contexts, wrong = [], []
 
-    def at(episode: str = "", **looks) -> Page:
+    def at(episode: str = "", before: str = "", **looks) -> Page:
         looks = {"viewport": {"width": 1280, "height": 860}, "reduced_motion": "reduce"} | looks
         context = browser.new_context(**looks)
         contexts.append(context)
         page = context.new_page()
+        page.add_init_script(before)
         page.set_default_timeout(PATIENCE_MS)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("console", lambda message: wrong.append(message.text) if message.type in ("error", "warning") else None)
@@ -218,16 +219,56 @@ def test_play_at_the_end_starts_over(opened: Callable[..., Page]) -> None:
     expect(page.locator("body.playing")).to_be_visible()
 
 
-def test_the_page_says_who_walks_where_and_cuts_no_name(opened: Callable[..., Page]) -> None:
+LONG = {"aware": "bathroom-collision-aware-ppo-s0", "plain": "bathroom-shortest-ppo-s0"}
+RENAMED = (
+    f"const long = {json.dumps([[json.dumps(word) for word in pair] for pair in LONG.items()])};"
+    """
+    const parse = JSON.parse;
+    JSON.parse = (text) => parse(long.reduce((told, [own, other]) => told.replaceAll(own, other), text));
+    Response.prototype.json = async function () { return JSON.parse(await this.text()); };
+    """
+)
+
+
+@pytest.mark.parametrize("viewport", [{"width": 1280, "height": 800}, PHONE], ids=["screen", "phone"])
+def test_long_names_take_one_line_and_the_views_stand_level(opened: Callable[..., Page], viewport: dict) -> None:
+    at = "scene=corridor&start=4&target=8"
+    heights = "cards => cards.map((card) => card.querySelector('header').offsetHeight)"
+    short = opened(at, viewport=viewport).locator(".walker").evaluate_all(heights)
+    page = opened(at, viewport=viewport, before=RENAMED)
+    names = page.locator(".walker h2")
+    expect(names).to_have_text(list(LONG.values()))  # read aloud whole
+    assert page.locator(".walker").evaluate_all(heights) == short == [short[0]] * 2
+    for name, heading in zip(LONG.values(), names.all(), strict=True):
+        title = heading.get_attribute("title")
+        assert title is not None and title.startswith(name)
+        cut = "(heading) => [...heading.children].some(({ scrollWidth, clientWidth }) => scrollWidth > clientWidth)"
+        assert heading.evaluate(cut)
+        assert heading.evaluate("({ lastChild }) => getComputedStyle(lastChild).textOverflow") == "ellipsis"
+    own = names.locator(".own").all_inner_texts()
+    assert own == ["collision-aware-ppo-s0", "shortest-ppo-s0"]  # what tells them apart is cut last
+    assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
+
+
+def test_the_page_says_who_walks_where(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=8", viewport=PHONE)
     expect(page.locator("h1")).to_contain_text("corridor: aware and plain, to where the target's picture was taken")
-    names = page.locator(".walker h2")
-    for name in ("collision-aware, after a long night", "shortest-path-agent-of-the-longest-name"):
-        names.first.evaluate("(heading, name) => (heading.textContent = name)", name)
-        box = "({ scrollWidth, clientWidth }) => [scrollWidth, clientWidth]"
-        wide, room = names.first.evaluate(box)
-        assert wide <= room
-        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_an_agent_has_one_colour_whatever_the_order(opened: Callable[..., Page]) -> None:
+    """The second agent's, green, is the collision-aware one's, as on the demo's page."""
+    page = opened("scene=corridor")
+    script = "async (walkers) => (await import('./page/looks.js')).withLooks(walkers).map(({ look }) => look.colour)"
+    blue, green, purple = "#0b3d91", "#3ddc84", "#8e2c9c"
+    for rewards, colours in {
+        ("shortest", "collision-aware"): [blue, green],
+        ("collision-aware", "shortest"): [green, blue],
+        ("collision-aware", "collision-aware"): [blue, green],
+        ("bump", "shortest"): [blue, green],
+        ("collision-aware",): [blue],
+    }.items():
+        walkers = [{"agent": True, "reward": reward} for reward in rewards] + [{"agent": False, "reward": "shortest"}]
+        assert page.evaluate(script, walkers) == [*colours, purple]
 
 
 def test_the_star_is_seen_round_those_who_stand_on_it(opened: Callable[..., Page]) -> None:

@@ -1,6 +1,7 @@
 """The saved page: what lies in its folder, and how it plays in a browser, from a file and from a plain file server."""
 
 import json
+import re
 import threading
 from collections.abc import Iterator
 from functools import partial
@@ -120,10 +121,40 @@ def test_the_page_plays(browser: Browser, addresses: dict[str, str], how: str) -
     expect(page).not_to_have_url(before)
     expect(page.locator("#goal-where")).to_contain_text("pose 16,")
     page.clock.run_for(10_000)  # what was said for a while is forgotten
-    page.locator("#map").click(position={"x": 5, "y": 5})
     expect(page.locator("#status")).to_have_text("")
     page.close()
     assert wrong == []
+
+
+def test_a_click_says_which_recorded_episode_it_took(browser: Browser, addresses: dict[str, str]) -> None:
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(addresses["server"])
+    where = page.locator("#goal-where")
+    expect(where).to_contain_text("pose 8,")
+    page.locator("#map").focus()
+    page.keyboard.press("Enter")  # the cursor stands at the start
+    expect(page.locator("#status")).to_have_text(re.compile(r"^Nearest recorded start: pose 4, .* zone, as before$"))
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("t")
+    expect(page.locator("#status")).to_have_text(
+        re.compile(r"^Nearest recorded target: pose 16, heading 0°, \w+ zone$")
+    )
+    expect(where).to_contain_text("pose 16,")
+    page.close()
+
+
+def test_its_help_lists_what_it_can_do(browser: Browser, addresses: dict[str, str]) -> None:
+    page = browser.new_page()
+    page.goto(addresses["server"])
+    expect(page.locator(".walker").first).to_be_visible()
+    page.keyboard.press("?")
+    told = page.get_by_role("dialog").inner_text()
+    assert "play or pause" in told and "zones, value, policy on the map" in told
+    for word in ("race", "drive", "elief", "4"):
+        assert word not in told
+    page.close()
 
 
 @pytest.mark.parametrize("there", ["file", "full"])

@@ -18,8 +18,13 @@ const WALKERS = [
   { colour: "#8e2c9c", halo: "#ffffff", dashes: [2.5, 5] },
 ];
 
-function lookOf(walker, index) {
-  return walker.agent ? WALKERS[index] : WALKERS[2];
+const BY_REWARD = { shortest: WALKERS[0], "collision-aware": WALKERS[1] }; // where both walk, in whatever order: as on the demo's page
+
+// The walkers, each with its `look`.
+function withLooks(walkers) {
+  const agents = walkers.filter(({ agent }) => agent), own = new Set(agents.map(({ reward }) => BY_REWARD[reward]));
+  const differ = own.size === WALKERS.length - 1 && !own.has(undefined);
+  return walkers.map((walker, index) => ({ ...walker, look: !walker.agent ? WALKERS[2] : differ ? BY_REWARD[walker.reward] : WALKERS[index] }));
 }
 
 // Forward, right, left, backward: Okabe and Ito's colours.
@@ -157,11 +162,11 @@ function hatching(pen) {
   return pattern;
 }
 
-return { ZONES, ZONE_OPACITY, HATCH_INK, WALL, TARGET, STANDS, GHOST, INK, WALKERS, lookOf, ACTIONS, heat, penOf, drawAgent, drawTarget, drawBump, drawLine, hatching };
+return { ZONES, ZONE_OPACITY, HATCH_INK, WALL, TARGET, STANDS, GHOST, INK, WALKERS, withLooks, ACTIONS, heat, penOf, drawAgent, drawTarget, drawBump, drawLine, hatching };
 })();
 const of_cards = (() => {
 // A card for each walker: its view, its numbers, and what it thinks of the four actions (or buttons to drive by).
-const { ACTIONS, drawAgent, lookOf, penOf } = of_looks;
+const { ACTIONS, drawAgent, penOf } = of_looks;
 
 function element(name, properties = {}, ...children) {
   const made = document.createElement(name);
@@ -197,7 +202,15 @@ function signed(number) {
   return number.toFixed(digits).replace("-", "−");
 }
 
-function createCard(walker, index, pictures, onDrive) {
+// The beginning that names share, up to a dash or the like, is the first to go where there is no room.
+function sharedBeginning(names) {
+  const [first, ...others] = names;
+  let end = others.length ? Math.min(...names.map((name) => name.length)) : 0;
+  while (end && !(others.every((name) => name.startsWith(first.slice(0, end))) && /[-_. ]/.test(first[end - 1]))) end -= 1;
+  return end;
+}
+
+function createCard(walker, shared, pictures, onDrive) {
   const swatch = element("canvas", { ariaHidden: "true" });
   const badge = element("span", { className: "badge" });
   const view = element("img", { alt: "" });
@@ -226,13 +239,14 @@ function createCard(walker, index, pictures, onDrive) {
           return button;
         }),
       );
-  const header = element("header", {}, swatch, element("h2", { textContent: walker.name, title: `reward ${walker.reward}` }), badge);
+  const parts = [["shared", walker.name.slice(0, shared)], ["own", walker.name.slice(shared)]].filter(([, text]) => text);
+  const name = element("h2", { title: `${walker.name}, reward ${walker.reward}` }, ...parts.map(([className, textContent]) => element("span", { className, textContent })));
+  const header = element("header", {}, swatch, name, badge);
   const picture = element("div", { className: pictures.any ? "picture" : "picture empty" }, view, missing);
   const inside = element("div", { className: "inside" }, picture, element("div", {}, numbers, below));
   const card = element("article", { className: walker.agent ? "card walker" : "card walker user", "data-walker": walker.name, "aria-label": walker.name }, header, inside);
-  const look = lookOf(walker, index);
   swatch.style.width = swatch.style.height = "22px";
-  drawAgent(penOf(swatch, 22, 22), 11, 11.5, 7.5, 0, look);
+  drawAgent(penOf(swatch, 22, 22), 11, 11.5, 7.5, 0, walker.look);
 
   function show(shown, ended, won) {
     const at = Math.min(shown, walker.steps.length - 1), step = walker.steps[at];
@@ -259,11 +273,11 @@ function createCard(walker, index, pictures, onDrive) {
   return { card, show };
 }
 
-return { element, icon, createCard };
+return { element, icon, sharedBeginning, createCard };
 })();
 const of_charts = (() => {
 // Small line charts of the episode by step.
-const { drawBump, drawLine, lookOf, penOf } = of_looks;
+const { drawBump, drawLine, penOf } = of_looks;
 
 const LEFT = 48, RIGHT = 8, TOP = 8, BOTTOM = 6;
 
@@ -290,10 +304,10 @@ function drawChart(canvas, walkers, shown, valueOf, digits) {
     line(pen, LEFT, y(value), width - RIGHT, y(value), style.getPropertyValue("--line"));
   }
   line(pen, x(shown), TOP - 4, x(shown), height - BOTTOM + 4, style.getPropertyValue("--soft"));
-  walkers.forEach((walker, index) => {
+  walkers.forEach((walker) => {
     const points = walker.steps.map((step, at) => [x(at), valueOf(step)]).filter(([, value]) => value !== null);
     if (!points.length) return;
-    const look = lookOf(walker, index);
+    const { look } = walker;
     drawLine(pen, points.map(([px, value]) => [px, y(value)]), look, 2.2);
     walker.steps.forEach((step, at) => step.blocked && valueOf(step) !== null && drawBump(pen, x(at), y(valueOf(step)), 3, look));
     const [lastX, lastValue] = points[Math.min(shown, points.length - 1)];
@@ -518,7 +532,7 @@ return { showLegend };
 })();
 const of_map = (() => {
 // The map: the room from above, its zones or what an agent thinks of every pose, and the ways walked so far.
-const { ACTIONS, GHOST, INK, STANDS, TARGET, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, lookOf, penOf } = of_looks;
+const { ACTIONS, GHOST, INK, STANDS, TARGET, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, penOf } = of_looks;
 
 const VEIL = "rgb(255 255 255 / 45%)"; // over the cells in the picture from above
 const SHADE = "rgb(29 35 41 / 62%)"; // over the room, where an agent's belief is shown
@@ -672,14 +686,14 @@ function createMap(canvas, onPick, onCursor) {
     const lanes = shown.walkers.map((_, i) => (i - (shown.walkers.length - 1) / 2) * side * 0.13);
     const thick = Math.min(Math.max(side * 0.08, 2), 5);
     shown.walkers.forEach((walker, i) => {
-      const look = lookOf(walker, i), steps = walker.steps.slice(0, shown.step + 1);
+      const { look } = walker, steps = walker.steps.slice(0, shown.step + 1);
       const moved = (state, ahead = 0) => beside(state, ahead, 0).map((value) => value + lanes[i]);
       const points = steps.map((step) => moved(step.state));
       if (points.length > 1) drawLine(pen, points, look, thick);
       dot(pen, points[0], thick * 1.5, look);
     });
     shown.walkers.forEach((walker, i) => {
-      const look = lookOf(walker, i), steps = walker.steps.slice(0, shown.step + 1);
+      const { look } = walker, steps = walker.steps.slice(0, shown.step + 1);
       for (const step of steps.filter((each) => each.blocked)) {
         const [x, y] = beside(step.state, step.action === 3 ? -0.5 : 0.5, 0);
         drawBump(pen, x + lanes[i], y + lanes[i], side * 0.09, look);
@@ -829,11 +843,12 @@ return { counted, verdict };
 })();
 const of_app = (() => {
 // The page: holds what is known of the episode, asks the viewer for more, and shows it.
-const { createCard, element } = of_cards;
+const { createCard, element, sharedBeginning } = of_cards;
 const { drawChart } = of_charts;
 const { connect, fetched } = of_connection;
 const { listenToKeys } = of_keys;
 const { showLegend } = of_legend;
+const { withLooks } = of_looks;
 const { createMap } = of_map;
 const { openSaved, saved } = of_saved;
 const { counted, verdict } = of_verdict;
@@ -887,8 +902,10 @@ async function begin(changes = {}) {
   await ask({ do: "begin", episode: new URLSearchParams(next).toString() });
 }
 
-function pick(state, put) {
-  begin({ [put ?? document.querySelector("input[name=put]:checked").value]: state });
+async function pick(state, put) {
+  const what = put ?? document.querySelector("input[name=put]:checked").value, before = known.episode[what];
+  await begin({ [what]: state });
+  if (saved) say(`Nearest recorded ${what}: ${nameOf(known.episode[what])}${known.episode[what] === before ? ", as before" : ""}`);
 }
 
 function nameOf(state) {
@@ -920,7 +937,7 @@ async function takeEpisode(answer) {
     titled();
     showSensors();
   }
-  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link, first: [] });
+  Object.assign(known, { episode: answer, walkers: withLooks(answer.walkers), ended: answer.ended, link: answer.link, first: [] });
   if (!before || before.scene !== answer.scene || before.target !== answer.target) known.minds.clear();
   shown = 0;
   $("scene").value = known.scene.name;
@@ -932,7 +949,8 @@ async function takeEpisode(answer) {
     path: (state) => `scenes/${answer.scene}/${$("sensor").value || "views"}/${state}.jpg`,
   };
   known.pictures = pictures;
-  known.cards = known.walkers.map((walker, index) => createCard({ ...walker, values: known.stage.agents[index]?.values }, index, pictures, drive));
+  const shared = sharedBeginning(known.stage.agents.map(({ name }) => name));
+  known.cards = known.walkers.map((walker, index) => createCard({ ...walker, values: known.stage.agents[index]?.values }, walker.agent ? shared : 0, pictures, drive));
   $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
   showTarget(pictures);
   await showLayer(askNow);

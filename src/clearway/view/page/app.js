@@ -1,9 +1,10 @@
 // The page: holds what is known of the episode, asks the viewer for more, and shows it.
-import { createCard, element } from "./cards.js";
+import { createCard, element, sharedBeginning } from "./cards.js";
 import { drawChart } from "./charts.js";
 import { connect, fetched } from "./connection.js";
 import { listenToKeys } from "./keys.js";
 import { showLegend } from "./legend.js";
+import { withLooks } from "./looks.js";
 import { createMap } from "./map.js";
 import { openSaved, saved } from "./saved.js";
 import { counted, verdict } from "./verdict.js";
@@ -57,8 +58,10 @@ async function begin(changes = {}) {
   await ask({ do: "begin", episode: new URLSearchParams(next).toString() });
 }
 
-function pick(state, put) {
-  begin({ [put ?? document.querySelector("input[name=put]:checked").value]: state });
+async function pick(state, put) {
+  const what = put ?? document.querySelector("input[name=put]:checked").value, before = known.episode[what];
+  await begin({ [what]: state });
+  if (saved) say(`Nearest recorded ${what}: ${nameOf(known.episode[what])}${known.episode[what] === before ? ", as before" : ""}`);
 }
 
 function nameOf(state) {
@@ -90,7 +93,7 @@ async function takeEpisode(answer) {
     titled();
     showSensors();
   }
-  Object.assign(known, { episode: answer, walkers: answer.walkers, ended: answer.ended, link: answer.link, first: [] });
+  Object.assign(known, { episode: answer, walkers: withLooks(answer.walkers), ended: answer.ended, link: answer.link, first: [] });
   if (!before || before.scene !== answer.scene || before.target !== answer.target) known.minds.clear();
   shown = 0;
   $("scene").value = known.scene.name;
@@ -102,7 +105,8 @@ async function takeEpisode(answer) {
     path: (state) => `scenes/${answer.scene}/${$("sensor").value || "views"}/${state}.jpg`,
   };
   known.pictures = pictures;
-  known.cards = known.walkers.map((walker, index) => createCard({ ...walker, values: known.stage.agents[index]?.values }, index, pictures, drive));
+  const shared = sharedBeginning(known.stage.agents.map(({ name }) => name));
+  known.cards = known.walkers.map((walker, index) => createCard({ ...walker, values: known.stage.agents[index]?.values }, walker.agent ? shared : 0, pictures, drive));
   $("walkers").replaceChildren(...known.cards.map(({ card }) => card));
   showTarget(pictures);
   await showLayer(askNow);

@@ -1,5 +1,5 @@
 // A card for each walker: its view, its numbers, and what it thinks of the four actions (or buttons to drive by).
-import { ACTIONS, drawAgent, lookOf, penOf } from "./looks.js";
+import { ACTIONS, drawAgent, penOf } from "./looks.js";
 
 export function element(name, properties = {}, ...children) {
   const made = document.createElement(name);
@@ -35,7 +35,15 @@ function signed(number) {
   return number.toFixed(digits).replace("-", "−");
 }
 
-export function createCard(walker, index, pictures, onDrive) {
+// The beginning that names share, up to a dash or the like, is the first to go where there is no room.
+export function sharedBeginning(names) {
+  const [first, ...others] = names;
+  let end = others.length ? Math.min(...names.map((name) => name.length)) : 0;
+  while (end && !(others.every((name) => name.startsWith(first.slice(0, end))) && /[-_. ]/.test(first[end - 1]))) end -= 1;
+  return end;
+}
+
+export function createCard(walker, shared, pictures, onDrive) {
   const swatch = element("canvas", { ariaHidden: "true" });
   const badge = element("span", { className: "badge" });
   const view = element("img", { alt: "" });
@@ -64,13 +72,14 @@ export function createCard(walker, index, pictures, onDrive) {
           return button;
         }),
       );
-  const header = element("header", {}, swatch, element("h2", { textContent: walker.name, title: `reward ${walker.reward}` }), badge);
+  const parts = [["shared", walker.name.slice(0, shared)], ["own", walker.name.slice(shared)]].filter(([, text]) => text);
+  const name = element("h2", { title: `${walker.name}, reward ${walker.reward}` }, ...parts.map(([className, textContent]) => element("span", { className, textContent })));
+  const header = element("header", {}, swatch, name, badge);
   const picture = element("div", { className: pictures.any ? "picture" : "picture empty" }, view, missing);
   const inside = element("div", { className: "inside" }, picture, element("div", {}, numbers, below));
   const card = element("article", { className: walker.agent ? "card walker" : "card walker user", "data-walker": walker.name, "aria-label": walker.name }, header, inside);
-  const look = lookOf(walker, index);
   swatch.style.width = swatch.style.height = "22px";
-  drawAgent(penOf(swatch, 22, 22), 11, 11.5, 7.5, 0, look);
+  drawAgent(penOf(swatch, 22, 22), 11, 11.5, 7.5, 0, walker.look);
 
   function show(shown, ended, won) {
     const at = Math.min(shown, walker.steps.length - 1), step = walker.steps[at];

@@ -1,5 +1,5 @@
 // Small line charts of the episode by step.
-import { drawBump, drawLine, lookOf, penOf } from "./looks.js";
+import { drawBump, drawLine, penOf } from "./looks.js";
 
 const LEFT = 48, RIGHT = 8, TOP = 8, BOTTOM = 6;
 
@@ -26,10 +26,10 @@ export function drawChart(canvas, walkers, shown, valueOf, digits) {
     line(pen, LEFT, y(value), width - RIGHT, y(value), style.getPropertyValue("--line"));
   }
   line(pen, x(shown), TOP - 4, x(shown), height - BOTTOM + 4, style.getPropertyValue("--soft"));
-  walkers.forEach((walker, index) => {
+  walkers.forEach((walker) => {
     const points = walker.steps.map((step, at) => [x(at), valueOf(step)]).filter(([, value]) => value !== null);
     if (!points.length) return;
-    const look = lookOf(walker, index);
+    const { look } = walker;
     drawLine(pen, points.map(([px, value]) => [px, y(value)]), look, 2.2);
     walker.steps.forEach((step, at) => step.blocked && valueOf(step) !== null && drawBump(pen, x(at), y(valueOf(step)), 3, look));
     const [lastX, lastValue] = points[Math.min(shown, points.length - 1)];

@@ -16,8 +16,13 @@ export const WALKERS = [
   { colour: "#8e2c9c", halo: "#ffffff", dashes: [2.5, 5] },
 ];
 
-export function lookOf(walker, index) {
-  return walker.agent ? WALKERS[index] : WALKERS[2];
+const BY_REWARD = { shortest: WALKERS[0], "collision-aware": WALKERS[1] }; // where both walk, in whatever order: as on the demo's page
+
+// The walkers, each with its `look`.
+export function withLooks(walkers) {
+  const agents = walkers.filter(({ agent }) => agent), own = new Set(agents.map(({ reward }) => BY_REWARD[reward]));
+  const differ = own.size === WALKERS.length - 1 && !own.has(undefined);
+  return walkers.map((walker, index) => ({ ...walker, look: !walker.agent ? WALKERS[2] : differ ? BY_REWARD[walker.reward] : WALKERS[index] }));
 }
 
 // Forward, right, left, backward: Okabe and Ito's colours.

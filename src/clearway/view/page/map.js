@@ -1,5 +1,5 @@
 // The map: the room from above, its zones or what an agent thinks of every pose, and the ways walked so far.
-import { ACTIONS, GHOST, INK, STANDS, TARGET, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, lookOf, penOf } from "./looks.js";
+import { ACTIONS, GHOST, INK, STANDS, TARGET, WALL, ZONES, ZONE_OPACITY, drawAgent, drawBump, drawLine, drawTarget, hatching, heat, penOf } from "./looks.js";
 
 const VEIL = "rgb(255 255 255 / 45%)"; // over the cells in the picture from above
 const SHADE = "rgb(29 35 41 / 62%)"; // over the room, where an agent's belief is shown
@@ -153,14 +153,14 @@ export function createMap(canvas, onPick, onCursor) {
     const lanes = shown.walkers.map((_, i) => (i - (shown.walkers.length - 1) / 2) * side * 0.13);
     const thick = Math.min(Math.max(side * 0.08, 2), 5);
     shown.walkers.forEach((walker, i) => {
-      const look = lookOf(walker, i), steps = walker.steps.slice(0, shown.step + 1);
+      const { look } = walker, steps = walker.steps.slice(0, shown.step + 1);
       const moved = (state, ahead = 0) => beside(state, ahead, 0).map((value) => value + lanes[i]);
       const points = steps.map((step) => moved(step.state));
       if (points.length > 1) drawLine(pen, points, look, thick);
       dot(pen, points[0], thick * 1.5, look);
     });
     shown.walkers.forEach((walker, i) => {
-      const look = lookOf(walker, i), steps = walker.steps.slice(0, shown.step + 1);
+      const { look } = walker, steps = walker.steps.slice(0, shown.step + 1);
       for (const step of steps.filter((each) => each.blocked)) {
         const [x, y] = beside(step.state, step.action === 3 ? -0.5 : 0.5, 0);
         drawBump(pen, x + lanes[i], y + lanes[i], side * 0.09, look);
