@@ -1,6 +1,15 @@
-"""Film the viewer as two agents race to one target: `python race.py demo race.webp`.
+"""Film `clearway view --example` as its two agents race to one target: `python race.py race.webp`.
 
-Its first argument is what `scripts/demo` wrote, with both runs. It needs Chromium, as the viewer's test does.
+It needs Chromium, as the viewer's test does. The start is chosen: from here `shortest` bumps once and takes 17 steps,
+`collision-aware` 14. Which of them wins is typical, the bump is not. Counted in this viewer, by seeds from 0 on, `shortest`
+first, steps and collisions as means:
+
+    episodes                                  won by      fewer collisions    collisions      steps
+    200 from this start to this target        16 :  91     9 : 24             0.140  0.085    16.6  15.3
+    300 from drawn starts to this target      28 :  86     0 : 33             0.133  0.013    11.0  10.4
+    100 from drawn starts to each of five     28 : 111     4 : 19             0.062  0.030     9.7   9.2
+
+In the others they tie; in most, neither bumps.
 """
 
 from __future__ import annotations
@@ -15,7 +24,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import FloatRect, ViewportSize, sync_playwright
 
-EPISODE = "scene=bathroom&start=7&target=57&selection=sampled&seed=0"
+EPISODE = "scene=bathroom&start=94&target=57&selection=sampled&seed=2"
 VIEWPORT: ViewportSize = {"width": 1240, "height": 800}
 CLIP: FloatRect = {"x": 0, "y": 0, "width": 1240, "height": 622}  # the map, the target, both agents
 SHOWN_PX = 1000, 502
@@ -35,16 +44,15 @@ def frames(address: str) -> Iterator[Image.Image]:
         while True:
             picture = Image.open(io.BytesIO(page.screenshot(clip=CLIP))).convert("RGB")
             yield picture.resize(SHOWN_PX, Image.Resampling.LANCZOS)
-            if page.get_by_text("reached", exact=True).count() == 2:
+            if page.locator(".badge.good").count() == 2:
                 return
             page.keyboard.press("n")
             page.wait_for_timeout(700)
 
 
-def film(demo: Path, out: Path) -> None:
-    """Serve the demo's runs, and write what the page shows."""
-    runs = [demo / "runs" / name for name in ("shortest", "collision-aware")]
-    command = [sys.executable, "-m", "clearway", "view", *map(str, runs), "--scenes", str(demo / "bathroom.h5")]
+def film(out: Path) -> None:
+    """Serve the example, and write what the page shows."""
+    command = [sys.executable, "-m", "clearway", "view", "--example"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
         assert viewer.stdout is not None
         try:
@@ -56,4 +64,4 @@ def film(demo: Path, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    film(Path(sys.argv[1]), Path(sys.argv[2]))
+    film(Path(sys.argv[1]))
