@@ -125,6 +125,17 @@ class Shrunk(CutShort):
         self.wfile.write(b"four")
 
 
+class Endless(CutShort):
+    """Says that a file has ten bytes, and sends them without end; of a folder likewise."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.end_headers()
+        with suppress(OSError):  # who asked has gone
+            while True:
+                self.wfile.write(b"<a href=a.h5>" * 1000)
+
+
 class Trickling(CutShort):
     """Sends slow.h5 byte by byte, 6 s long, after it has told so, and cuts others short."""
 

@@ -133,13 +133,21 @@ def _keep(folder: Path, places: Sequence[Path]) -> None:
     for entry, place in zip(entries, places, strict=True):
         if is_whole(place):
             os.utime(folder / entry)  # used last
-        elif place.exists():
-            shutil.rmtree(folder / entry)
+        elif os.path.lexists(folder / entry):
+            _remove(folder / entry)
     try:
         _make_room(folder)
     except ClearwayError:
         lease.drop(entries)
         raise
+
+
+def _remove(entry: Path) -> None:
+    """Remove an entry, or what lies there in place of one."""
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.rmtree(entry)
+    else:
+        entry.unlink()
 
 
 def _found_again(place: Path, stop: threading.Event) -> tuple[RemoteFile, Store]:

@@ -10,16 +10,21 @@ import asyncio
 import logging
 import threading
 import time
-from collections.abc import Callable, Coroutine, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Coroutine, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import urljoin
 
 import fsspec
 
 from clearway.errors import ClearwayError
-from clearway.remote.address import EXTRAS, addresses_without_secrets, file_name, without_secrets
+from clearway.remote.address import EXTRAS, file_name, without_secrets
+from clearway.remote.bounds import bounded
+from clearway.remote.faults import faults_named, is_for_the_moment
+from clearway.remote.web_folder import files_of_page
 
 CONNECT_S = 10  # for a connection
 SILENCE_S = 20  # for the next bytes
@@ -27,20 +32,12 @@ ANSWER_S = 60  # for a question about one file or folder, tries together
 TRIES = 3
 PAUSE_S = 0.5  # before the second try; twice as long before the next one
 LOOK_S = 0.1  # how often is looked whether a task is to stop
+MAX_NAME_BYTES = 200
+MAX_BYTES = 10**18
 STOPPING_S = 1  # that a task is given to end
 NEVER = threading.Event()  # stops nothing
 WRITABLE = ("s3", "gs")
 _VERSIONS = ("ETag", "etag", "generation", "Content-MD5", "LastModified", "Last-Modified", "mtime", "updated")
-_CREDENTIALS = ("Credential", "Permission", "Refresh", "Profile", "Token", "Forbidden")  # in names of errors
-_FOR_THE_MOMENT = {  # names of errors and of their bases, since no package of theirs need be installed
-    "TimeoutError",
-    "ConnectionError",
-    "ClientConnectionError",  # aiohttp's
-    "ClientPayloadError",
-    "HTTPClientError",  # botocore's, and the next
-    "IncompleteRead",
-    "ResponseParserError",
-}
 
 
 @dataclass(frozen=True)
@@ -51,11 +48,22 @@ class RemoteFile:
         address: of it.
         size: bytes.
         version: another one once the file is another one, as far as its server says.
+
+    Raises:
+        ClearwayError: no file of this machine can have such a name or size.
     """
 
     address: str
     size: int
     version: str
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.size <= MAX_BYTES:
+            problem = f"its server says that it has {self.size:,} bytes"
+            raise ClearwayError(f"{without_secrets(self.address)}: {problem}. Download it by hand")
+        if len(self.name.encode()) > MAX_NAME_BYTES or not self.name.isprintable() or "\\" in self.name:
+            problem = f"its name has over {MAX_NAME_BYTES} bytes, or letters that no file here may have"
+            raise ClearwayError(f"{without_secrets(self.address):.200}: {problem}. Rename it there")
 
     @property
     def name(self) -> str:
@@ -75,7 +83,7 @@ class Store:
 
     def __init__(self, address: str) -> None:
         self.scheme = address.partition(":")[0]
-        with _faults_named(address):
+        with faults_named(address):
             try:
                 self.system = fsspec.filesystem(self.scheme, **_options(self.scheme))
             except ImportError as error:
@@ -94,10 +102,13 @@ class Store:
         """
         if file_name(address).endswith(tuple(suffixes)):
             return [{"name": address}]
-        with _faults_named(address):
+        with faults_named(address):
             path = self.system._strip_protocol(address)
             folder = path.rstrip("/") + ("/" if self.scheme.startswith("http") else "")
-            listed = self._ask(self.system._ls, folder, stop, detail=True)
+            if self.scheme.startswith("http"):
+                listed = self._ask(partial(files_of_page, self.system), folder, stop)
+            else:
+                listed = self._ask(self.system._ls, folder, stop, detail=True)
         found = [entry for entry in listed if file_name(entry["name"]).endswith(tuple(suffixes))]
         if not found:
             told = f"no file ending in {' or '.join(suffixes)} there"
@@ -114,7 +125,7 @@ class Store:
 
     def file(self, address: str, stop: threading.Event = NEVER) -> RemoteFile:
         """A file as it is now. Raises ClearwayError where it is not there, or its server cannot be asked."""
-        with _faults_named(address):
+        with faults_named(address):
             entry = self._ask(self.system._info, self.system._strip_protocol(address), stop)
         if entry["type"] == "directory":
             raise ClearwayError(f"{without_secrets(address)}: a folder, expected a file. Check the address")
@@ -126,11 +137,15 @@ class Store:
     def download(self, file: RemoteFile, path: Path, stop: threading.Event = NEVER) -> None:
         """Write a file to `path`, not checked further than by its size; given up soon after `stop` is set.
 
+        No more is written than the server has said that there is.
+
         Raises:
             ClearwayError: it cannot be had whole.
         """
-        with _faults_named(file.address):
-            self._tried(self.system._get_file, self.system._strip_protocol(file.address), str(path), stop=stop)
+        with faults_named(file.address):
+            self._tried(
+                bounded(self.system, file.size), self.system._strip_protocol(file.address), str(path), stop=stop
+            )
         if (size := path.stat().st_size) != file.size:
             problem = f"{size:,} of {file.size:,} bytes came"
             raise ClearwayError(f"{without_secrets(file.address)}: {problem}. Try again; the file there may be damaged")
@@ -141,7 +156,7 @@ class Store:
         Raises:
             ClearwayError: the server cannot be asked.
         """
-        with _faults_named(address):
+        with faults_named(address):
             path = self.system._strip_protocol(address)
             try:
                 listed = self._ask(self.system._ls, path, NEVER, detail=True)
@@ -155,12 +170,12 @@ class Store:
         Raises:
             ClearwayError: the server cannot be written to.
         """
-        with _faults_named(address):
+        with faults_named(address):
             self._tried(self.system._put_file, str(path), self.system._strip_protocol(address))
 
     def remove(self, address: str) -> None:
         """Remove a file, if it is there. Raises ClearwayError as `upload` does."""
-        with _faults_named(address), suppress(FileNotFoundError):
+        with faults_named(address), suppress(FileNotFoundError):
             self._tried(self.system._rm_file, self.system._strip_protocol(address))
 
     def _ask(self, question: Callable[..., Any], path: str, stop: threading.Event, **options: Any) -> Any:
@@ -181,7 +196,7 @@ class Store:
                 try:
                     return await task(*given, **options)
                 except Exception as fault:
-                    if before + 1 == self.tries or not _is_for_the_moment(fault):
+                    if before + 1 == self.tries or not is_for_the_moment(fault):
                         raise
                 await asyncio.sleep(PAUSE_S * 2**before)
 
@@ -237,52 +252,20 @@ def _options(scheme: str) -> dict[str, Any]:
 
     logging.getLogger("gcsfs").setLevel(logging.CRITICAL)  # it writes a traceback of every try; we say it in one line
     timeout = aiohttp.ClientTimeout(total=None, sock_connect=CONNECT_S, sock_read=SILENCE_S)
-    return {**fresh, ("session_kwargs" if scheme == "gs" else "client_kwargs"): {"timeout": timeout}}
+    session = {"timeout": timeout, "trace_configs": [_kept_private()]}
+    return {**fresh, ("session_kwargs" if scheme == "gs" else "client_kwargs"): session}
 
 
-@contextmanager
-def _faults_named(address: str) -> Iterator[None]:
-    """Turn whatever fsspec and the libraries below it raise into one line about an address."""
-    began = time.monotonic()
-    try:
-        yield
-    except ClearwayError:
-        raise
-    except Exception as fault:  # each store's library has a hundred kinds of its own, without a common base
-        told = _told(fault, address, time.monotonic() - began)
-        raise ClearwayError(f"{without_secrets(address)}: {told}") from fault
+@cache
+def _kept_private() -> Any:
+    """Has aiohttp follow no redirection from https to http. The same object each time: fsspec compares by it."""
+    import aiohttp
 
+    async def look(session: object, context: object, redirected: Any) -> None:
+        there = urljoin(str(redirected.url), redirected.response.headers.get("Location", ""))
+        if redirected.url.scheme == "https" and not there.startswith("https:"):
+            raise OSError("its server leads from https to http, which is not followed")
 
-def _told(fault: Exception, address: str, seconds: float) -> str:
-    """What went wrong, and the remedy; without secrets, which the library's words may repeat."""
-    cause = _cause(fault)
-    words = addresses_without_secrets(str(cause).replace(address, without_secrets(address)))
-    reason = " ".join(words.split())[:200] or type(cause).__name__
-    kind = type(cause).__name__
-    if isinstance(cause, FileNotFoundError) or getattr(cause, "status", None) == 404:
-        return "there is nothing there. Check the address"
-    if any(word in kind for word in _CREDENTIALS) or getattr(cause, "status", None) in (401, 403):
-        return f"may not be opened ({reason}). Check the credentials and their rights, see docs/scenes.md"
-    if isinstance(cause, TimeoutError) or "Timeout" in kind:
-        return f"no answer in {seconds:.0f} s. Check the network and the server, then try again"
-    return f"cannot be reached or read ({reason}). Check the address and the network, then try again"
-
-
-def _cause(fault: BaseException) -> BaseException:
-    """What a fault is about: of web servers fsspec says that a file is not there, whatever happened."""
-    hidden = isinstance(fault, FileNotFoundError) and str(fault).startswith("http")
-    return fault.__cause__ or fault if hidden else fault
-
-
-def _is_for_the_moment(fault: BaseException) -> bool:
-    """Whether the next try may do: silence, a connection that broke, or a server that is too busy or has failed."""
-    cause = _cause(fault)
-    status = _status(cause.__cause__ or cause)  # s3fs has translated what botocore raised
-    return status == 429 or status >= 500 or not _FOR_THE_MOMENT.isdisjoint(kind.__name__ for kind in type(cause).mro())
-
-
-def _status(fault: BaseException) -> int:
-    """The status with which a server answered; 0 where it did not."""
-    answer = getattr(fault, "response", None)
-    metadata = answer.get("ResponseMetadata", {}) if isinstance(answer, dict) else {}
-    return int(metadata.get("HTTPStatusCode") or getattr(fault, "status", None) or 0)
+    config = aiohttp.TraceConfig()
+    config.on_request_redirect.append(look)
+    return config
