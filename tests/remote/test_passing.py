@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -18,11 +19,12 @@ from clearway.cli.main import main
 from clearway.errors import ClearwayError
 from clearway.learn.load import run_scenes
 from clearway.learn.run_folder import RunFolder
-from clearway.remote import passing
+from clearway.remote import cache, passing
 from clearway.remote.address import fetched_folder
 from clearway.remote.cache import AHEAD, LIMIT_VARIABLE, CacheWarning, fetched
 from clearway.remote.records import RECORDS, origin
 from clearway.remote.store import Store
+from clearway.remote.together import AT_ONCE
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views.stream import views_in
@@ -175,6 +177,79 @@ def test_a_file_that_several_want_comes_once(scenes: Path, monkeypatch: pytest.M
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(looked_at, [first] * 8))
     assert came == ["a.h5"]
+
+
+@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside files of this machine"])
+def test_those_that_come_next_are_fetched_together(beside: bool, scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit_to(3 / AHEAD, scenes, monkeypatch)
+    monkeypatch.setattr(cache, "_stay", lambda *_: False)
+    with pytest.warns(CacheWarning):
+        paths = fetched([SET], (".h5",), may_pass=True)
+    expected = [len(group) for group in cache.groups(paths)]
+    groups: list[int] = []
+    fetch_again = cache.fetch_again
+    monkeypatch.setattr(cache, "fetch_again", lambda some: groups.append(len(some)) or fetch_again(some))
+    here = [scenes / "a.h5"] if beside else []
+    given = [*here, *paths]
+    for path, wanted in zip(passing.in_turn(given), given, strict=True):
+        assert path == wanted and path.exists()
+    assert groups == expected and 1 < len(expected) < len(NAMES)
+
+
+def test_groups_end_at_the_room_and_at_the_number_of_downloads(monkeypatch: pytest.MonkeyPatch) -> None:
+    places = [fetched_folder() / f"{number:032x}-100/a.h5" for number in range(2 * AT_ONCE + 1)]
+    monkeypatch.setenv(LIMIT_VARIABLE, "1")
+    assert [len(group) for group in cache.groups(places)] == [AT_ONCE, AT_ONCE, 1]
+    monkeypatch.setenv(LIMIT_VARIABLE, f"{300 / AHEAD / 1e9:.12f}")
+    assert [len(group) for group in cache.groups(places[:7])] == [3, 3, 1]
+    here = [Path("here.h5")]
+    assert [len(group) for group in cache.groups([*here, *places[:4], *here])] == [4, 2]
+
+
+def test_what_was_read_last_goes_last(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reading counts as use, not only fetching."""
+    limit_to(20, scenes, monkeypatch)
+    monkeypatch.setattr(cache, "_stay", lambda *_: False)
+    with pytest.warns(CacheWarning):
+        first, second, third, *_ = fetched([f"{SET}/{name}.h5" for name in "abc"], (".h5",), may_pass=True)
+    passing.bring([first, second])
+    for age_s, path in ((200, first), (100, second)):
+        used_s = time.time() - age_s
+        os.utime(path.parent, (used_s, used_s))
+    with passing.name_of_present(first):
+        pass
+    limit_to(2.1, scenes, monkeypatch)
+    passing.bring([third])
+    assert (first.exists(), second.exists(), third.exists()) == (True, False, True)
+
+
+def test_another_process_may_be_faster(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    download = Store.download
+
+    def late(store: Store, file: Any, path: Path, *more: Any) -> None:
+        download(store, file, path, *more)
+        theirs = fetched_folder() / path.parent.name
+        if not theirs.exists():
+            shutil.copytree(path.parent, theirs)
+
+    monkeypatch.setattr(Store, "download", late)
+    (path,) = fetched([f"{SET}/a.h5"], (".h5",))
+    assert path.read_bytes() == (scenes / "a.h5").read_bytes()
+
+
+def test_a_place_that_cannot_be_taken_is_told_of(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where something else is in the way: the tolerance for another process is for a file that has come."""
+    download = Store.download
+
+    def late(store: Store, file: Any, path: Path, *more: Any) -> None:
+        download(store, file, path, *more)
+        theirs = fetched_folder() / path.parent.name
+        theirs.mkdir()
+        (theirs / "other").write_text("")
+
+    monkeypatch.setattr(Store, "download", late)
+    with pytest.raises(ClearwayError, match="cannot keep what is fetched"):
+        fetched([f"{SET}/a.h5"], (".h5",))
 
 
 def test_who_has_opened_a_file_reads_on_when_it_goes(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -336,17 +411,28 @@ def test_only_the_cache_s_own_files_come_and_go(scenes: Path, monkeypatch: pytes
         looked_at(scene)
 
 
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [
+        (("inspect", "s3://rooms/views"), "views"),
+        (("inspect", f"{SET}/f.h5"), "scenes"),
+        (("export", f"{SET}/f.h5", "--out", "f.h5"), "scenes"),
+    ],
+    ids=["inspect views", "inspect", "export"],
+)
 def test_commands_read_what_passes(
-    scenes: Path, views: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: tuple[str, ...],
+    kind: str,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    limit_to(1, views, monkeypatch)
-    for words in (
-        ["inspect", "s3://rooms/views"],
-        ["inspect", f"{SET}/a.h5"],
-        ["export", f"{SET}/a.h5", "--out", str(tmp_path / "a.h5")],
-    ):
-        with pytest.raises(SystemExit) as ended:
-            main(["scenes", *words])
-        told = capsys.readouterr()
-        assert ended.value.code == 0, told.err
-    assert (tmp_path / "a.h5").exists()
+    limit_to(1, request.getfixturevalue(kind), monkeypatch)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["scenes", *words])
+    told = capsys.readouterr()
+    assert ended.value.code == 0, told.err
+    assert "do not fit into a cache of" in told.err
+    assert "export" not in words or (tmp_path / "f.h5").exists()

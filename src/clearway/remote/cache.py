@@ -15,6 +15,7 @@ import threading
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import chain, islice
 from pathlib import Path
 
 from clearway.errors import ClearwayError
@@ -25,6 +26,7 @@ from clearway.remote.address import (
     ENTRY,
     entry_bytes,
     fetched_folder,
+    is_fetched,
     is_whole,
     without_secrets,
 )
@@ -43,7 +45,12 @@ class CacheWarning(UserWarning):
 
 
 def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool = False) -> list[Path]:
-    """Files on this machine: those that addresses name, folders by the files in them with such endings, in order.
+    """As `fetched_each`, the files of all addresses in one list."""
+    return list(chain.from_iterable(fetched_each(addresses, suffixes, may_pass=may_pass)))
+
+
+def fetched_each(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool = False) -> list[list[Path]]:
+    """Files on this machine, of each address: the file that it names, or those of the folder with such endings.
 
     Args:
         addresses: of files and folders.
@@ -74,7 +81,8 @@ def fetched(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass: bool
             told = f"{size_gb:,.3g} GB do not fit into a cache of {limit_gb:g} GB, beside what others keep there"
             remedy = f"they are fetched as they are read, more than once. Set {LIMIT_VARIABLE} to more"
             warnings.warn(f"{without_secrets(addresses[0])}: {told}; {remedy}", CacheWarning, stacklevel=2)
-    return [places[file] for file in found]
+    in_order = iter(found)
+    return [[places[file] for file in islice(in_order, len(some))] for some in listed]
 
 
 def fetch_again(places: Sequence[Path]) -> None:
@@ -92,14 +100,15 @@ def fetch_again(places: Sequence[Path]) -> None:
 
 
 def groups(places: Iterable[Path]) -> Iterator[list[Path]]:
-    """Files that were fetched, in order, by as many as may come together before their turn."""
+    """Files in order, by as many as may come together before their turn; those that were never fetched lie here."""
     group: list[Path] = []
     left = most = AHEAD * _limit()
     for place in places:
-        left -= entry_bytes(place.parent.name)
+        size = entry_bytes(place.parent.name) if is_fetched(place) else 0
+        left -= size
         if group and (left < 0 or len(group) == AT_ONCE):
             yield group
-            group, left = [], most - entry_bytes(place.parent.name)
+            group, left = [], most - size
         group.append(place)
     if group:
         yield group

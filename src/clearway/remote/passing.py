@@ -64,7 +64,7 @@ def in_turn(paths: Sequence[Path]) -> Iterator[Path]:
     Raises:
         ClearwayError: as of `name_of_present`.
     """
-    if not all(map(is_fetched, paths)):
+    if not any(map(is_fetched, paths)):
         yield from paths
         return
     from clearway.remote.cache import groups
