@@ -35,6 +35,7 @@ def test_names_are_last_parts() -> None:
             "(https://me:secret@a.org/b.h5), see (http://b.org/?c=d(e)f'g).",
             "(https://a.org/b.h5), see (http://b.org/).",
         ),
+        ("https:/me:secret@a.org/b?signature=c", "https://a.org/b"),
         ("nothing at https://a.org/b.h5", "nothing at https://a.org/b.h5"),
     ],
 )

@@ -17,8 +17,10 @@ from clearway.errors import ClearwayError, EnvError
 from clearway.learn.load import run_scenes
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
+from clearway.remote import cache
 from clearway.remote.address import fetched_folder
 from clearway.scenes.digest import scene_digest
+from clearway.scenes.scene_files import scene_files
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views.stream import views_in
 from helpers.made import corridor_scene
@@ -77,6 +79,7 @@ def test_a_damaged_scene_elsewhere_is_refused(
     with pytest.raises(SystemExit) as ended:
         main(["scenes", "inspect", "s3://rooms/set/one.h5"])
     assert ended.value.code == 2
+<<<<<<< HEAD
     told = capsys.readouterr().err
     assert told.startswith("error: s3://rooms/set/one.h5: cannot be opened as HDF5")
     assert str(fetched_folder()) not in told
@@ -100,3 +103,32 @@ def test_commands_are_kept_and_told_without_secrets(word: str, monkeypatch: pyte
     plain = ("clearway", "train", word.format("https://host/a.h5"), "--frames", "9")
     assert record_of(small_request()).command == plain
     assert longer(words, Path("r"), 9) == " ".join([*plain, "--out r --resume"])
+=======
+    assert "cannot be opened as HDF5" in capsys.readouterr().err
+
+
+def test_addresses_named_one_by_one_are_fetched_together(
+    s3: Callable[[str, bytes], None], files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for path in files.iterdir():
+        s3(f"set/{path.name}", path.read_bytes())
+    together: list[int] = []
+    fetched_each = cache.fetched_each
+    monkeypatch.setattr(
+        cache, "fetched_each", lambda *given, **more: together.append(len(given[0])) or fetched_each(*given, **more)
+    )
+    one, two, inside = "s3://rooms/set/one.h5", "s3://rooms/set/two.h5", corridor_scene(5, name="inside")
+    loaded = clearway.load_scenes([two, files / "one.h5", inside, one, "s3://rooms/set", two])
+    assert [scene.name for scene in loaded] == ["two", "one", "inside", "one", "one", "two", "two"]
+    found = scene_files([Path(two), files, Path(one)])
+    assert [path.stem for path in found] == ["two", "one", "two", "one"]
+    assert together == [3, 2]
+
+
+def test_a_folder_of_several_is_named_without_its_password(files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLEARWAY_CACHE", str(files.parent / "cache"))
+    with web_server(files_of(files)) as address:
+        secret = address.replace("://", "://me:secret@")
+        for source in (secret, Path(secret)):
+            with pytest.raises(ClearwayError, match=f"^{address}: 2 scenes"):
+                clearway.load_scene(source)

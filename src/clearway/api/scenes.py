@@ -14,10 +14,11 @@ from clearway.errors import ArgumentError
 from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.plugged import own_encoder
 from clearway.regular_files import read_ahead
+from clearway.remote.address import addresses_without_secrets
 from clearway.remote.passing import in_turn
 from clearway.rooms import ROOM_NAMES
 from clearway.scenes.scene import Scene
-from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files
+from clearway.scenes.scene_files import SCENE_SUFFIXES, scene_files_of_each
 from clearway.scenes.sensors import RGB, check_names
 from clearway.scenes.targets import possible_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -56,7 +57,8 @@ def load_scene(source: SceneSource) -> Scene:
     """
     scene, *others = load_scenes(source)
     if others:
-        raise ArgumentError(f"{source}: {1 + len(others)} scenes. Name one, or use load_scenes")
+        named = addresses_without_secrets(str(source))
+        raise ArgumentError(f"{named}: {1 + len(others)} scenes. Name one, or use load_scenes")
     return scene
 
 
@@ -75,12 +77,11 @@ def load_scenes(sources: Scenes) -> list[Scene]:
 
 def scenes_and_files(sources: Scenes, *, features_in_file: bool = False) -> list[tuple[Scene, Path | None]]:
     """As `load_scenes`, each with its file, None of a scene in memory; `features_in_file` as of `read_scene`."""
+    given = [one if isinstance(one, Scene) else as_path("scenes", one) for one in _each(sources)]
+    files_of_each = iter(scene_files_of_each([one for one in given if not isinstance(one, Scene)]))
     named: list[tuple[Scene | None, Path | None]] = []
-    for source in _each(sources):
-        if isinstance(source, Scene):
-            named.append((source, None))
-        else:
-            named += [(None, file) for file in scene_files([as_path("scenes", source)])]
+    for one in given:
+        named += [(one, None)] if isinstance(one, Scene) else [(None, file) for file in next(files_of_each)]
     if not named:
         raise ArgumentError("scenes: none given. Give at least one scene or scene file")
     files = [file for _, file in named if file is not None]

@@ -13,7 +13,7 @@ EXTRAS = {"s3": "s3", "gs": "gs", "https": "https", "http": "https"}  # what to 
 COPIED_NS = 10**18  # time of change that every copy has, so that one that comes again is the same
 ENTRY = re.compile(r"[0-9a-f]{32}-(\d{1,20})")  # see `cache`
 _ADDRESS = re.compile(rf"({'|'.join(EXTRAS)}):/+([^/].*)", re.DOTALL)
-_IN_WORDS = re.compile(r"https?://\S+?(?=['\")\]>.,;]*(?:\s|$))")  # less what closes a bracket or sentence
+_IN_WORDS = re.compile(r"https?:/+\S+?(?=['\")\]>.,;]*(?:\s|$))")  # less what closes a bracket or sentence
 
 
 def address_of(path: str | os.PathLike[str]) -> str | None:
@@ -30,11 +30,11 @@ def file_name(address: str) -> str:
 
 
 def without_secrets(address: str) -> str:
-    """A web address without name and password, and without its query, such as a signature."""
+    """A web address without name and password, and without its query, such as a signature; also one made a `Path`."""
     if not address.startswith("http"):
         return address
-    scheme, _, rest = address.partition("?")[0].partition("://")
-    host, slash, path = rest.partition("/")
+    scheme, _, rest = address.partition("?")[0].partition(":")
+    host, slash, path = rest.lstrip("/").partition("/")
     return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from clearway.errors import ClearwayError
@@ -14,26 +15,35 @@ SCENE_SUFFIXES = (".h5", ".hdf5")
 def scene_files(paths: Sequence[Path]) -> list[Path]:
     """The scene files that some paths name: files as they are, folders by the scene files in them.
 
-    An address that starts with s3://, gs:// or https:// is a path, too; its files come from a cache on this machine.
+    An address that starts with s3://, gs:// or https:// is a path, too; its files come from a cache on this machine,
+    those of all addresses together.
 
     Raises:
         ClearwayError: a path does not exist, a folder holds no scene file, or an address cannot be read.
     """
-    files: list[Path] = []
-    for path in paths:
-        if (address := address_of(path)) is not None:
-            from clearway.remote.cache import fetched
-
-            files += fetched([address], SCENE_SUFFIXES, may_pass=True)  # `hdf5.opened` has them come
-        elif path.is_dir():
-            found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
-            if not found:
-                raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
-            files += found
-        elif path.exists() or is_fetched(path):
-            files.append(path)
-        else:
-            raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
-    if not files:
+    if not paths:
         raise ClearwayError("no scene file given. Name at least one, or make one with clearway scenes build")
-    return files
+    return list(chain.from_iterable(scene_files_of_each(paths)))
+
+
+def scene_files_of_each(paths: Sequence[Path]) -> list[list[Path]]:
+    """As `scene_files`, those of each path by themselves."""
+    addresses = {path: address for path in paths if (address := address_of(path)) is not None}
+    found = {path: _files_here(path) for path in paths if path not in addresses}
+    if addresses:
+        from clearway.remote.cache import fetched_each
+
+        there = fetched_each(list(addresses.values()), SCENE_SUFFIXES, may_pass=True)  # `hdf5.opened` has them come
+        found |= dict(zip(addresses, there, strict=True))
+    return [found[path] for path in paths]
+
+
+def _files_here(path: Path) -> list[Path]:
+    if path.is_dir():
+        found = sorted(p for p in path.iterdir() if p.suffix in SCENE_SUFFIXES)
+        if not found:
+            raise ClearwayError(f"{path}: no scene file ({', '.join(SCENE_SUFFIXES)}) in this folder. Name another")
+        return found
+    if path.exists() or is_fetched(path):
+        return [path]
+    raise ClearwayError(f"{path}: no such file. Check the path, or make a scene with clearway scenes build")
