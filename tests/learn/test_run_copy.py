@@ -122,6 +122,19 @@ def test_whatever_is_cut_off_leaves_a_whole_copy(
     assert without_times(found) == without_times(undisturbed)
 
 
+def test_what_was_cut_off_does_not_stay(s3: S3, two_moments: tuple[Path, Path]) -> None:
+    """Whatever its name: checkpoints are written when time has passed, and another try has others."""
+    earlier, later = two_moments
+    kept = [path.name for path in checkpoints(RunFolder(later).checkpoints)]
+    for name in ("frames-000000000001", "frames-000000000999", kept[-1], "notes"):
+        s3(f"runs/one/checkpoints/{name}/network.safetensors", b"half")
+    for folder in (earlier, later):
+        RunCopy(ADDRESS).update(folder)
+    assert Store(ADDRESS).names(f"{ADDRESS}/checkpoints") == [*kept, "notes"]
+    for name in kept:
+        assert len(Store(ADDRESS).names(f"{ADDRESS}/checkpoints/{name}")) == 3
+
+
 def test_a_training_goes_on_without_a_store_and_says_so(
     s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -142,7 +142,12 @@ def _read_tensors(path: Path, name: str) -> dict[str, Tensor]:
 
 def checkpoints(folder: Path) -> list[Path]:
     """Checkpoints in `folder`, oldest first."""
-    return sorted(path for path in folder.glob("frames-*") if _NAME.fullmatch(path.name))
+    return sorted(path for path in folder.glob("frames-*") if is_name(path.name))
+
+
+def is_name(name: str) -> bool:
+    """Whether a folder's name is that of a checkpoint."""
+    return _NAME.fullmatch(name) is not None
 
 
 def _checked_manifest(path: Path) -> dict:

@@ -12,12 +12,13 @@ import shutil
 import tempfile
 import threading
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from clearway.errors import ClearwayError, RunError
 from clearway.files import folder_written_whole
-from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints
+from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints, is_name
 from clearway.learn.run_folder import CHECKPOINTS, COPIED, METRICS_FILE, RUN_FILE, SETTINGS_FILE, RunFolder
 from clearway.remote.address import address_of
 from clearway.remote.store import WRITABLE, Store
@@ -80,13 +81,15 @@ class RunCopy:
         Raises:
             ClearwayError: the store cannot be written to; what it holds can still be gone on with.
         """
-        there, here = self._checkpoints(), {path.name: path for path in checkpoints(folder / CHECKPOINTS)}
+        names = self._names()
+        there, here = self._whole(names), {path.name: path for path in checkpoints(folder / CHECKPOINTS)}
         self._put(folder, METRICS_FILE, SETTINGS_FILE)
         for name in sorted(set(here) - set(there)):
             for part in FILES:
                 self.store.upload(here[name] / part, self._place(CHECKPOINTS, name, part))
         self._put(folder, RUN_FILE)
-        for old in sorted({*there, *here})[:-KEPT]:
+        kept = sorted({*there, *here})[-KEPT:]
+        for old in sorted({*names, *here}.difference(kept)):  # what is in part there was cut off
             for part in reversed(FILES):
                 self.store.remove(self._place(CHECKPOINTS, old, part))
 
@@ -120,8 +123,14 @@ class RunCopy:
 
     def _checkpoints(self) -> list[str]:
         """Names of those that are whole, ascending."""
-        found = self.store.names(self._place(CHECKPOINTS))
-        return sorted(name for name in found if MANIFEST_FILE in self.store.names(self._place(CHECKPOINTS, name)))
+        return self._whole(self._names())
+
+    def _names(self) -> list[str]:
+        """Of all, also of those that are there in part, ascending."""
+        return list(filter(is_name, self.store.names(self._place(CHECKPOINTS))))
+
+    def _whole(self, names: Sequence[str]) -> list[str]:
+        return [name for name in names if MANIFEST_FILE in self.store.names(self._place(CHECKPOINTS, name))]
 
     def _place(self, *parts: str) -> str:
         return "/".join((self.address, *parts))
