@@ -92,6 +92,34 @@ def test_before_others_it_needs_a_token_of_one_s_own_and_warns_without_tls(clear
     assert "without a token: http://127.0.0.1:" in clearway("serve", "x.onnx", "--health-port", "0").err
 
 
+def test_health_and_figures_are_for_this_machine_unless_it_is_said(clearway, monkeypatch, served):
+    """They were open, without a token, to whoever reached the service."""
+    monkeypatch.setenv("CLEARWAY_TOKEN", "a-token-of-one-s-own")
+    hosts = []
+
+    def run(agent, network, *others):
+        hosts.append(network.health.getsockname()[0])
+
+    monkeypatch.setattr("clearway.serve.run.run_service", run)
+    everywhere = ("serve", "x.onnx", "--host", "0.0.0.0", "--health-port", "0")
+    assert "without a token: http://127.0.0.1:" in clearway(*everywhere).err
+    assert "without a token: http://0.0.0.0:" in clearway(*everywhere, "--health-host", "0.0.0.0").err
+    assert hosts == ["127.0.0.1", "0.0.0.0"]
+    clearway("serve", "x.onnx", "--health-host", "0.0.0.0").refusal("--health-host is 0.0.0.0", "no --health-port")
+    clearway("serve", "x.onnx", "--health-port", "-1").refusal("--health-port is -1")
+    clearway("serve", "x.onnx", "--health-port", "0", "--health-host", " ").refusal("--health-host is empty")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a second loopback address")
+def test_one_port_at_two_addresses_is_not_for_health_too(clearway, monkeypatch, served):
+    """All of the service would count as its port for health, figures without a token among it."""
+    monkeypatch.setenv("CLEARWAY_TOKEN", "a-token-of-one-s-own")
+    with socket.create_server(("127.0.0.2", 0)) as free:
+        port = free.getsockname()[1]
+    both = ("--host", "127.0.0.2", "--port", port, "--health-port", port)
+    clearway("serve", "x.onnx", *both).refusal(f"--health-port is {port}, as --port is")
+
+
 def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, served):
     line = "arrived is null in all answers: an earlier clearway exported this file. Export it again"
     assert line in clearway("serve", "x.onnx").err.replace("\n", " ")

@@ -48,6 +48,8 @@ class Serve:
     """Its key, in PEM, without a password."""
     health_port: int | None = None
     """Port for /health, /ready and /metrics alone, without a token; by default the service's own answers them."""
+    health_host: str = "127.0.0.1"
+    """Address for --health-port. The default is reached from this machine alone; who reaches it needs no token."""
     trusted_proxy: str | None = None
     """Address of a proxy before the service, whose X-Forwarded-For says who asks; nobody else's is believed."""
     log_requests: bool = False
@@ -71,7 +73,7 @@ class Serve:
         from clearway.serve.sessions import state_bytes
         from clearway.serve.tokens import ALONE, Tokens, checked_token, read_tokens
         from clearway.web.guard import new_token
-        from clearway.web.local import address_of, is_loopback, listening
+        from clearway.web.local import address_of, is_loopback, listening, port_of
 
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
         if not 1 <= self.replicas <= MOST_REPLICAS:
@@ -91,6 +93,8 @@ class Serve:
 
         agent = servable_agent(self.agent, self.scene, say)
         with listening(self.port, self.host) as listener, self._health() as health:
+            if health is not None and port_of(health) == port_of(listener):  # at two addresses both could have it
+                raise ClearwayError(f"--health-port is {self.health_port}, as --port is. Give another")
             local, scheme = is_loopback(listener), "http" if self.tls_cert is None else "https"
             if not local and self.tokens is None and not own:
                 problem = f"--host {self.host} is reached by others, and no token of yours is set"
@@ -99,7 +103,7 @@ class Serve:
             if not local and scheme == "http":
                 say(UNENCRYPTED)
             if health is not None:
-                say(f"health and metrics, without a token: {address_of(health, self.host, scheme)}")
+                say(f"health and metrics, without a token: {address_of(health, self.health_host, scheme)}")
             if self.tokens is None and not own:
                 say(f"token: {token}")
             if not agent.card.tells_arrival:
@@ -120,6 +124,10 @@ class Serve:
                 run_service(agent, network, tokens, limits)
 
     def _health(self) -> AbstractContextManager[socket.socket | None]:
-        from clearway.web.local import listening
+        from clearway.web.local import LOOPBACK, listening
 
-        return nullcontext() if self.health_port is None else listening(self.health_port, self.host)
+        if self.health_port is not None:
+            return listening(self.health_port, self.health_host, "health-")
+        if self.health_host != LOOPBACK:
+            raise ClearwayError(f"--health-host is {self.health_host}, and there is no --health-port. Give both")
+        return nullcontext()

@@ -30,21 +30,22 @@ ENDED_LATE = 70  # exit code where something under way did not end (EX_SOFTWARE 
 LATE_S = 3  # after the grace
 
 
-def listening(port: int, host: str = LOOPBACK) -> socket.socket:
+def listening(port: int, host: str = LOOPBACK, which: str = "") -> socket.socket:
     """A socket on the loopback address, or on another one; from here on connections wait in line.
 
     Args:
         port: 0 for any that is free.
         host: address or name of a network interface of this machine.
+        which: stands before `port` and `host` in the names of their options.
 
     Raises:
         ClearwayError: the port is none, is taken or is not allowed, or the address is not this machine's.
     """
     if not 0 <= port <= MOST_PORT:
-        raise ClearwayError(f"--port is {port}, expected 0 to {MOST_PORT}. Give a port in that range")
+        raise ClearwayError(f"--{which}port is {port}, expected 0 to {MOST_PORT}. Give a port in that range")
     if not host.strip():  # to the system: every network interface
-        raise ClearwayError("--host is empty, expected an address. Leave it out to be reached from this machine alone")
-    where = f"--port {port}" if host == LOOPBACK else f"--host {host} --port {port}"
+        raise ClearwayError(f"--{which}host is empty, expected an address. Leave it out, for this machine alone")
+    where = f"--{which}port {port}" if host == LOOPBACK else f"--{which}host {host} --{which}port {port}"
     try:
         listener = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
     except (OSError, UnicodeError) as error:
