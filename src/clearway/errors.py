@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 
 
@@ -14,6 +16,19 @@ def reason_of(fault: BaseException) -> str:
     """What was wrong, in one line, for an error of ours that names the file itself."""
     told = getattr(fault, "strerror", None) or fault
     return " ".join(str(told).split())[:200] or type(fault).__name__
+
+
+def install_hint(extra: str) -> str:
+    """How to install one of our extras into the Python that runs: from the clone that this is, else from one."""
+    clone = Path(__file__).parents[2]
+    source = clone if (clone / "pyproject.toml").exists() else "."
+    where = "" if source == clone else ", in a clone of clearway"
+    return f"Install it: {pip_install(f'{source}[{extra}]')}{where}"
+
+
+def pip_install(requirement: str) -> str:
+    """The command that installs into the Python that runs, fit for a shell."""
+    return f"{shlex.quote(sys.executable)} -m pip install '{requirement}'"
 
 
 def is_out_of_memory(fault: BaseException) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from clearway.errors import RunError
+from clearway.errors import RunError, install_hint
 
 LOCAL = "local"
 PATIENCE_S = 10.0  # for a cluster's address to answer; Ray by itself tries for many minutes
@@ -30,7 +30,7 @@ def connected(address: str, cores: int | None = None) -> Iterator[Any]:
     try:
         import ray
     except ImportError as error:
-        raise RunError("--ray needs Ray. Install it: pip install 'clearway[ray]'") from error
+        raise RunError(f"--ray needs Ray. {install_hint('ray')}") from error
     started_before = ray.is_initialized()
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR", "include_dashboard": False}
     if address == LOCAL:

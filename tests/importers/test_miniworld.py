@@ -139,5 +139,5 @@ def test_a_name_that_is_none_or_no_miniworld_is_said() -> None:
 
 def test_without_the_package_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "miniworld.miniworld", None)
-    with pytest.raises(SceneError, match=r"pip install 'clearway\[miniworld\]'"), started("MiniWorld-Hallway-v0"):
+    with pytest.raises(SceneError, match=r"-m pip install '/.*\[miniworld\]'"), started("MiniWorld-Hallway-v0"):
         pytest.fail("started")

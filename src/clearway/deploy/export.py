@@ -19,7 +19,7 @@ from clearway.deploy.from_run import RunInScene, exportable_encoder
 from clearway.deploy.generalist import card_of
 from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
 from clearway.deploy.onnx_graph import AgentGraph
-from clearway.errors import DeployError
+from clearway.errors import DeployError, install_hint
 from clearway.files import written_whole
 from clearway.mapping.settings import MappingSettings
 from clearway.perception.eyes import EyesEncoder
@@ -102,7 +102,7 @@ def _translated(
         import onnx  # noqa: F401
         import onnxscript  # noqa: F401
     except ImportError as fault:
-        raise DeployError(f"export needs {fault.name}. Install it: pip install 'clearway[onnx]'") from fault
+        raise DeployError(f"export needs {fault.name}. {install_hint('onnx')}") from fault
     with _quiet(), torch.no_grad():
         program = torch.onnx.export(
             graph,

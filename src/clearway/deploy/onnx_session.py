@@ -24,7 +24,7 @@ import numpy as np
 
 from clearway.children import command_of
 from clearway.deploy.onnx_worker import read_message, write_message
-from clearway.errors import DeployError
+from clearway.errors import DeployError, install_hint
 
 MEMORY_LIMIT_BYTES = 4 << 30  # of a file's weights and of all that its graph computes
 ADDRESS_LIMIT_BYTES = 2 * MEMORY_LIMIT_BYTES  # of its process, with the libraries and the file
@@ -51,7 +51,7 @@ class BoundedSession:
 
     def __init__(self, content: bytes, source: str, threads: int | None) -> None:
         if find_spec("onnxruntime") is None:
-            raise DeployError(f"{source}: needs onnxruntime. Install it: pip install 'clearway[onnx]'")
+            raise DeployError(f"{source}: needs onnxruntime. {install_hint('onnx')}")
         self._content, self._source, self._threads = content, source, threads
         self._lock = threading.Lock()
         _SESSIONS.add(self)

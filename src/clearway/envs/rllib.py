@@ -9,7 +9,7 @@ import gymnasium
 from gymnasium.wrappers import FlattenObservation
 
 from clearway.envs.registration import ENV_ID, register_environments
-from clearway.errors import EnvError
+from clearway.errors import EnvError, pip_install
 
 
 def register_rllib() -> str:
@@ -25,7 +25,7 @@ def register_rllib() -> str:
     try:
         from ray.tune.registry import register_env
     except ImportError as error:
-        raise EnvError("register_rllib needs RLlib. Install it: pip install 'ray[rllib]'") from error
+        raise EnvError(f"register_rllib needs RLlib. Install it: {pip_install('ray[rllib]')}") from error
 
     register_env(ENV_ID, made)
     return ENV_ID

@@ -11,12 +11,12 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from clearway.envs.vector import ImageGoalVectorEnv, Observation
-from clearway.errors import EnvError
+from clearway.errors import EnvError, install_hint
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise EnvError("clearway.envs.sb3 needs Stable-Baselines3. Install it: pip install 'clearway[sb3]'") from error
+    raise EnvError(f"clearway.envs.sb3 needs Stable-Baselines3. {install_hint('sb3')}") from error
 
 
 class SB3VecEnv(VecEnv):

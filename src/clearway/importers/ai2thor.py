@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, install_hint
 from clearway.importers.picture_limits import check_picture_count, check_picture_size
 from clearway.importers.pose_graph import recorded_pose_graph
 from clearway.progress import picture_progress
@@ -49,7 +49,7 @@ def started(scene: str, step_m: float, width_px: int, height_px: int) -> Iterato
     try:
         from ai2thor.controller import Controller as Simulator
     except ImportError as error:
-        raise SceneError(scene, "needs the package ai2thor", "Install it: pip install 'clearway[ai2thor]'") from error
+        raise SceneError(scene, "needs the package ai2thor", install_hint("ai2thor")) from error
     try:
         controller = Simulator(scene=scene, gridSize=step_m, width=width_px, height=height_px, snapToGrid=True)
     except Exception as fault:  # the package raises ValueError, OSError or plain Exception where it finds no simulator

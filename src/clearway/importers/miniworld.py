@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from clearway.errors import SceneError
+from clearway.errors import SceneError, install_hint
 from clearway.importers.picture_limits import check_picture_count, check_picture_size
 from clearway.progress import picture_progress
 from clearway.scenes.grid import HEADING_COUNT, connected_parts, edges_among, neighbour_pairs, pose_graph
@@ -54,9 +54,7 @@ def started(name: str, seed: int = 0) -> Iterator[Any]:
         pyglet.options["headless"] = sys.platform == "linux"  # before anything of it opens a window
         from miniworld.miniworld import MiniWorldEnv
     except ModuleNotFoundError as error:
-        raise SceneError(
-            name, "needs the package miniworld", "Install it: pip install 'clearway[miniworld]'"
-        ) from error
+        raise SceneError(name, "needs the package miniworld", install_hint("miniworld")) from error
     except Exception as fault:  # a missing library is an ImportError, AttributeError or pyglet's own exception
         raise SceneError(name, f"MiniWorld does not start here ({_line(fault)})", NO_SCREEN) from fault
     import gymnasium

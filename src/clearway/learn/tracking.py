@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol, get_args
 
 from clearway.choices import TrackerName
-from clearway.errors import RunError
+from clearway.errors import RunError, install_hint
 from clearway.regular_files import read_text
 
 BOARD, WANDB = "tensorboard", "wandb"  # folders of their files, beside the JSON lines
@@ -45,7 +45,7 @@ def check_tracker(name: str | None) -> None:
     if name not in get_args(TrackerName):
         raise RunError(f"--track {name:.40}: expected {' or '.join(get_args(TrackerName))}. Give one of them")
     if importlib.util.find_spec(name) is None:
-        raise RunError(f"--track {name}: needs {name}. Install it: pip install 'clearway[{name}]'")
+        raise RunError(f"--track {name}: needs {name}. {install_hint(name)}")
 
 
 def tracker_of(

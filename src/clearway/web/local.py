@@ -13,14 +13,13 @@ from contextlib import ExitStack, contextmanager
 from types import FrameType
 from typing import Any
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, install_hint
 from clearway.web.guard import Application
 
 try:
     import uvicorn
 except ImportError as error:
-    problem = "a local service needs uvicorn"
-    raise ClearwayError(f"{problem}. Install it: pip install 'clearway[view]' or 'clearway[serve]'") from error
+    raise ClearwayError(f"a local service needs uvicorn. {install_hint('view')}, or with serve") from error
 
 LOOPBACK = "127.0.0.1"
 GRACE_S = 5  # for requests under way when the service is told to end
