@@ -11,6 +11,7 @@ from PIL import Image, ImageSequence
 from clearway.view.bundle import bundled
 from clearway.view.content import page_files
 from clearway.view.saved import MODULES, SCRIPTS
+from helpers.browser import opened_browser
 from helpers.documents import ROOT, Block, code_blocks, run_block, shortened
 
 UNTIL_STOPPED = "timeout 30 clearway "
@@ -65,19 +66,38 @@ def test_a_block_that_fails_is_noticed(tmp_path: Path) -> None:
     assert run_block(Block("sh", "clearway --version\n"), tmp_path).stdout.startswith("clearway ")
 
 
-def test_the_site_builds_without_a_broken_link(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site's folder."""
+    folder = tmp_path_factory.mktemp("site") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    pages = {page.parent.name for page in (tmp_path / "site").rglob("index.html")}
+    return folder
+
+
+def test_tables_of_the_site_fit_a_phone(site: Path) -> None:
+    """What is too wide nevertheless, scrolls within a box."""
+    wide = """wraps => wraps.filter(wrap => wrap.scrollWidth > wrap.clientWidth).length"""
+    with opened_browser() as browser:
+        page = browser.new_page(viewport={"width": 390, "height": 844})
+        for name, most in {"results": 0, "first-hour": 0, "reference": 20}.items():
+            page.goto((site / name / "index.html").as_uri())
+            page.locator(".md-typeset__scrollwrap").first.wait_for()
+            assert page.locator(".md-typeset__scrollwrap").evaluate_all(wide) <= most
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_the_site_builds_without_a_broken_link(site: Path) -> None:
+    pages = {page.parent.name for page in site.rglob("index.html")}
     assert {"tutorial", "python", "zones", "learning", "reference", "metrics", "results", "building"} <= pages
-    reference = (tmp_path / "site/reference/index.html").read_text()
+    reference = (site / "reference/index.html").read_text()
     ids = [f'id="clearway.{name}"' for name in ("train", "scenes.thor_v1.read_scene")]  # by the names that one imports
     first, later = map(reference.index, ids)
     assert first < later
-    commands = re.sub("<[^>]*>", "", (tmp_path / "site/commands/index.html").read_text())
+    commands = re.sub("<[^>]*>", "", (site / "commands/index.html").read_text())
     assert "# what comes along, and how to open it\nclearway examples\n" in commands  # no comment is cut
-    assert "Made with" not in (tmp_path / "site/index.html").read_text()
+    assert "Made with" not in (site / "index.html").read_text()
 
 
 @pytest.mark.slow

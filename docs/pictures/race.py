@@ -1,8 +1,8 @@
 """Film `clearway view --example` as its two agents race to one target: `python race.py race.webp`.
 
 It needs Chromium, as the viewer's test does. The start is chosen: from here `shortest` bumps once and takes 17 steps,
-`collision-aware` 14. Which of them wins is typical, the bump is not. Counted in this viewer, by seeds from 0 on, `shortest`
-first, steps and collisions as means:
+`collision-aware` 14. Which of them wins is typical, the bump is not. Counted in this viewer, by seeds from 0 on,
+`shortest` first, steps and collisions as means:
 
     episodes                                  won by      fewer collisions    collisions      steps
     200 from this start to this target        16 :  91     9 : 24             0.140  0.085    16.6  15.3
