@@ -79,7 +79,6 @@ def test_a_damaged_scene_elsewhere_is_refused(
     with pytest.raises(SystemExit) as ended:
         main(["scenes", "inspect", "s3://rooms/set/one.h5"])
     assert ended.value.code == 2
-<<<<<<< HEAD
     told = capsys.readouterr().err
     assert told.startswith("error: s3://rooms/set/one.h5: cannot be opened as HDF5")
     assert str(fetched_folder()) not in told
@@ -103,8 +102,6 @@ def test_commands_are_kept_and_told_without_secrets(word: str, monkeypatch: pyte
     plain = ("clearway", "train", word.format("https://host/a.h5"), "--frames", "9")
     assert record_of(small_request()).command == plain
     assert longer(words, Path("r"), 9) == " ".join([*plain, "--out r --resume"])
-=======
-    assert "cannot be opened as HDF5" in capsys.readouterr().err
 
 
 def test_addresses_named_one_by_one_are_fetched_together(
