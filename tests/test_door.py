@@ -40,6 +40,7 @@ def test_every_name_can_be_had_and_is_shown() -> None:
     assert set(clearway.__all__) >= OFFERED
     assert set(clearway.__all__) == {*clearway._HOME, "__version__"}
     assert set(dir(clearway)) >= set(clearway.__all__)
+    assert not {"TYPE_CHECKING", "_HOME", "_from_home", "register_with_gymnasium"} & set(dir(clearway))
     for name in clearway.__all__:
         assert getattr(clearway, name).__doc__
     shown = pydoc.plain(pydoc.render_doc(clearway))

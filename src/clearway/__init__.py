@@ -119,8 +119,11 @@ def _from_home(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """What is loaded, and what can be asked for."""
-    return sorted({*globals(), *_HOME})
+    """What can be asked for, and the modules that are loaded."""
+    from types import ModuleType
+
+    loaded = [name for name, value in globals().items() if name.startswith("__") or isinstance(value, ModuleType)]
+    return sorted({*loaded, *__all__})
 
 
 register_with_gymnasium()

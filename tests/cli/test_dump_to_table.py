@@ -86,6 +86,7 @@ def test_inspect_prints_the_figures_of_the_room(clearway, trained, tmp_path):
 def test_inspect_without_json_says_the_same(clearway, trained):
     answer = clearway("scenes", "inspect", trained.scene)
     assert answer.code == 0
+    assert "None" not in answer.out
     rows = dict(line.split("  ", 1) for line in answer.out.splitlines())
     assert rows["states"].strip() == "76"
     assert rows["zones"].strip() == "free 12, precollision 24, collision 40"

@@ -160,6 +160,8 @@ def _print_table(content: dict[str, object]) -> None:
 
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for key, value in content.items():
+        if value is None:
+            continue
         table.add_row(key.replace("_", " "), Text(printable(_cell(value))))
     stdout_console().print(table)
 
