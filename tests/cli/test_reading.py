@@ -31,6 +31,28 @@ def test_a_run_s_settings_are_offered_to_train_alone(clearway, words):
     assert "YAML file" in text and ("run.yaml" in text) == (words == ("train",))
 
 
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (("train", "--frmes", 5), "Did you mean --frames? Help: clearway train --help"),
+        (("scenes", "build", "bathroom"), "Did you mean --room bathroom? Help: clearway scenes build --help"),
+        (("trian",), "Did you mean train?"),
+    ],
+)
+def test_a_refusal_names_what_was_meant_and_the_command_s_own_help(clearway, words, part):
+    line = clearway(*words).refusal(part)
+    assert "full helptext" not in line and line.endswith(" --help")
+
+
+@pytest.mark.parametrize("words", [(), ("runs", "list"), ("evaluate",), ("view",)])
+def test_help_is_as_wide_as_the_terminal_and_its_headings_are_plain(clearway, monkeypatch, words):
+    monkeypatch.setenv("COLUMNS", "70")
+    text = clearway(*words, "--help").out
+    assert max(map(len, text.splitlines())) <= 70
+    for internal in ("parameters options", "room options", "perturbations options", "these fields", "(default: '')"):
+        assert internal not in text
+
+
 def test_choices_stand_in_the_order_written(clearway):
     assert "{bathroom,bedroom,living_room,kitchen,all}" in clearway("scenes", "build", "--help").out
 

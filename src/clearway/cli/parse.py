@@ -4,17 +4,60 @@ from __future__ import annotations
 
 import io
 import re
+import shutil
+import sys
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from typing import TextIO, get_args, get_type_hints
 
 from clearway.cli.known import command_of, options, subcommands
+from clearway.cli.reading import without_none
 from clearway.errors import ClearwayError
 from clearway.spelling import did_you_mean
 
 CORNERS = ("╭", "╰")
 LENGTHY = ("Perhaps you meant", "Argument helptext")  # parts of a refusal that --help says better
 _UNKNOWN = re.compile(r"Unrecognized options: (.+)")
+_FULL_HELP = re.compile(r"For full helptext, run:? .*$")
 _NO_CHOICE = re.compile(r"invalid choice '(.*)' for argument ")
+
+
+class _Kept(io.StringIO):
+    """What is printed, kept; it looks like the stream that it stands for, by which the printer chooses its letters."""
+
+    def __init__(self, stream: TextIO) -> None:
+        super().__init__()
+        self._stream = stream
+
+    @property
+    def encoding(self) -> str | None:  # type: ignore[override]
+        """Of the stream."""
+        return getattr(self._stream, "encoding", None)
+
+    def isatty(self) -> bool:
+        """Of the stream."""
+        return self._stream.isatty()
+
+    def fileno(self) -> int:
+        """Of the stream."""
+        return self._stream.fileno()
+
+
+def _wrapped(helped: str) -> str:
+    """Help with its first lines, usage and description, as wide as the terminal, as its frames are already."""
+    width = shutil.get_terminal_size().columns
+    lines = helped.splitlines(keepends=True)
+    framed = (*CORNERS, "│", "|", "+")
+    whole = (len(line) <= width + 1 or line.startswith(framed) for line in lines)
+    return "".join(line if kept else _folded(line, width) for line, kept in zip(lines, whole, strict=True))
+
+
+def _folded(line: str, width: int) -> str:
+    usage = line.startswith("usage:")
+    text = line.replace(",", ", ") if usage else line
+    indent = " " * len("usage: ") if usage else ""
+    return textwrap.fill(text, width, subsequent_indent=indent, break_on_hyphens=False) + "\n"
 
 
 @contextmanager
@@ -25,25 +68,45 @@ def refusals_in_one_line(words: Sequence[str], commands: object) -> Iterator[Non
         words: that are read.
         commands: the union of all commands' classes.
     """
-    said = io.StringIO()
+    said, helped = io.StringIO(), _Kept(sys.stdout)
     try:
-        with redirect_stderr(said):
+        with redirect_stderr(said), redirect_stdout(helped):
             yield
     except SystemExit as leaving:
         if not leaving.code:
             raise
-        refused = one_line(said.getvalue())
-        raise ClearwayError(_with_suggestion(refused, words, commands)) from leaving
+        refused = _FULL_HELP.sub("", one_line(said.getvalue()))
+        named = " ".join(["clearway", *words[: command_of(words, commands)[1]]])
+        raise ClearwayError(f"{_with_suggestion(refused, words, commands).strip()} Help: {named} --help") from leaving
+    finally:
+        sys.stdout.write(_wrapped(helped.getvalue()))
 
 
 def _with_suggestion(refused: str, words: Sequence[str], commands: object) -> str:
     """A refusal with the name that was probably meant, where there is one."""
+    if choice := _choice_without_option(refused, words, commands):
+        return f"{refused.rstrip('. ')}. Did you mean {choice}?"
     told, _, rest = refused.partition(". ")
     for pattern, names in ((_UNKNOWN, _names_there(words, commands)), (_NO_CHOICE, _choices(refused))):
         if found := pattern.match(told):
             word = next((part for part in found[1].split(", ") if part.startswith("--")), found[1].split(", ")[0])
             return f"{told}.{did_you_mean(word.split('=')[0], names)} {rest}"
     return refused
+
+
+def _choice_without_option(refused: str, words: Sequence[str], commands: object) -> str:
+    """The option with its value, where a word that was not recognised is one of an option's choices."""
+    kind, used = command_of(words, commands)
+    found = _UNKNOWN.search(refused)
+    if kind is None or found is None:
+        return ""
+    for word in words[used:]:
+        if word not in re.split(r"[, .]+", found[1]):
+            continue
+        for name, (owner, field) in options(kind).items():
+            if word in get_args(without_none(get_type_hints(owner)[field.name])):
+                return f"--{name} {word}"
+    return ""
 
 
 def _names_there(words: Sequence[str], commands: object) -> list[str]:

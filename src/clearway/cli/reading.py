@@ -28,6 +28,7 @@ PLACEHOLDERS = {int: "N", float: "X", str: "WORD", Path: "PATH"}  # of an option
 
 CONFIG_HELP = "Take options from a YAML file, a name and a value a line. The command line goes before."
 CONFIG_HELP_OF_TRAIN = CONFIG_HELP.replace("YAML file,", "YAML file, such as a run's run.yaml,")
+GROUPS = {"parameters": "reward", "room": "live", "perturbations": ""}  # of options, in the headings of help
 
 
 def reading() -> ConstructorRegistry:
@@ -112,7 +113,8 @@ def _told_plainly(field: StructFieldSpec) -> StructFieldSpec:
     kind, *said = get_args(field.type) if get_origin(field.type) is Annotated else (field.type,)
     placeholder = _placeholder(kind)
     if placeholder is None:
-        return field
+        headed: Any = Annotated[(kind, tyro.conf.arg(name=GROUPS.get(field.name, field.name)), *said)]
+        return replace(field, type=headed) if is_dataclass(kind) else field
     if tyro.conf.Positional in said and field.default is not MISSING_NONPROP:
         placeholder = f"[{placeholder}]"
     metavar = None if placeholder == "" else placeholder
@@ -138,7 +140,7 @@ def _placeholder(kind: Any) -> str | None:
 
 def _default_told(label: str) -> str:
     """The end of an option's help; an option that changes nothing where it is left out says so in its help itself."""
-    if label in ("", "None", "False"):
+    if label in ("", "''", "None", "False"):
         return ""
     return "(on by default)" if label == "True" else f"(default: {label})"
 

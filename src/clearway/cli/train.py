@@ -69,7 +69,8 @@ class Train:
     seed: int = 0
     """Of parameters, environments, actions and the choice of targets."""
     threads: int | None = None
-    """Threads of torch, or processes of a3c. Results repeat bit for bit at one number of threads, and a3c's with 1."""
+    """Threads of torch, or processes of a3c; by default one a core. Results repeat bit for bit at one number of
+    threads, and a3c's with 1."""
     workers: int = 1
     """Processes of this machine that train one agent together, a scene each at least; ppo, a2c, bc. The result is that
     of one, up to rounding. One that dies is replaced. See docs/scale.md."""

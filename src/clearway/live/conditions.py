@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Perturbations:
-    """How the live room differs from the grid; all zero: not at all. The command line's flags are these fields."""
+    """How the live room differs from the grid; all zero: not at all."""
 
     distance_noise: float = 0.0
     """Standard deviation of the length of a move, metres."""
