@@ -2,18 +2,35 @@
 
 from pathlib import Path
 
-from PIL import Image, ImageSequence
+import numpy as np
+from PIL import Image, ImageColor, ImageSequence
 
-from clearway.examples.contrast import FILE, SHOWN_PX, contrast
+from clearway.examples.contrast import FILE, contrast
+from clearway.viz.figures import BY_REWARD
 
 
-def test_the_example_s_episode_moves_and_its_caption_has_the_contrast(tmp_path: Path) -> None:
-    picture = contrast(tmp_path)
-    assert picture.file == FILE
-    with Image.open(tmp_path / FILE) as film:
-        waits = [frame.copy().info["duration"] for frame in ImageSequence.Iterator(film)]  # known once it is read
-        assert film.width == SHOWN_PX and film.info["loop"] == 0
-    assert len(waits) == 18 and waits[-1] > waits[0]  # the start and 17 steps; it waits at the end
-    assert (tmp_path / FILE).stat().st_size < 2_000_000
-    assert "shortest bumped 1 time, collision-aware bumped 0 times" in picture.caption
-    assert "shortest 0.116 (0.082 to 0.156), collision-aware 0.040 (0.020 to 0.062)" in picture.caption
+def test_the_example_s_episode_moves_under_the_contrast(tmp_path: Path) -> None:
+    opening = contrast(tmp_path)
+    lengths = []
+    for picture, name in zip(opening.pictures, ("shortest", "collision-aware"), strict=True):
+        assert picture.file == FILE.format(name)
+        with Image.open(tmp_path / picture.file) as film:
+            waits, last = [], None
+            for frame in ImageSequence.Iterator(film):
+                last = np.asarray(frame.convert("RGB")).astype(int)
+                waits.append(frame.info["duration"])  # known once it is read
+            assert film.info["loop"] == 0
+        lengths.append(sum(waits))
+        assert len(waits) > 14 and waits[-1] > waits[0]  # it waits at the end
+        assert (tmp_path / picture.file).stat().st_size < 1_000_000
+        assert last is not None
+        near = np.abs(last - ImageColor.getrgb(BY_REWARD[name].colour)).max(axis=2) < 25
+        assert near.mean() > 0.003  # its way has its colour
+    assert lengths[0] == lengths[1]  # both play in step
+    assert [picture.caption for picture in opening.pictures] == [
+        "shortest: 17 steps, 1 collision",
+        "collision-aware: 14 steps, 0 collisions",
+    ]
+    told = [(figure.value, figure.note) for figure in opening.figures]
+    assert told == [("0.116", "95 %: 0.082 to 0.156"), ("0.040", "95 %: 0.020 to 0.062")]
+    assert "start was chosen" in opening.text

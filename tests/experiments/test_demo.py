@@ -64,7 +64,7 @@ def linked_files(page: Path) -> set[str]:
 def check_demo(out: Path) -> None:
     """What every demo leaves behind."""
     links = linked_files(out / "index.html")
-    assert {"pictures/contrast.webp", "pictures/map.png", "pictures/curves.png"} <= links
+    assert {"pictures/contrast-shortest.webp", "pictures/map.png", "pictures/curves.png"} <= links
     assert {f"pictures/episode-{agent}.png" for agent in ("collision-aware", "shortest")} <= links
     assert len([link for link in links if link.startswith("pictures/view-")]) == 6
     for link in links:

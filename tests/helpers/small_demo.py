@@ -12,7 +12,7 @@ from PIL import Image
 from clearway.evaluation.runs import evaluate_runs
 from clearway.examples.contrast import FILE
 from clearway.scenes.scene import Scene
-from clearway.viz.page import Picture
+from clearway.viz.page import KeyFigure, Opening, Picture
 from helpers.made import grid_scene
 from helpers.small_pictures import shrink_pictures
 from helpers.small_runs import FEATURES, small_learner
@@ -26,11 +26,12 @@ def small_bathroom() -> Scene:
     return grid_scene(1, width=width, depth=depth, obstacle_share=0.1, feature_count=FEATURES, name="bathroom")
 
 
-def still(out: Path) -> Picture:
-    """A picture in place of the film that a page begins with."""
-    (out / FILE).parent.mkdir()
-    Image.new("RGB", (8, 6)).save(out / FILE)
-    return Picture(FILE, "The example", "an agent")
+def still(out: Path) -> Opening:
+    """A picture in place of the films that a page begins with."""
+    file = FILE.format("shortest")
+    (out / file).parent.mkdir()
+    Image.new("RGB", (8, 6)).save(out / file)
+    return Opening([KeyFigure("shortest: collisions an episode", "0.1")], [Picture(file, "The example", "an agent")])
 
 
 def shrink_demo(patch: pytest.MonkeyPatch) -> None:

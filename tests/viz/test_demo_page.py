@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from importlib.resources import files
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +15,8 @@ from PIL import Image
 from clearway.experiments.demo import DemoRequest, DemoResult, run_demo
 from clearway.viz import demo_page
 from clearway.viz.demo_page import VIEWS, make_demo_page
-from clearway.viz.page import Picture
+from clearway.viz.figures import BY_REWARD, LINES
+from clearway.viz.page import KeyFigure, Opening, Picture
 from clearway.zones import scene_zones
 from helpers.small_demo import shrink_demo
 
@@ -62,9 +65,10 @@ def test_every_link_leads_to_a_picture_beside_the_page(result, shown):
 
 
 def test_it_opens_with_the_pictures_that_are_given(result):
-    opening = Picture("pictures/map.png", "Both & each", "both")
-    page = make_demo_page(result, COMMAND, [opening]).read_text(encoding="utf-8")
-    assert page.index("Both &amp; each") < page.index("shortest: collisions")
+    opening = Opening([KeyFigure("bumps", "0.1")], [Picture("pictures/map.png", "Both & each", "both")], "Chosen.")
+    page = make_demo_page(result, COMMAND, opening).read_text(encoding="utf-8")
+    places = [page.index(text) for text in ("bumps", "Both &amp; each", "Chosen.", "Before anything is trained")]
+    assert places == sorted(places)
 
 
 def test_all_pictures_are_shown(shown):
@@ -85,16 +89,24 @@ def test_the_generalist_is_shown_in_a_room_of_the_seed_first(result, shown):
     assert shown.text.index("Before anything is trained") < shown.text.index("The figures")
 
 
-def test_key_figures_are_those_of_the_table(result, shown):
-    for evaluation in result.evaluations:
-        if evaluation.agent in ("collision-aware", "shortest") and evaluation.protocol.action_selection == "sampled":
-            values, intervals = evaluation.average.values, evaluation.average.intervals
-            low, high = intervals["collisions"]
-            assert f"{evaluation.agent}: steps\n{values['steps']:.2f}\nshortest path " in shown.text
-            assert f"{values['collisions']:.3f}\n95 %: {low:.3f} to {high:.3f}\n" in shown.text
-    ideal = result.evaluations[-1]
-    assert ideal.agent == "shortest path"
-    assert shown.text.count(f"shortest path {ideal.average.values['steps']:.2f}\n") == 2
+def test_four_rows_stand_open_and_all_are_folded(result, shown):
+    assert "All rows" in shown.text
+    page = (result.out / "index.html").read_text(encoding="utf-8")
+    table, folded, _ = page[page.index("<h2>The figures") :].split("<details>", 2)
+    names = re.findall(r'<th scope="row">\s*([^<\n]+)', table)
+    assert names == ["collision-aware", "shortest", "random", "shortest path"]
+    assert len(re.findall('<th scope="row">', folded)) == len(result.evaluations) > 4
+
+
+def test_an_agent_has_one_colour_on_the_map_in_the_curves_and_in_the_viewer(result, monkeypatch):
+    curves = []
+    monkeypatch.setattr(demo_page, "draw_curves", lambda runs, path, looks: curves.append((list(runs), looks)))
+    make_demo_page(result, COMMAND)
+    assert curves == [(["shortest", "collision-aware"], LINES)]  # as the walks on the map, see below
+    script = (files("clearway.view") / "page/looks.js").read_text()
+    viewer = re.findall(r'colour: "(#\w+)", halo: "(#\w+)"', script)
+    assert viewer[:2] == [(look.colour, look.halo) for look in BY_REWARD.values()]
+    assert list(BY_REWARD.values()) == list(LINES[:2])
 
 
 def test_the_page_says_what_made_it(shown):
@@ -111,7 +123,7 @@ def test_both_agents_are_drawn_on_one_map_from_one_start(result, monkeypatch):
     make_demo_page(result, COMMAND)
     unseen, drawn = maps
     assert [walk.label for walk in unseen["walks"]] == ["generalist"] and unseen["target"] == result.first.target
-    assert [walk.label for walk in drawn["walks"]] == ["collision-aware", "shortest"]
+    assert [walk.label for walk in drawn["walks"]] == ["shortest", "collision-aware"]
     assert len({int(walk.states[0]) for walk in drawn["walks"]}) == 1
     assert drawn["target"] == result.showcase.target
     assert np.array_equal(drawn["zones"], scene_zones(result.scene))

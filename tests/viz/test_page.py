@@ -1,5 +1,5 @@
 from clearway.evaluation.tables import Cell, TableText
-from clearway.viz.page import KeyFigure, Page, Picture, write_page
+from clearway.viz.page import KeyFigure, Opening, Page, Picture, write_page
 
 TABLE = TableText(
     ("agent", "solved", "steps"),
@@ -13,7 +13,7 @@ def full_page() -> Page:
         title="Two agents & a <room>",
         sentence='They "walk".',
         table=TABLE,
-        key_figures=[KeyFigure("steps", "9.1", "<9.4")],
+        opening=Opening([KeyFigure("steps", "9.1", "<9.4")]),
         maps=[Picture("pictures/map 1.png", "The <way>", alt='a "map"')],
         rooms=[Picture("pictures/a.png", "State 1"), Picture("pictures/b.png", "State 2")],
         more_tables={"Every target": TABLE},

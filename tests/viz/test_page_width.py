@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from clearway.evaluation.tables import COLUMNS, Cell, TableText
-from clearway.viz.page import KeyFigure, Page, write_page
+from clearway.viz.page import KeyFigure, Opening, Page, write_page
 from helpers.browser import opened_browser
 
 NAMES = (("collision-aware", "sampled"), ("shortest, alpha -0.02", "argmax untried"), ("optimum", "collision-aware"))
@@ -23,7 +23,7 @@ def widest() -> Page:
     page = Page("Two agents in one room", "They walk.", table, more_tables={"Every target": table})
     return replace(
         page,
-        key_figures=[KeyFigure(f"figure {number}", "100 %", "99.9–100") for number in range(4)],
+        opening=Opening([KeyFigure(f"figure {number}", "100 %", "99.9–100") for number in range(4)]),
         commands=["clearway demo " + "--out a/very/long/folder " * 8],
         facts={"Hardware": "x" * 200},
     )

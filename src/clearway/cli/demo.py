@@ -47,7 +47,7 @@ class Demo:
             opening = contrast(Path(folder))  # before minutes of training, should it fail
             result = run_demo(request, show_progress=True)
             shutil.copytree(folder, result.out, dirs_exist_ok=True)
-        page = make_demo_page(result, self._command(), [opening])
+        page = make_demo_page(result, self._command(), opening)
         if self.json:
             print_json([evaluation.to_json() for evaluation in result.evaluations])
             return

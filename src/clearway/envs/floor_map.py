@@ -5,6 +5,8 @@ Each cell is made of triangles, one a heading (the upper one looks along +z), co
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from PIL import Image, ImageDraw
 
@@ -20,6 +22,18 @@ OPACITY_ON_PICTURE = {Zone.FREE: 0.3, Zone.PRECOLLISION: 0.6, Zone.COLLISION: 0.
 MAX_CELL_PX = 52  # in a very small room the map stays below the size it is given
 PICTURE_FADE = 0.3  # share of white in the picture from above, so that the marks stand out
 PATH_WIDTH, PATH_EDGE_WIDTH = 0.16, 0.28  # in cells
+
+
+@dataclass(frozen=True)
+class Ink:
+    """The colours of an agent and of its way."""
+
+    agent: str = colours.AGENT
+    path: str = colours.PATH
+    edge: str = "white"
+
+
+PLAIN = Ink()
 
 
 class FloorMap:
@@ -41,23 +55,24 @@ class FloorMap:
         self._left_m, self._top_m = x_min, z_max
         self._base = self._paint_base(zones)
 
-    def draw(self, states: np.ndarray, bumps: np.ndarray, target: int) -> Image.Image:
+    def draw(self, states: np.ndarray, bumps: np.ndarray, target: int, ink: Ink = PLAIN) -> Image.Image:
         """The map with an episode on it.
 
         Args:
             states: (T + 1,) int, the path in the scene's own numbering; the agent is at its end.
             bumps: (B, 2) int, state and action of each blocked move.
             target: the target state.
+            ink: of the agent.
         """
         image = self._base.copy()
         pen = ImageDraw.Draw(image)
-        self._draw_path(pen, states)
+        self._draw_path(pen, states, ink)
         draw_target(pen, self._at(target), self._cell_px, self._heading(target))
         for state, action in bumps.tolist():
             ahead = 0.5 if action == Action.MOVE_FORWARD else -0.5
             draw_bump(pen, self._at(state, ahead * self._scene.cell_size_m), self._cell_px)
         here = int(states[-1])
-        draw_agent(pen, self._at(here), self._cell_px, self._heading(here))
+        draw_agent(pen, self._at(here), self._cell_px, self._heading(here), colour=ink.agent, edge=ink.edge)
         return image.resize(self.size, Image.Resampling.LANCZOS)
 
     def _paint_base(self, zones: np.ndarray) -> Image.Image:
@@ -88,12 +103,12 @@ class FloorMap:
             pen.polygon([self._at(state), self._at(state, half, -aside), self._at(state, half, aside)], fill=1)
         return np.asarray(mask)
 
-    def _draw_path(self, pen: ImageDraw.ImageDraw, states: np.ndarray) -> None:
+    def _draw_path(self, pen: ImageDraw.ImageDraw, states: np.ndarray, ink: Ink) -> None:
         points = [self._at(state) for state in states.tolist()]
-        for share, colour in ((PATH_EDGE_WIDTH, "white"), (PATH_WIDTH, colours.PATH)):
+        for share, colour in ((PATH_EDGE_WIDTH, ink.edge), (PATH_WIDTH, ink.path)):
             if len(set(points)) > 1:
                 pen.line(points, fill=colour, width=round(share * self._cell_px), joint="curve")
-        for radius, colour in ((0.26, "white"), (0.20, colours.PATH), (0.09, "white")):
+        for radius, colour in ((0.26, ink.edge), (0.20, ink.path), (0.09, ink.edge)):
             draw_disc(pen, points[0], radius * self._cell_px, colour)
 
     def _heading(self, state: int) -> float:

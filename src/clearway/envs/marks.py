@@ -22,11 +22,19 @@ STAR_WAIST = 0.48  # inner radius of the star as a share of the outer
 Point = tuple[float, float]
 
 
-def draw_agent(pen: ImageDraw.ImageDraw, centre: Point, cell_px: float, heading_deg: float) -> None:
-    """An arrowhead along the heading, with a white edge."""
+def draw_agent(
+    pen: ImageDraw.ImageDraw,
+    centre: Point,
+    cell_px: float,
+    heading_deg: float,
+    *,
+    colour: str = colours.AGENT,
+    edge: str = "white",
+) -> None:
+    """An arrowhead along the heading, with an edge."""
     outline = ((1.0, 0.0), (-0.80, 0.78), (-0.42, 0.0), (-0.80, -0.78))  # ahead, right
-    for size, colour in ((0.62, "white"), (0.46, colours.AGENT)):
-        pen.polygon(_turned(outline, centre, size * cell_px, heading_deg), fill=colour)
+    for size, fill in ((0.62, edge), (0.46, colour)):
+        pen.polygon(_turned(outline, centre, size * cell_px, heading_deg), fill=fill)
 
 
 def draw_target(pen: ImageDraw.ImageDraw, centre: Point, cell_px: float, heading_deg: float | None = None) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clearway import colours
-from clearway.viz.figures import CURVES, LineStyle, new_figure
+from clearway.viz.figures import CURVES, LineStyle, Look, halo, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Rows = Sequence[Mapping[str, float]]
 COLUMNS = 3
 PANEL_WIDTH_IN, PANEL_HEIGHT_IN, LEGEND_IN = 2.9, 2.05, 0.35
+LINE_PT, HALO_PT = 1.8, 3.0
 SMOOTH_SHARE = 0.04  # of a run's rows that the strong line averages
 
 
@@ -45,7 +46,13 @@ PANELS = (
 
 
 def draw_curves(
-    runs: Mapping[str, Rows], path: Path, *, x: str = "frames", title: str = "", panels: Sequence[Panel] = PANELS
+    runs: Mapping[str, Rows],
+    path: Path,
+    *,
+    x: str = "frames",
+    title: str = "",
+    panels: Sequence[Panel] = PANELS,
+    looks: Sequence[LineStyle] = CURVES,
 ) -> None:
     """Draw the learning curves of some runs and save them as PNG. Figures and rows that are missing are left out.
 
@@ -55,6 +62,7 @@ def draw_curves(
         x: the figure along the horizontal axis: "frames" or "seconds".
         title: stands above.
         panels: the figures to draw, in this order.
+        looks: of the runs, in their order.
     """
     panels = [panel for panel in panels if any(len(_series(rows, x, panel)[0]) for rows in runs.values())]
     columns = min(COLUMNS, max(1, len(panels)))
@@ -70,7 +78,7 @@ def draw_curves(
             axes = figure.add_subplot(lines, columns, index + 1)
             series = [_series(rows, x, panel) for rows in runs.values()]
             for style, (name, (across, up)) in enumerate(zip(runs, series, strict=True)):
-                _draw_series(axes, across, up, name, CURVES[style % len(CURVES)])
+                _draw_series(axes, across, up, name, looks[style % len(looks)])
             lowest = min(float(up.min()) for _, up in series if len(up))
             _dress(axes, panel, x, lowest, with_x_label=index >= len(panels) - columns)
         handles, labels = figure.axes[0].get_legend_handles_labels()
@@ -97,7 +105,9 @@ def _draw_series(axes: Axes, across: np.ndarray, up: np.ndarray, name: str, look
     width = max(1, round(SMOOTH_SHARE * len(up)))
     if width > 1:
         axes.plot(across, up, color=look.colour, alpha=0.22, linewidth=0.9)
-    axes.plot(across, _running_mean(up, width), color=look.colour, linestyle=look.pattern, linewidth=1.8, label=name)
+    mean, effects = _running_mean(up, width), halo(look.halo, HALO_PT)
+    line: Look = {"color": look.colour, "linestyle": look.pattern, "linewidth": LINE_PT, "path_effects": effects}
+    axes.plot(across, mean, label=name, **line)
 
 
 def _running_mean(values: np.ndarray, width: int) -> np.ndarray:

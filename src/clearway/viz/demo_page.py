@@ -9,16 +9,16 @@ import numpy as np
 
 from clearway.agents.generalist import GENERALIST
 from clearway.evaluation.summary import Evaluation
-from clearway.evaluation.tables import table_text
+from clearway.evaluation.tables import REFERENCES, table_text
 from clearway.experiments.demo import DemoResult
 from clearway.experiments.demo_generalist import FirstWalk
 from clearway.learn.provenance import facts_text, hardware, package_versions
 from clearway.viz.contact_sheet import draw_contact_sheet
 from clearway.viz.curves import draw_curves
-from clearway.viz.figures import counted
+from clearway.viz.figures import BY_REWARD, LINES, counted
 from clearway.viz.held import held_picture
 from clearway.viz.maps import Walk, draw_map
-from clearway.viz.page import KeyFigure, Page, Picture, write_page
+from clearway.viz.page import Opening, Page, Picture, write_page
 from clearway.zones import scene_zones
 
 PICTURES = "pictures"
@@ -30,26 +30,28 @@ SENTENCE = (
 )
 
 
-def make_demo_page(result: DemoResult, command: str, opening: Sequence[Picture] = ()) -> Path:
+def make_demo_page(result: DemoResult, command: str, opening: Opening | None = None) -> Path:
     """Draw the pictures of a demo and write its index.html; returns the page's path.
 
     Args:
         result: what was trained and evaluated.
         command: the command line that made the demo.
-        opening: pictures that are in its folder already, shown first.
+        opening: shown first; its pictures are in the demo's folder already.
     """
     first = result.evaluations[0]
     page = Page(
         title="clearway: anticipating collisions on the way to a picture",
         sentence=SENTENCE,
-        opening=opening,
-        key_figures=_key_figures(result.evaluations),
+        opening=opening or Opening(),
         unseen=_unseen(result),
         unseen_text=_unseen_text(result.first),
         maps=_maps(result),
         rooms=_views(result),
-        table=table_text(result.evaluations, "scenes"),
-        more_tables={"Every target": table_text(result.evaluations, "targets")},
+        table=table_text(_one_each(result.evaluations), "scenes", width="page"),
+        more_tables={
+            "All rows": table_text(result.evaluations, "scenes"),
+            "Every target": table_text(result.evaluations, "targets"),
+        },
         contact_sheets=_contact_sheets(result),
         curves=_curves(result),
         commands=(command,),
@@ -67,20 +69,12 @@ def make_demo_page(result: DemoResult, command: str, opening: Sequence[Picture] 
     return write_page(result.out, page)
 
 
-def _key_figures(evaluations: Sequence[Evaluation]) -> list[KeyFigure]:
-    shortest = evaluations[-1].average.values["steps"]
-    figures = []
+def _one_each(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
+    """Every agent by its first way of acting, without the exact optima."""
+    first: dict[str, Evaluation] = {}
     for evaluation in evaluations:
-        if evaluation.protocol.action_selection == "sampled" and evaluation.agent in ("collision-aware", "shortest"):
-            values, intervals = evaluation.average.values, evaluation.average.intervals
-            low, high = intervals["collisions"]
-            figures += [
-                KeyFigure(f"{evaluation.agent}: steps", f"{values['steps']:.2f}", f"shortest path {shortest:.2f}"),
-                KeyFigure(
-                    f"{evaluation.agent}: collisions", f"{values['collisions']:.3f}", f"95 %: {low:.3f} to {high:.3f}"
-                ),
-            ]
-    return figures
+        first.setdefault(evaluation.agent, evaluation)
+    return [one for name, one in first.items() if not name.startswith(tuple(REFERENCES))]
 
 
 def _training(result: DemoResult) -> str:
@@ -95,9 +89,9 @@ def _maps(result: DemoResult) -> list[Picture]:
         result.out / file,
         zones=scene_zones(result.scene),
         target=show.target,
-        walks=[Walk(name, walk.states) for name, walk in show.walks.items()],
+        walks=[Walk(name, show.walks[name].states) for name in BY_REWARD],
     )
-    steps = ", ".join(f"{name} {len(walk.actions)}" for name, walk in show.walks.items())
+    steps = ", ".join(f"{name} {len(show.walks[name].actions)}" for name in BY_REWARD)
     caption = f"The same start and target for both agents. Steps: {steps}; shortest path {show.shortest_path_steps}."
     return [Picture(file, caption, "The room from above with zones and the ways of both agents")]
 
@@ -140,7 +134,8 @@ def _unseen(result: DemoResult) -> list[Picture]:
 def _contact_sheets(result: DemoResult) -> list[Picture]:
     zones, show = scene_zones(result.scene), result.showcase
     pictures = []
-    for name, walk in show.walks.items():
+    for name in BY_REWARD:
+        walk = show.walks[name]
         file = f"{PICTURES}/episode-{name}.png"
         draw_contact_sheet(
             result.scene,
@@ -157,7 +152,7 @@ def _contact_sheets(result: DemoResult) -> list[Picture]:
 
 def _curves(result: DemoResult) -> list[Picture]:
     file = f"{PICTURES}/curves.png"
-    draw_curves({name: run.metrics() for name, run in result.runs.items()}, result.out / file)
+    draw_curves({name: result.runs[name].metrics() for name in BY_REWARD}, result.out / file, looks=LINES)
     return [Picture(file, "Training episodes: sampled actions, random starts, cut after 200 steps.", "Learning curves")]
 
 

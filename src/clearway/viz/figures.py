@@ -13,6 +13,7 @@ from clearway.files import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.patheffects import AbstractPathEffect
 
 Look = dict[str, Any]
 """Keyword arguments of matplotlib's artists."""
@@ -58,6 +59,9 @@ LINES = (
 )
 """Of the first, second, ... agent on a map."""
 
+BY_REWARD = {"shortest": LINES[0], "collision-aware": LINES[1]}
+"""Of the demo's and the example's agents, in their order; the viewer has the same (`view/page/looks.js`)."""
+
 CURVES = (
     LineStyle("#0b3d91", "#ffffff"),
     LineStyle("#d55e00", "#ffffff", (5, 1.6)),
@@ -71,6 +75,13 @@ CURVES = (
 def counted(count: int, noun: str) -> str:
     """For example "1 step" and "2 steps"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def halo(colour: str, width_pt: float) -> list[AbstractPathEffect]:
+    """What draws the halo of a line."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    return [Stroke(linewidth=width_pt, foreground=colour), Normal()]
 
 
 @contextmanager

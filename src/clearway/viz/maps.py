@@ -15,13 +15,12 @@ import numpy as np
 
 from clearway import colours
 from clearway.scenes.scene import Scene
-from clearway.viz.figures import LINES, LineStyle, Look, counted, new_figure
+from clearway.viz.figures import LINES, LineStyle, Look, counted, halo, new_figure
 from clearway.zones import Zone
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.patheffects import AbstractPathEffect
 
 WIDTH_IN = 6.4
 LEGEND_HEIGHT_IN, TITLE_HEIGHT_IN = 0.9, 0.3
@@ -169,7 +168,7 @@ def _draw_walk(axes: Axes, scene: Scene, walk: Walk, style: LineStyle, lane_m: f
         axes.scatter(*bumps.T, color=style.colour, **cross)
     steps, collisions = len(walk.states) - 1, int(walk.bumps.sum())
     label = f"{walk.label}: {counted(steps, 'step')}, {counted(collisions, 'collision')}"
-    return Line2D([], [], linestyle=style.pattern, label=label, path_effects=_edge(style.halo, HALO_PT), **line)
+    return Line2D([], [], linestyle=style.pattern, label=label, path_effects=halo(style.halo, HALO_PT), **line)
 
 
 def _draw_arrows(axes: Axes, places: np.ndarray, every: int, style: LineStyle) -> None:
@@ -228,10 +227,3 @@ def _draw_scale_bar(axes: Axes, right_m: float, low_m: float) -> None:
     ends_m = [right_m - SCALE_BAR_M - 0.02, right_m - 0.02]
     axes.plot(ends_m, [height_m] * 2, color=colours.INK, linewidth=2, marker="|", markersize=7)
     axes.text(ends_m[0] - 0.08, height_m, f"{SCALE_BAR_M:g} m", ha="right", va="center", fontsize=8)
-
-
-def _edge(colour: str, width_pt: float) -> list[AbstractPathEffect]:
-    """What draws a line's halo in a legend."""
-    from matplotlib.patheffects import Normal, Stroke
-
-    return [Stroke(linewidth=width_pt, foreground=colour), Normal()]

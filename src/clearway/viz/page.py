@@ -30,11 +30,21 @@ class Picture:
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """One figure of the summary: what it is, its value, and what belongs beside it (an interval, a reference)."""
+    """One figure of the summary: what it is, its value, what belongs beside it, and whose colour it has."""
 
     name: str
     value: str
     note: str = ""
+    colour: str = ""
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What one sees first: figures, pictures of what they mean, and what they are of."""
+
+    figures: Sequence[KeyFigure] = ()
+    pictures: Sequence[Picture] = ()
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -45,7 +55,6 @@ class Page:
         title: the headline.
         sentence: what this is, in one sentence.
         opening: what one sees first.
-        key_figures: the summary.
         unseen: the generalist's way in a room that it has never entered, and what it saw.
         unseen_text: how that went.
         maps: the room from above with the agents' ways.
@@ -61,8 +70,7 @@ class Page:
     title: str
     sentence: str
     table: TableText
-    opening: Sequence[Picture] = ()
-    key_figures: Sequence[KeyFigure] = ()
+    opening: Opening = Opening()
     unseen: Sequence[Picture] = ()
     unseen_text: str = ""
     maps: Sequence[Picture] = ()
