@@ -1,5 +1,6 @@
 """What is said of servers that fail, and how soon."""
 
+import gc
 import os
 import signal
 import threading
@@ -205,13 +206,17 @@ def test_a_file_that_fails_ends_the_others(tmp_path: Path, capfd: pytest.Capture
 
 @pytest.mark.parametrize("server", ["silent", "slow"])
 def test_ctrl_c_ends_what_is_under_way(
-    server: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    server: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     pressed: list[float] = []
 
     def press() -> None:
-        pressed.append(time.monotonic())
-        os.kill(os.getpid(), signal.SIGINT)
+        if not pressed:
+            pressed.append(time.monotonic())
+            os.kill(os.getpid(), signal.SIGINT)
 
     monkeypatch.setattr(store, "SILENCE_S", 6)
     monkeypatch.setattr(Trickling, "on_first_byte", staticmethod(press))
@@ -224,7 +229,21 @@ def test_ctrl_c_ends_what_is_under_way(
         later.cancel()
         assert time.monotonic() - pressed[0] < 1.5
     assert not threads_of_pools()
+    gc.collect()  # what was left open is told of then
     assert capfd.readouterr().err == ""
+    assert not caplog.records
+
+
+def test_a_large_file_comes_in_one_stream(
+    s3: Callable[[str, bytes], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten parts of 50 MB of each of sixteen files would be 8 GB of memory."""
+    from s3fs import S3FileSystem
+
+    monkeypatch.setattr(S3FileSystem, "default_block_size", 1000)
+    monkeypatch.setattr(S3FileSystem, "_download_file_part_concurrent", None)
+    s3("a.h5", bytes(5000))
+    assert fetched(["s3://rooms/a.h5"], SUFFIXES)[0].stat().st_size == 5000
 
 
 def test_google_s_store(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,7 @@ class Bounds(fsspec.Callback):
 def bounded(system: Any, size: int) -> Callable[..., Coroutine[Any, Any, None]]:
     """The download of a file of so many bytes, in `Bounds` that begin anew with every try."""
 
-    async def get(address: str, path: str) -> None:
-        await system._get_file(address, path, callback=Bounds(size))
+    async def get(address: str, path: str, **options: Any) -> None:
+        await system._get_file(address, path, callback=Bounds(size), **options)
 
     return get

@@ -90,8 +90,10 @@ class Store:
                 extra = EXTRAS[self.scheme]
                 told = f"{without_secrets(address)}: {self.scheme}:// needs another package"
                 raise ClearwayError(f"{told}. Install it: pip install 'clearway[{extra}]'") from error
+        self._in_one_stream: dict[str, Any] = {}
         if self.scheme == "s3":
             self.system.retries = 1  # `_tried` tries again
+            self._in_one_stream = {"max_concurrency": 1}  # else ten parts of 50 MB of each large file are in memory
         self.tries = 1 if self.scheme == "gs" else TRIES  # Google's package tries again by itself
 
     def listed(self, address: str, suffixes: Sequence[str], stop: threading.Event = NEVER) -> list[dict[str, Any]]:
@@ -143,9 +145,8 @@ class Store:
             ClearwayError: it cannot be had whole.
         """
         with faults_named(file.address):
-            self._tried(
-                bounded(self.system, file.size), self.system._strip_protocol(file.address), str(path), stop=stop
-            )
+            there = self.system._strip_protocol(file.address)
+            self._tried(bounded(self.system, file.size), there, str(path), stop=stop, **self._in_one_stream)
         if (size := path.stat().st_size) != file.size:
             problem = f"{size:,} of {file.size:,} bytes came"
             raise ClearwayError(f"{without_secrets(file.address)}: {problem}. Try again; the file there may be damaged")
