@@ -29,11 +29,20 @@ def test_exports_that_cannot_be(clearway, trained, tmp_path, monkeypatch, words,
     assert not list(tmp_path.iterdir())
 
 
+def test_it_says_at_once_what_it_does(clearway, trained, tmp_path, monkeypatch):
+    monkeypatch.setattr("clearway.deploy.export._write", lambda path, *_: path.touch())
+    answer = clearway("export", trained.run, "--out", tmp_path / "policy.onnx", "--no-encoder")
+    begun, told = answer.err.splitlines()
+    assert begun == "exporting an agent for scene bathroom_02" and told.startswith("policy: ")
+
+
 @pytest.mark.slow
 def test_a_policy_exported_and_loaded(clearway, trained, tmp_path):
     out = tmp_path / "policy.onnx"
     answer = clearway("export", trained.run, "--format", "onnx", "--out", out, "--no-encoder")
     assert (answer.code, answer.out) == (0, "")
-    assert answer.err.startswith(f"policy: {out}, ") and answer.err.endswith("MB, for scene bathroom_02\n")
+    begun, told = answer.err.splitlines(keepends=True)
+    assert begun == "exporting an agent for scene bathroom_02\n"
+    assert told.startswith(f"policy: {out}, ") and told.endswith("MB, for scene bathroom_02\n")
     assert [path.name for path in tmp_path.iterdir()] == ["policy.onnx"]
     assert package.Navigator(out).card.scene == "bathroom_02"

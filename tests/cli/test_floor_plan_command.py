@@ -17,6 +17,7 @@ def test_a_plan_becomes_a_furnished_room(clearway, tmp_path, monkeypatch):
     words = ("--cell-size", 0.5, "--sensors", "rgb", "depth")
     answer = clearway("scenes", "import", "floor-plan", tmp_path / "nook.txt", *words, "--out", tmp_path / "scenes")
     assert answer.code == 0, answer
+    assert answer.err.startswith(f"{tmp_path / 'nook.txt'}: rendering and encoding nook\n")
     assert "nook.h5: 12 states, 3 cells of 0.5 m, 1 x 1 m" in answer.err
     found = clearway("scenes", "inspect", tmp_path / "scenes" / "nook.h5", "--json").json
     assert (found["states"], found["encoder"], found["source"]) == (12, "clearway", "floor_plan")

@@ -5,6 +5,8 @@ import shutil
 
 import pytest
 
+from clearway import progress
+
 ELLIPSIS = "…"
 
 
@@ -35,6 +37,12 @@ def test_evaluate_prints_three_rows_and_all_where_they_are_asked_for(narrow, tra
     every = narrow(*words, "--all")
     assert any("argmax" in line for line in every) and any(line.startswith(" optimum") for line in every)
     assert not any("--all" in line for line in every)
+
+
+def test_a_long_evaluation_tells_how_far_it_is(clearway, trained, monkeypatch):
+    monkeypatch.setattr(progress, "FIRST_LINE_S", 0.0)
+    answer = clearway("evaluate", trained.run, "--episodes", 1, "--step-limit", 5, "--json")
+    assert answer.json["others"] and answer.err.startswith("evaluating: 1 of 7 agents\n")
 
 
 def test_rows_of_targets_fit(narrow, trained):

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias, get_args
+from typing import Any, TypeAlias, get_args
 
 from clearway.agents.agent import Agent
 from clearway.agents.named import AgentMaker, Foreign, agent_maker, checked_agent, named_maker
@@ -155,6 +155,7 @@ def evaluate(
     episodes: int = EPISODES_PER_TARGET,
     step_limit: int = STEP_LIMIT,
     seed: int = 0,
+    show_progress: bool = False,
 ) -> EvaluateResult:
     """Evaluate an agent by the paper's protocol, beside exact optima, a random walk and shortest paths.
 
@@ -170,16 +171,18 @@ def evaluate(
         episodes: episodes a target.
         step_limit: steps after which an episode has failed.
         seed: of starts, sampled actions and the bootstrap.
+        show_progress: draw a progress bar; where there is no terminal, print a line now and then.
 
     Raises:
         ArgumentError: an argument is of the wrong kind or out of range.
         ClearwayError: the run cannot be read, a scene is missing or not the one that the agent was trained on, or an
             agent cannot walk there.
     """
-    settings = {
+    settings: dict[str, Any] = {
         "episodes_per_target": as_whole("episodes", episodes, 1),
         "step_limit": as_whole("step_limit", step_limit, 1),
         "seed": as_seed("seed", seed),
+        "show_progress": show_progress,
     }
     others = _makers(beside)
     found = None if scenes is None else load_scenes(scenes)
@@ -205,7 +208,7 @@ def _own(
     scenes: list[Scene] | None,
     targets: Targets,
     beside: Mapping[str, AgentMaker],
-    settings: Mapping[str, int],
+    settings: Mapping[str, Any],
 ) -> EvaluateResult:
     """The evaluation of an agent that has no run."""
     made = isinstance(agent, Agent) and not isinstance(agent, type)

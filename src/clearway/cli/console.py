@@ -39,6 +39,12 @@ def say(text: str) -> None:
     stderr_console().print(printable(text), soft_wrap=True)
 
 
+def say_begun(text: str) -> None:
+    """Say what takes a while, where no terminal shows how far it has come."""
+    if not stderr_console().is_terminal:
+        say(text)
+
+
 def say_made(folder: Path, paths: Sequence[Path], there: Set[Path]) -> None:
     """Say how many of some files of a folder were made, how many were there, and which they are."""
     made = sum(path not in there for path in paths)

@@ -218,6 +218,7 @@ class Evaluate:
             files,
             targets=HELD_OUT if self.held_out else None,
             beside=self.beside,
+            show_progress=True,
             episodes=episodes,
             step_limit=step_limit,
             seed=self.seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,7 +11,7 @@ import tyro
 
 from clearway.choices import GENERALIST, is_generalist
 from clearway.cli.arguments import check_ending, scene_files
-from clearway.cli.console import say
+from clearway.cli.console import say, say_begun
 from clearway.errors import ClearwayError, EncoderError
 
 
@@ -47,8 +48,9 @@ class ExportAgent:
             return
         files = scene_files(self.scenes) if self.scenes else None
         chosen = load_run_in_scene(self.folder, self.scene, checkpoint=self.checkpoint, files=files)
+        begun = partial(say_begun, f"exporting an agent for scene {chosen.scene.name}")
         try:
-            export_onnx(chosen, self.out, with_encoder=self.encoder)
+            export_onnx(chosen, self.out, with_encoder=self.encoder, on_begin=begun)
         except EncoderError as fault:
             raise EncoderError(f"{fault}, or export the policy alone with --no-encoder") from fault
         others = [name for name in chosen.scene_names if name != chosen.scene.name]
@@ -60,13 +62,15 @@ class ExportAgent:
 
     def _generalist(self) -> None:
         from clearway.agents.generalist import Generalist
-        from clearway.deploy.export import export_generalist
+        from clearway.deploy.export import check_can_export, export_generalist
         from clearway.perception import eyes
 
         given = {"--scene": self.scene, "--checkpoint": self.checkpoint, "--scenes": self.scenes}
         asked = [option for option, value in given.items() if value] + ([] if self.encoder else ["--no-encoder"])
         if asked:
             raise ClearwayError(f"{asked[0]}: not with {GENERALIST}, which is one agent for all rooms. Leave it out")
+        check_can_export()
+        say_begun(f"exporting {GENERALIST}")
         encoder = eyes.from_record(eyes.find_record())
         export_generalist(encoder, Generalist.by_eyes(encoder).settings, self.out)
         say(f"{GENERALIST} with its eyes: {self.out}, {self.out.stat().st_size / 1e6:.1f} MB, for any room")

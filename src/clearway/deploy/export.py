@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -29,18 +29,24 @@ OPSET = 18
 EXAMPLE_SIDES = (48, 64)  # of the pictures that the graph is traced with; it takes any
 
 
-def export_onnx(chosen: RunInScene, path: Path, *, with_encoder: bool = True) -> None:
+def export_onnx(
+    chosen: RunInScene, path: Path, *, with_encoder: bool = True, on_begin: Callable[[], None] | None = None
+) -> None:
     """Write an agent for one scene.
 
     With the encoder, the graph's inputs are picture (B, height, width, 3) uint8, start (B,) bool, history (B, K, F)
     float32 and target (B, F) float32, its outputs probabilities (B, A), value (B, 1) and history_after (B, K, F); see
-    `OnnxAgent`. The policy alone has the inputs history and target and the outputs probabilities and value.
+    `OnnxAgent`. The policy alone has the inputs history and target and the outputs probabilities and value. `on_begin`
+    is called once it is known that nothing is missing, before what takes long.
 
     Raises:
         DeployError: the packages of the extra `onnx` are not installed.
         EncoderError: the encoder that made the scene's features cannot be had.
     """
+    check_can_export()
     encoder = exportable_encoder(chosen) if with_encoder else None
+    if on_begin is not None:
+        on_begin()
     policy = chosen.policy
     card = chosen.card(encoder)
     history = torch.zeros(2, card.history_length, card.feature_count)
@@ -64,6 +70,7 @@ def export_generalist(encoder: EyesEncoder, settings: MappingSettings, path: Pat
     Raises:
         DeployError: the packages of the extra `onnx` are not installed.
     """
+    check_can_export()
     card = card_of(replace(Generalist.by_eyes(encoder), settings=settings))
     features = torch.zeros(2, card.feature_count)
     pictures, seen, pairs = (torch.export.Dim(name, min=0) for name in ("pictures", "seen", "pairs"))
@@ -77,6 +84,15 @@ def export_generalist(encoder: EyesEncoder, settings: MappingSettings, path: Pat
         "second": {0: pairs},
     }
     _write(path, card, EyesGraph(encoder.eyes), inputs, ["features", "stands", "whereabouts"], axes)
+
+
+def check_can_export() -> None:
+    """Raise DeployError where the packages of the extra `onnx` are not installed."""
+    try:
+        import onnx  # noqa: F401
+        import onnxscript  # noqa: F401
+    except ImportError as fault:
+        raise DeployError(f"export needs {fault.name}. {install_hint('onnx')}") from fault
 
 
 def _write(
@@ -98,11 +114,6 @@ def _translated(
     graph: torch.nn.Module, inputs: dict[str, torch.Tensor], outputs: list[str], axes: dict[str, dict[int, Any]]
 ) -> Any:
     """The graph as an ONNX model (a protocol buffer)."""
-    try:
-        import onnx  # noqa: F401
-        import onnxscript  # noqa: F401
-    except ImportError as fault:
-        raise DeployError(f"export needs {fault.name}. {install_hint('onnx')}") from fault
     with _quiet(), torch.no_grad():
         program = torch.onnx.export(
             graph,

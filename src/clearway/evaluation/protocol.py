@@ -11,6 +11,7 @@ from clearway.agents.selection import ActionSelection
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT, run_episodes
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
+from clearway.progress import picture_progress
 from clearway.scenes.scene import Scene
 from clearway.world.world import World
 
@@ -28,6 +29,7 @@ def evaluate_agents(
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_limit: int = STEP_LIMIT,
     seed: int = 0,
+    show_progress: bool = False,
 ) -> list[Evaluation]:
     """Every agent with each way of choosing actions, then the references, random and shortest-path agent.
 
@@ -44,6 +46,7 @@ def evaluate_agents(
         episodes_per_target: how many each.
         step_limit: steps after which an episode has failed.
         seed: of starts, chances and bootstrap.
+        show_progress: tell how far it has come.
 
     Raises:
         AgentError: an agent cannot walk here; it is named.
@@ -52,19 +55,21 @@ def evaluate_agents(
     rows += [(name, "sampled", agent) for name, agent in (references or {}).items()]
     rows += [(RANDOM, "sampled", RandomWalk()), (SHORTEST_PATH, "sampled", shortest_paths(world))]
     evaluations = []
-    for name, selection, agent in rows:
-        try:
-            table = run_episodes(
-                world,
-                agent,
-                scenes=scenes,
-                selection=selection,
-                episodes_per_target=episodes_per_target,
-                step_limit=step_limit,
-                seed=seed,
-            )
-        except AgentError as fault:
-            raise AgentError(f"{name}: {fault}") from fault
-        protocol = Protocol(episodes_per_target, step_limit, seed, selection)
-        evaluations.append(summarise(world, table, name, encoder, protocol))
+    with picture_progress("evaluating", len(rows), show_progress, unit="agents") as show_done:
+        for name, selection, agent in rows:
+            try:
+                table = run_episodes(
+                    world,
+                    agent,
+                    scenes=scenes,
+                    selection=selection,
+                    episodes_per_target=episodes_per_target,
+                    step_limit=step_limit,
+                    seed=seed,
+                )
+            except AgentError as fault:
+                raise AgentError(f"{name}: {fault}") from fault
+            protocol = Protocol(episodes_per_target, step_limit, seed, selection)
+            evaluations.append(summarise(world, table, name, encoder, protocol))
+            show_done(len(evaluations))
     return evaluations

@@ -35,6 +35,7 @@ def evaluate_runs(
     episodes_per_target: int = EPISODES_PER_TARGET,
     step_limit: int = STEP_LIMIT,
     seed: int = 0,
+    show_progress: bool = False,
 ) -> list[Evaluation]:
     """Agents of several runs on the same scenes and targets, by each way of choosing actions.
 
@@ -65,6 +66,7 @@ def evaluate_runs(
             episodes_per_target=episodes_per_target,
             step_limit=step_limit,
             seed=seed,
+            show_progress=show_progress,
         )
     trained = {name: _trained(agent) for name, agent in agents.items()}
     return [replace(evaluation, trained=trained.get(evaluation.agent)) for evaluation in evaluations]

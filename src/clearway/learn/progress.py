@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-FIRST_LINE_S, MOST_S_BETWEEN_LINES = 10.0, 300.0
+from clearway.progress import LineTimes
 
 
 class ProgressView(Protocol):
@@ -27,28 +27,25 @@ class _Silent:
 
 
 class _Lines:
-    """A line after some seconds, then ever more rarely: each wait is twice the one before, 5 minutes at most."""
+    """A line now and then, see `LineTimes`."""
 
     def __init__(self, frames: int) -> None:
         self.all_frames = frames
         self.began: float | None = None
         self.frames_before = 0
-        self.wait_s = FIRST_LINE_S
-        self.due = 0.0
+        self.times: LineTimes | None = None
 
     def show(self, frames: int, solved: int, targets: int) -> None:
         """Print a line where one is due."""
         now = time.monotonic()
-        if self.began is None:
-            self.began, self.frames_before, self.due = now, frames, now + self.wait_s
-        elif now >= self.due:
+        if self.began is None or self.times is None:
+            self.began, self.frames_before, self.times = now, frames, LineTimes(now)
+        elif self.times.is_due(now):
             rate = (frames - self.frames_before) / max(now - self.began, 1e-9)
             left = max(self.all_frames - frames, 0) / max(rate, 1e-9)
             progress = f"training: {frames:,} of {self.all_frames:,} frames, {rate:,.0f} frames/s"
             solved_told = f"solved {solved} of {targets}"
             print(f"{progress}, {solved_told}, {_duration(left)} left", file=sys.stderr, flush=True)
-            self.wait_s = min(2 * self.wait_s, MOST_S_BETWEEN_LINES)
-            self.due = now + self.wait_s
 
 
 def _duration(seconds: float) -> str:

@@ -11,13 +11,15 @@ import tyro
 
 from clearway.choices import SensorName
 from clearway.cli.arguments import check_at_least
-from clearway.cli.console import say
+from clearway.cli.console import say, say_begun
 from clearway.cli.imports.writing import Encoding, encode_and_write, place_name, write_scenes
 from clearway.errors import ClearwayError
 from clearway.ray_cluster import kept_connected
 
 if TYPE_CHECKING:
     from clearway.scenes.floor_plans import FloorPlan
+
+TOLD_PLANS = 10  # names of plans to be rendered, at most
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ class ImportFloorPlan:
         check_sees(self.encoding.encoder, self.sensors)
         for plan in plans:  # all of them before anything that takes minutes
             check_can_be_rendered(plan, self.seed)
+        say_begun(f"{self.file}: rendering and encoding {', '.join(plan.name for plan in plans[:TOLD_PLANS])}")
         workers, ray = self.encoding.workers, self.encoding.ray
         with kept_connected(ray, workers):
             scenes = [
