@@ -11,7 +11,7 @@ from threading import Barrier
 
 import pytest
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, install_hint
 from clearway.remote import store
 from clearway.remote.cache import fetched
 from clearway.remote.records import RECORDS
@@ -258,7 +258,7 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    needs = "https:// needs another package. Install it: pip install 'clearway[https]'"
+    needs = f"https:// needs another package. {install_hint('https')}"
     assert told("https://127.0.0.1/a.h5") == needs
     with pytest.raises(ClearwayError) as caught:
         fetched(["https://127.0.0.1/a.h5?signature=secret"], SUFFIXES)

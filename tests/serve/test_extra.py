@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from clearway.errors import install_hint
+
 SERVE = """
 import sys
 sys.modules.update(dict.fromkeys(sys.argv[1:]))  # None: not installed
@@ -19,6 +21,5 @@ main(["serve", "runs/bathroom"])
 def test_a_missing_package_is_one_line(missing):
     answer = subprocess.run([sys.executable, "-c", SERVE, *missing], capture_output=True, text=True, timeout=120)
     assert answer.returncode == 2
-    assert answer.stderr == (
-        "error: clearway serve needs prometheus-client. Install it: pip install 'clearway[serve]'\n"
-    ), answer
+    told = f"error: clearway serve needs prometheus-client. {install_hint('serve')}\n"
+    assert answer.stderr == told, answer

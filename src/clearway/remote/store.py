@@ -20,7 +20,7 @@ from urllib.parse import urljoin
 
 import fsspec
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, install_hint
 from clearway.remote.address import EXTRAS, file_name, without_secrets
 from clearway.remote.bounds import bounded
 from clearway.remote.faults import faults_named, is_for_the_moment
@@ -89,7 +89,7 @@ class Store:
             except ImportError as error:
                 extra = EXTRAS[self.scheme]
                 told = f"{without_secrets(address)}: {self.scheme}:// needs another package"
-                raise ClearwayError(f"{told}. Install it: pip install 'clearway[{extra}]'") from error
+                raise ClearwayError(f"{told}. {install_hint(extra)}") from error
         self._in_one_stream: dict[str, Any] = {}
         if self.scheme == "s3":
             self.system.retries = 1  # `_tried` tries again

@@ -11,7 +11,7 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from clearway.deploy.navigator import Selection
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, install_hint
 from clearway.serve.decoding import CONTENT_TYPES
 from clearway.serve.faults import INTERNAL, POLICY, STATUS, Code, Fault, FaultBody
 from clearway.serve.service import Service
@@ -28,7 +28,7 @@ try:
     from starlette.exceptions import HTTPException
     from starlette.requests import HTTPConnection
 except ImportError as error:
-    raise ClearwayError("clearway serve needs FastAPI. Install it: pip install 'clearway[serve]'") from error
+    raise ClearwayError(f"clearway serve needs FastAPI. {install_hint('serve')}") from error
 
 DESCRIPTION = """A trained agent: pictures in, actions out.
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from clearway.deploy.agent import checked_picture
 from clearway.deploy.navigator import Decision, Selection, checked_seed
-from clearway.errors import ClearwayError, DeployError
+from clearway.errors import ClearwayError, DeployError, install_hint
 from clearway.regular_files import read_bytes
 from clearway.scenes.actions import Action
 
@@ -66,7 +66,7 @@ class Client:
         try:
             import httpx
         except ImportError as fault:
-            raise ClearwayError("the client needs httpx. Install it: pip install 'clearway[serve]'") from fault
+            raise ClearwayError(f"the client needs httpx. {install_hint('serve')}") from fault
         if not token or " " in token or not (token.isascii() and token.isprintable()):
             problem = "the token is empty or holds other than plain letters"
             raise ServiceError("unauthorised", f"{problem}. Give the one that the service printed when it started")

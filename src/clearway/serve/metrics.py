@@ -6,12 +6,12 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, install_hint
 
 try:
     from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest, multiprocess, values
 except ImportError as error:
-    raise ClearwayError("clearway serve needs prometheus-client. Install it: pip install 'clearway[serve]'") from error
+    raise ClearwayError(f"clearway serve needs prometheus-client. {install_hint('serve')}") from error
 
 FOLDER_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"  # where prometheus_client looks for it
 

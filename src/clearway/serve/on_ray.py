@@ -16,7 +16,7 @@ from typing import Any
 
 from clearway import files
 from clearway.deploy.agent import DeployedAgent
-from clearway.errors import ClearwayError, DeployError
+from clearway.errors import ClearwayError, DeployError, install_hint
 from clearway.serve.access_log import to_stderr
 from clearway.serve.app import make_app
 from clearway.serve.limits import MOST_REPLICAS, Limits
@@ -36,7 +36,7 @@ try:
     from pydantic import BaseModel, ConfigDict, Field, ValidationError
     from ray import serve
 except ImportError as error:
-    raise ClearwayError("Ray Serve is not installed. Install it: pip install 'clearway[ray-serve]'") from error
+    raise ClearwayError(f"Ray Serve is not installed. {install_hint('ray-serve')}") from error
 
 NAMESPACE = "serve"  # that Ray Serve looks into
 MOST_NUMBERS = 2 * MOST_REPLICAS  # while new replicas take the place of old ones, both run

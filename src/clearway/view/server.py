@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.errors import ClearwayError
+from clearway.errors import ClearwayError, install_hint
 from clearway.view.content import grey, jpeg, map_json, page_files, shades, stage_json
 from clearway.view.episode import read_episode
 from clearway.view.film import write_film
@@ -25,7 +25,7 @@ try:
     from fastapi import FastAPI, Request, WebSocket, WebSocketDisconnect
     from fastapi.responses import JSONResponse, Response
 except ImportError as error:
-    raise ClearwayError("the viewer needs FastAPI. Install it: pip install 'clearway[view]'") from error
+    raise ClearwayError(f"the viewer needs FastAPI. {install_hint('view')}") from error
 
 MOST_PAGES = 16  # open at a time
 TOO_MANY_PAGES = 4001  # WebSocket close code; the page shows the reason that comes with it
