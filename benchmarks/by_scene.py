@@ -5,7 +5,10 @@ Scenes are drawn anew, 2,000 times (Efron & Tibshirani 1993).
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -51,3 +54,8 @@ def print_table(found: Mapping[str, GoalEvaluation]) -> None:
 def print_difference(one: GoalEvaluation, other: GoalEvaluation, name: str, what: str) -> None:
     """By how much a figure of one is higher than that of the other, scene by scene."""
     print(f"{what}: {shown(name, column(one, name) - column(other, name))}")
+
+
+def write_record(path: Path, about: Mapping[str, Any], found: Mapping[str, GoalEvaluation]) -> None:
+    """Write figures of every scene, by agent, beside what is to be said about all of them."""
+    path.write_text(json.dumps({**about, **{name: one.to_json() for name, one in found.items()}}) + "\n")

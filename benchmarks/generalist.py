@@ -13,11 +13,10 @@ are of the mean over scenes, and so are differences, scene by scene; see `by_sce
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 
-from by_scene import print_difference, print_table
+from by_scene import print_difference, print_table, write_record
 from retrieval import Retrieving
 
 import clearway
@@ -55,7 +54,7 @@ def main() -> None:
         own, *others = clearway.evaluate_goals(agent, args.scenes, **asked)
         found |= {name: own} | {other.agent: other for other in others}
         if args.json:  # after each: it may be hours until the next is done
-            args.json.write_text(json.dumps({**record, **{name: one.to_json() for name, one in found.items()}}) + "\n")
+            write_record(args.json, record, found)
     print_table(found)
     own = found["generalist"]
     if CARELESS in found:

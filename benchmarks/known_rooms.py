@@ -12,14 +12,13 @@ Scenes are files or folders of them, with pictures, of rooms that can be built a
 from __future__ import annotations
 
 import argparse
-import json
 import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from by_scene import print_table
+from by_scene import print_table, write_record
 
 import clearway
 from clearway.agents.agent import POSE, Agent, Decisions, Observation, State
@@ -120,9 +119,7 @@ def main() -> None:
                     one if before is None else replace(before, scenes={**before.scenes, **one.scenes}, tour=None)
                 )
             if args.json:  # after each: it may be minutes until the next is done
-                args.json.write_text(
-                    json.dumps({**record, **{name: one.to_json() for name, one in found.items()}}) + "\n"
-                )
+                write_record(args.json, record, found)
     print_table(found)
 
 

@@ -12,7 +12,7 @@ import argparse
 import json
 from pathlib import Path
 
-from by_scene import print_difference, print_table
+from by_scene import print_difference, print_table, write_record
 
 import clearway
 from clearway.evaluation.goals import GoalEvaluation
@@ -43,9 +43,7 @@ def main() -> None:
     if args.json:
         record = {"asked": asked, "versions": package_versions(), "hardware": hardware()}
         runs = {run.name: json.loads((run / "run.json").read_text())["learner"] for run in args.runs}
-        args.json.write_text(
-            json.dumps({**record, "learners": runs, **{name: one.to_json() for name, one in found.items()}}) + "\n"
-        )
+        write_record(args.json, {**record, "learners": runs}, found)
 
 
 if __name__ == "__main__":
