@@ -23,8 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import connected_parts, neighbour_pairs
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 
 DISTINCT = 100

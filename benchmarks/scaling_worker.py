@@ -25,7 +25,7 @@ from clearway.learn.presets import DEFAULT
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from clearway.scenes.floor_plans import floor_plan_scene
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Scene
 from clearway.scenes.targets import default_targets
 

@@ -48,7 +48,8 @@ from clearway.learn.on_policy import OnPolicy
 from clearway.learn.presets import DEFAULT
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.targets import seeded_targets
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.world.world import make_world

@@ -7,7 +7,8 @@ from clearway.envs.vector import ImageGoalVectorEnv
 from clearway.errors import ArgumentError
 from clearway.live_envs.single import LiveImageGoalEnv
 from clearway.live_envs.vector import LiveImageGoalVectorEnv
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene
 

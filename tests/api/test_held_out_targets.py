@@ -13,7 +13,8 @@ from clearway.generation.files import notes_of
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
 from clearway.live.live_room import live_room
-from clearway.scenes.floor_plans import GENERATED, floor_plan_scene
+from clearway.scenes.floor_plans import GENERATED
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from clearway.scenes.validate import SceneWarning

@@ -6,7 +6,8 @@ from clearway.generation import files
 from clearway.generation.files import notes_of, scene_path
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
-from clearway.scenes.floor_plans import GENERATED, floor_plan_scene
+from clearway.scenes.floor_plans import GENERATED
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Provenance
 from clearway.scenes.thor_v1 import write_scene
 

@@ -12,7 +12,7 @@ from clearway.generation.cached import cached_requests, room_of_seed
 from clearway.generation.files import Seen, scene_path
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import MAX_SEED, Request
-from clearway.scenes.floor_plans import floor_plan_scene
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 
 

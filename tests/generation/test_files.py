@@ -16,7 +16,8 @@ from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
 from clearway.live.live_room import live_room
 from clearway.perception.eyes import write_eyes
-from clearway.scenes.floor_plans import GENERATED, floor_plan_scene, plan_of
+from clearway.scenes.floor_plans import GENERATED
+from clearway.scenes.plan_scenes import floor_plan_scene, plan_of
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.sensors import Readings, depth
 from clearway.scenes.thor_v1 import read_scene, write_scene

@@ -20,7 +20,8 @@ from clearway.perception.encoder import Encoder
 from clearway.rooms.camera import eye_view, first_person_shot
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.actions import Action
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.sensors import RGB
 from clearway.world.world import World, make_world
 from helpers.agents import alike, by_rule, only

@@ -16,7 +16,8 @@ from clearway.rooms.build import build_floor_plan
 from clearway.rooms.camera import first_person_view
 from clearway.rooms.render import render
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Provenance
 from helpers.made import corridor_scene
 from helpers.plan_maps import plan_of

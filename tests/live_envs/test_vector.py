@@ -22,7 +22,8 @@ from clearway.live_envs.single import LiveImageGoalEnv
 from clearway.live_envs.vector import LiveImageGoalVectorEnv
 from clearway.rooms.camera import eye_view, first_person_shot
 from clearway.rooms.render import render
-from clearway.scenes.floor_plans import GENERATED, FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import GENERATED, FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 from helpers.imported import imported_by
 from helpers.small_model import AGENT, CHOICE, PLANE, written

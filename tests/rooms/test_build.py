@@ -7,7 +7,8 @@ from clearway import rooms
 from clearway.errors import RenderError, SceneError
 from clearway.rooms import build
 from clearway.rooms.build import build_floor_plan, build_scene
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Provenance
 from clearway.scenes.validate import check_scene
 from clearway.version import __version__

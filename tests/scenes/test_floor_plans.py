@@ -8,16 +8,8 @@ import pytest
 
 from clearway.errors import SceneError
 from clearway.scenes.feature_spread import feature_spread
-from clearway.scenes.floor_plans import (
-    CELL_SIZE_M,
-    MAX_WALLS,
-    Area,
-    FloorPlan,
-    Furnishing,
-    floor_plan_scene,
-    parts_apart,
-    plan_of,
-)
+from clearway.scenes.floor_plans import CELL_SIZE_M, MAX_WALLS, Area, FloorPlan, Furnishing, parts_apart
+from clearway.scenes.plan_scenes import floor_plan_scene, plan_of
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import check_scene, pose_quirks
 from clearway.world.world import make_world

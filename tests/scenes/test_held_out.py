@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.held_out import held_out_cells
+from clearway.scenes.plan_scenes import floor_plan_scene
 from helpers.made import scene_of_cells
 
 CELLS = np.argwhere(np.ones((8, 5), bool))

@@ -12,7 +12,7 @@ from clearway.errors import SceneError
 from clearway.generation.plans import generated_plan
 from clearway.generation.request import Request
 from clearway.live.words import GEOMETRY
-from clearway.scenes.floor_plans import floor_plan_scene
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views import files
 from clearway.views.files import take_missing

@@ -14,7 +14,7 @@ from clearway.live.conditions import REFERENCE, Perturbations
 from clearway.rooms.camera import first_person_shot
 from clearway.rooms.detail import DETAIL_NOTE
 from clearway.rooms.render import render
-from clearway.scenes.floor_plans import floor_plan_scene
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.views import grid
 from clearway.views.grid import grid_settings, grid_takes, placed_takes, take_grid
 from helpers.made import corridor_scene

@@ -12,8 +12,9 @@ import numpy as np
 
 from clearway.scenes import graph as graphs
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.floor_plans import FloorPlan, plan_poses
+from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import HEADING_COUNT
+from clearway.scenes.plan_scenes import plan_poses
 
 
 @dataclass(frozen=True)

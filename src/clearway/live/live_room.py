@@ -13,7 +13,7 @@ from clearway.live.conditions import REARRANGING, Perturbations
 from clearway.live.draws import FURNITURE, OBSTACLE, Draws
 from clearway.rooms.camera import CAMERA_HEIGHT_M, View, eye_view
 from clearway.rooms.groups import CEILING_GROUP, SEEN_GROUP
-from clearway.scenes import floor_plans
+from clearway.scenes import floor_plans, plan_scenes
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.targets import possible_targets
 
@@ -128,7 +128,7 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
     if made.source == floor_plans.GENERATED and (problem := other_version(made.notes)):
         raise SceneError(scene.name, problem, "Its looks may differ: generate it again, or use that clearway")
     if made.source in floor_plans.SOURCES and made.seed is not None:
-        return _live_plan(scene, floor_plans.plan_of(scene), made.seed, small, loose)
+        return _live_plan(scene, plan_scenes.plan_of(scene), made.seed, small, loose)
     assert made.room is not None and made.seed is not None, "as check_is_room found"
     grid = room_scene(made.room, made.seed)
     if not np.array_equal(grid.graph, scene.graph) or not np.allclose(grid.locations_m, scene.locations_m):
@@ -199,8 +199,8 @@ def _live_plan(scene: Scene, plan: FloorPlan, seed: int, small: bool, loose: boo
     """The room of a floor plan, and the scene moved to where the room's corner is the origin."""
     from clearway.rooms.build import check_mujoco
 
-    if not np.array_equal(floor_plans.plan_poses(plan)[2], scene.graph):
-        raise SceneError(scene.name, "its moves are not those of its floor plan", floor_plans.REBUILD, "graph")
+    if not np.array_equal(plan_scenes.plan_poses(plan)[2], scene.graph):
+        raise SceneError(scene.name, "its moves are not those of its floor plan", plan_scenes.REBUILD, "graph")
     check_mujoco()
     from clearway.rooms.detail import SMALL, recorded_detail
     from clearway.rooms.plans.plan_room import agent_for, build_plan_room

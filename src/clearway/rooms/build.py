@@ -11,7 +11,7 @@ from importlib.metadata import version
 import numpy as np
 
 from clearway.rooms.detail import DETAIL_NOTE, DETAILS, are_small, detail_for
-from clearway.scenes import floor_plans
+from clearway.scenes import floor_plans, plan_scenes
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.sensors import RGB, check_names
@@ -112,7 +112,7 @@ def build_floor_plan(
     from clearway.rooms.sense import sense
     from clearway.rooms.topview import render_top_view
 
-    locations_m, headings_deg, graph = floor_plans.plan_poses(plan)
+    locations_m, headings_deg, graph = plan_scenes.plan_poses(plan)
     check_moves(graph, plan.source or plan.name)
     detail = detail_for(*size_px)
     with _status(f"furnishing and lighting {plan.name}", progress):
@@ -136,7 +136,7 @@ def build_floor_plan(
             floor_plans.SOURCE,
             seed=seed,
             versions=shaping_versions(),
-            notes={**floor_plans.plan_notes(plan), DETAIL_NOTE: detail},
+            notes={**plan_scenes.plan_notes(plan), DETAIL_NOTE: detail},
         ),
         cell_size_m=plan.cell_size_m,
         top_view=replace(

@@ -51,7 +51,8 @@ class ImportFloorPlan:
         """Make and write."""
         from clearway.rooms.plans.cell_map import check_doors
         from clearway.scenes.floor_plan_files import read_floor_plans
-        from clearway.scenes.floor_plans import floor_plan_scene, parts_apart
+        from clearway.scenes.floor_plans import parts_apart
+        from clearway.scenes.plan_scenes import floor_plan_scene
 
         plans = read_floor_plans(self.file, self.name, cell_size_m=self.cell_size)
         if self.features is None:
