@@ -130,7 +130,6 @@ def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[.
     page = opened("scene=corridor&start=4&target=8&seed=52")
     page.locator("#speed").fill("5")
     page.get_by_role("button", name="Play").click()
-    expect(page.locator("body.playing")).to_be_visible()
     expect(page.locator(".badge.good")).to_have_count(2)
     expect(page.locator("body.playing")).to_have_count(0)
     steps = {name: number(page, name, "steps") for name in ("aware", "plain")}
