@@ -38,7 +38,8 @@ with atheris.instrument_imports(include=["clearway"]):
     from clearway.learn.run_folder import RunFolder
     from clearway.mapping.map_files import read_map
     from clearway.scenes.floor_plan_files import floor_plan_names, read_floor_plan
-    from clearway.scenes.floor_plans import FloorPlan, floor_plan_scene
+    from clearway.scenes.floor_plans import FloorPlan
+    from clearway.scenes.plan_scenes import floor_plan_scene
     from clearway.scenes.thor_v1 import read_scene, write_scene
     from clearway.serve.decoding import Bounds, Refused, decoded
     from clearway.serve.limits import Limits
