@@ -218,6 +218,16 @@ def cache_dir() -> Path:
 
 
 @contextmanager
+def cache_faults_named(folder: Path, kind: type[ClearwayError] = ClearwayError) -> Iterator[None]:
+    """Turn what goes wrong with writing to a cache folder into one line, an error of some kind."""
+    try:
+        yield
+    except OSError as fault:
+        problem = f"the cache folder {folder} cannot be written to ({fault.strerror or fault})"
+        raise kind(f"{problem}. Make room, or set {CACHE_VARIABLE} to another folder") from fault
+
+
+@contextmanager
 def locked(path: Path) -> Iterator[None]:
     """Hold the lock of `path` (a file `path`.lock beside it); others wait until it is released, and say so in time.
 

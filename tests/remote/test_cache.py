@@ -167,7 +167,7 @@ def test_a_limit_that_is_none(words: str, web: str, monkeypatch: pytest.MonkeyPa
 def test_a_cache_that_cannot_be_written(web: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "file"))
-    with pytest.raises(ClearwayError, match=r"cannot keep what is fetched \(Not a directory\)"):
+    with pytest.raises(ClearwayError, match=r"cannot be written to \(Not a directory\)"):
         fetched([f"{web}/a.h5"], SUFFIXES)
 
 

@@ -248,7 +248,7 @@ def test_a_place_that_cannot_be_taken_is_told_of(scenes: Path, monkeypatch: pyte
         (theirs / "other").write_text("")
 
     monkeypatch.setattr(Store, "download", late)
-    with pytest.raises(ClearwayError, match="cannot keep what is fetched"):
+    with pytest.raises(ClearwayError, match="cannot be written to"):
         fetched([f"{SET}/a.h5"], (".h5",))
 
 

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from clearway.errors import EncoderError
-from clearway.files import cache_dir, locked, parse_json, safetensors_metadata, written_whole
+from clearway.files import cache_dir, cache_faults_named, locked, parse_json, safetensors_metadata, written_whole
 from clearway.regular_files import read_bytes
 from clearway.scenes.file_pictures import BLOCK_PICTURES
 from clearway.scenes.scene import Observations
@@ -47,12 +47,12 @@ def cached(folder: str, key: str, make: Callable[[], Entry]) -> Entry:
     if entry is not None:
         return entry
     with ExitStack() as stack:
-        with _write_faults_named(path.parent):
+        with cache_faults_named(path.parent, EncoderError):
             stack.enter_context(locked(path))
         entry = _load(path)  # another process may have made it meanwhile
         if entry is None:
             entry = make()
-            with _write_faults_named(path.parent):
+            with cache_faults_named(path.parent, EncoderError):
                 _store(path, entry)
     return entry
 
@@ -68,15 +68,6 @@ def content_key(pictures: Observations) -> str:
 def joint_key(*parts: object) -> str:
     """Hash of several JSON values."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
-
-
-@contextmanager
-def _write_faults_named(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as fault:
-        problem = f"the cache folder {folder} cannot be written to ({fault})"
-        raise EncoderError(f"{problem}. Set the environment variable CLEARWAY_CACHE to another folder") from fault
 
 
 def _load(path: Path) -> Entry | None:

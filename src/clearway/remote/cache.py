@@ -19,7 +19,7 @@ from itertools import chain, islice
 from pathlib import Path
 
 from clearway.errors import ClearwayError
-from clearway.files import locked, part_folder
+from clearway.files import cache_faults_named, locked, part_folder
 from clearway.progress import picture_progress
 from clearway.remote.address import (
     COPIED_NS,
@@ -31,7 +31,7 @@ from clearway.remote.address import (
     without_secrets,
 )
 from clearway.remote.leases import lease_of, leased
-from clearway.remote.records import faults_named, record_text, recorded_address, write_records
+from clearway.remote.records import record_text, recorded_address, write_records
 from clearway.remote.store import RemoteFile, Store
 from clearway.remote.together import AT_ONCE, together
 
@@ -68,7 +68,7 @@ def fetched_each(addresses: Sequence[str], suffixes: Sequence[str], *, may_pass:
     files = {file: store for (store, _), file in zip(entries, found, strict=True)}
     folder = fetched_folder()
     places = {file: folder / _entry(file) / file.name for file in files}
-    with faults_named(folder):
+    with cache_faults_named(folder):
         may_pass = may_pass and all(file.version and without_secrets(file.address) == file.address for file in files)
         with locked(folder / ".cache"):
             write_records(folder, {_entry(file): record_text(file.address, file.version) for file in files})
@@ -92,7 +92,7 @@ def fetch_again(places: Sequence[Path]) -> None:
         ClearwayError: one cannot be had again or is another one now, or the cache is too small for them together.
     """
     folder = fetched_folder()
-    with faults_named(folder), locked(folder / ".passing"):
+    with cache_faults_named(folder), locked(folder / ".passing"):
         missing = list(dict.fromkeys(place for place in places if not is_whole(place)))  # others may have fetched some
         files = dict(together(_found_again, missing))
         with _kept_meanwhile(folder, places):

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from clearway.errors import ClearwayError
-from clearway.files import CACHE_VARIABLE, json_text, locked, read_json
+from clearway.files import cache_faults_named, json_text, locked, read_json
 from clearway.regular_files import read_text
 from clearway.remote.address import ENTRY, fetched_folder, is_fetched, without_secrets
 
 RECORDS = ".records"  # in the cache folder, by the entry's name
 MAX_RECORD_BYTES = 64 * 1024
 _NO_RECORD = (OSError, ValueError, KeyError, TypeError)
-
-
-@contextmanager
-def faults_named(folder: Path) -> Iterator[None]:
-    """Turn what goes wrong with the cache folder into one line."""
-    try:
-        yield
-    except OSError as fault:
-        remedy = f"Make room, or set {CACHE_VARIABLE} to another folder"
-        raise ClearwayError(f"{folder}: cannot keep what is fetched ({fault.strerror or fault}). {remedy}") from fault
 
 
 def record_text(address: str, version: str) -> str:
@@ -86,7 +76,7 @@ def take_records(texts: Mapping[str, str]) -> None:
     """
     if texts:
         folder = fetched_folder()
-        with faults_named(folder), locked(folder / ".cache"):
+        with cache_faults_named(folder), locked(folder / ".cache"):
             write_records(folder, texts)
 
 
