@@ -27,7 +27,7 @@ class LineTimes:
 
 
 @contextmanager
-def picture_progress(label: str, total: int, wanted: bool, unit: str = "pictures") -> Iterator[Callable[[int], None]]:
+def work_progress(label: str, total: int, wanted: bool, unit: str = "pictures") -> Iterator[Callable[[int], None]]:
     """A progress bar of pictures, or of a unit; yields what to call with the number of them done so far.
 
     If standard error is not a terminal, a line now and then instead. `unit` is what they are.

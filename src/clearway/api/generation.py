@@ -56,7 +56,7 @@ def generate(
     from clearway.generation.cached import cached_requests
     from clearway.generation.files import NO_ENCODER, Seen, generate_scenes, scene_path
     from clearway.perception.encode import check_sees
-    from clearway.progress import picture_progress
+    from clearway.progress import work_progress
     from clearway.ray_cluster import kept_connected
 
     chosen_kind = cast(PlanKind, as_choice("kind", kind, KINDS))
@@ -77,7 +77,7 @@ def generate(
     requests = [Request(chosen_kind, chosen_split, chosen_seed, number) for number in range(wanted)]
     with (
         kept_connected(ray, crew),
-        picture_progress(f"making {kind}s", wanted, show_progress, unit=f"{kind}s") as show_done,
+        work_progress(f"making {kind}s", wanted, show_progress, unit=f"{kind}s") as show_done,
     ):
         if folder is None:
             return cached_requests(

@@ -67,7 +67,7 @@ def pretrain(
     from clearway.pretraining.settings import PretrainSettings
     from clearway.pretraining.trainer import PretrainRequest
     from clearway.pretraining.workers import pretrain_by_workers
-    from clearway.progress import picture_progress
+    from clearway.progress import work_progress
     from clearway.torch_threads import torch_threads
     from clearway.views.stream import views_in
 
@@ -86,6 +86,6 @@ def pretrain(
         )
     with torch_threads(count):
         if processes == 1:
-            with picture_progress("learning to see", settings.pictures, show_progress) as show_done:
+            with work_progress("learning to see", settings.pictures, show_progress) as show_done:
                 train_eyes(request, folder, resume=resume, track=track, done=show_done)
         return None if tried is None else judge(read_eyes(folder), tried)

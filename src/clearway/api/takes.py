@@ -64,7 +64,7 @@ def takes_seen(
     """
     from clearway.evaluation.takes import Takes
     from clearway.perception.encode import features_of
-    from clearway.progress import picture_progress
+    from clearway.progress import work_progress
     from clearway.views.grid import grid_takes
 
     label = label_of(perturbations)
@@ -73,7 +73,7 @@ def takes_seen(
     if not seen:
         return Takes(takes, seen, made)
     by = (encoder or _encoder_of(scenes)) if FEATURES in seen else None
-    with picture_progress("taking perturbed pictures", len(scenes), show_progress, unit="scenes") as show_done:
+    with work_progress("taking perturbed pictures", len(scenes), show_progress, unit="scenes") as show_done:
         for pictures in grid_takes(scenes, perturbations, takes=takes, seed=seed, done=show_done):
             if RGB in seen:
                 seen[RGB].append(pictures)

@@ -61,7 +61,7 @@ def take_views(
     """
     from clearway.live.conditions import Perturbations
     from clearway.live.words import perturbations_named
-    from clearway.progress import picture_progress
+    from clearway.progress import work_progress
     from clearway.ray_cluster import kept_connected
     from clearway.views.files import shard_path, take_missing
     from clearway.views.settings import ViewSettings
@@ -88,7 +88,7 @@ def take_views(
     files = scene_files(_paths("scenes", scenes))
     with (
         kept_connected(ray, crew),
-        picture_progress("taking views", len(files), show_progress, unit="rooms") as show_done,
+        work_progress("taking views", len(files), show_progress, unit="rooms") as show_done,
     ):
         take_missing(files, folder, settings, workers=crew, ray=ray, done=show_done)
     return [shard_path(file, folder) for file in files]

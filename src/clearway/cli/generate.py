@@ -73,8 +73,8 @@ def chosen_room(seed: int) -> Scene:
     from clearway.api.arguments import as_whole
     from clearway.generation.cached import room_of_seed
     from clearway.generation.request import MAX_SEED
-    from clearway.progress import picture_progress
+    from clearway.progress import work_progress
 
     as_whole("room", seed, 0, MAX_SEED)
-    with picture_progress("making the room", 1, True, unit="rooms") as done:
+    with work_progress("making the room", 1, True, unit="rooms") as done:
         return room_of_seed(seed, done)

@@ -11,7 +11,7 @@ from clearway.agents.selection import ActionSelection
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT, run_episodes
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.scenes.scene import Scene
 from clearway.world.world import World
 
@@ -55,7 +55,7 @@ def evaluate_agents(
     rows += [(name, "sampled", agent) for name, agent in (references or {}).items()]
     rows += [(RANDOM, "sampled", RandomWalk()), (SHORTEST_PATH, "sampled", shortest_paths(world))]
     evaluations = []
-    with picture_progress("evaluating", len(rows), show_progress, unit="agents") as show_done:
+    with work_progress("evaluating", len(rows), show_progress, unit="agents") as show_done:
         for name, selection, agent in rows:
             try:
                 table = run_episodes(

@@ -18,7 +18,7 @@ import numpy as np
 from clearway.errors import SceneError, install_hint
 from clearway.importers.picture_limits import check_picture_count, check_picture_size
 from clearway.importers.pose_graph import recorded_pose_graph
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.validate import MAX_STATES, SceneWarning, check_scene
 from clearway.version import __version__
@@ -82,7 +82,7 @@ def photographed(controller: Controller, name: str, *, step_m: float, progress: 
     positions = _reachable(controller, name)
     pictures: list[np.ndarray] = []
     places: list[tuple[float, float]] = []
-    with picture_progress(f"photographing {name}", len(positions) * len(HEADINGS_DEG), progress) as show_done:
+    with work_progress(f"photographing {name}", len(positions) * len(HEADINGS_DEG), progress) as show_done:
         for number, position in enumerate(positions, 1):
             frames = _all_round(controller, position)
             show_done(number * len(HEADINGS_DEG))

@@ -20,7 +20,7 @@ import numpy as np
 
 from clearway.errors import SceneError, install_hint
 from clearway.importers.picture_limits import check_picture_count, check_picture_size
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.scenes.grid import HEADING_COUNT, connected_parts, edges_among, neighbour_pairs, pose_graph
 from clearway.scenes.scene import Provenance, Scene, TopView
 from clearway.scenes.validate import check_scene
@@ -174,7 +174,7 @@ def _pictures(
     height_px, width_px = size_px
     buffer = _frame_buffer(height_px, width_px)
     pictures = np.empty((len(headings_deg), height_px, width_px, 3), np.uint8)
-    with picture_progress(f"photographing {name}", len(pictures), progress) as show_done:
+    with work_progress(f"photographing {name}", len(pictures), progress) as show_done:
         for state, (place_m, heading_deg) in enumerate(zip(locations_m, headings_deg, strict=True)):
             env.agent.pos = _point(place_m)
             env.agent.dir = np.radians(90.0 - float(heading_deg))  # 0 looks along x, and turns to the left add

@@ -15,7 +15,7 @@ from clearway.perception.encoder import Encoder, sensor_of
 from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import RESNET50, ResNetShape
 from clearway.plugins import find_plugin
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
 from clearway.scenes.sensors import DEPTH, RGB
 from clearway.spread.workers import Work, Workers, workers_for
@@ -133,7 +133,7 @@ def encode_scenes(
     here = workers is None and ray is None
     with (
         torch_threads(threads),
-        picture_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
+        work_progress("encoding", sum(scene.state_count for scene in scenes), progress) as show_done,
     ):
         record = find_record(encoder, scenes, seed=seed) if isinstance(encoder, str) else encoder
         shaped_by = {"threads": threads_in_use() if here else 1, "batch": batch}

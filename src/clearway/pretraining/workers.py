@@ -19,7 +19,7 @@ from clearway.pretraining.eyes_folder import EyesFolder, record_of
 from clearway.pretraining.pretrain import SECONDS_BETWEEN_CHECKPOINTS, pretrain_part
 from clearway.pretraining.together import check_groups
 from clearway.pretraining.trainer import PretrainRequest
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.remote.records import records_of
 from clearway.torch_device import usable_device
 
@@ -37,14 +37,14 @@ class PretrainTask(Task):
         """See `pretrain_part`."""
         request = replace(self.request, device=str(peers.device))
         shown = self.show_progress and peers.leads
-        with picture_progress("learning to see", request.settings.pictures, shown) as done:
+        with work_progress("learning to see", request.settings.pictures, shown) as done:
             folder = EyesFolder(self.out)
             pretrain_part(request, folder, peers, track=self.track, done=done, checkpoint_s=self.checkpoint_s)
 
     @contextmanager
     def watched(self) -> Iterator[Callable[[], None]]:
         """See `Task`."""
-        with picture_progress("learning to see", self.request.settings.pictures, self.show_progress) as done:
+        with work_progress("learning to see", self.request.settings.pictures, self.show_progress) as done:
 
             def look() -> None:
                 with suppress(RunError):  # of rows that cannot be read now: the next look may see more

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from clearway.errors import ClearwayError
 from clearway.files import cache_faults_named, locked, part_folder
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.remote.address import (
     COPIED_NS,
     ENTRY,
@@ -218,7 +218,7 @@ def _fetch(files: Mapping[RemoteFile, Store], folder: Path, *, show_progress: bo
         return
     with (
         part_folder(folder) as part,
-        picture_progress("fetching", len(files), show_progress, unit="files") as show_done,
+        work_progress("fetching", len(files), show_progress, unit="files") as show_done,
     ):
 
         def fetch(file: RemoteFile, stop: threading.Event) -> None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clearway.errors import RenderError
-from clearway.progress import picture_progress
+from clearway.progress import work_progress
 from clearway.rooms.render_worker import Camera, binary_model, open_camera, renderer_environment, take
 from clearway.spread.workers import Work, Workers, workers_for
 
@@ -60,7 +60,7 @@ def render(
     workers, ray = (None, None) if here else (count or workers, ray)
     size = RAY_SHARE_SHOTS if count is None else _share_size(len(pictures), count)
     with (
-        picture_progress(label, len(pictures), progress) as show_done,
+        work_progress(label, len(pictures), progress) as show_done,
         workers_for(_work(model, view, count), workers=workers, ray=ray) as crew,
     ):
         done = 0
