@@ -21,6 +21,7 @@ from clearway.scenes.plan_scenes import floor_plan_scene, plan_of
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.sensors import Readings, depth
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from helpers.crashing import crashes_once
 from helpers.made_files import Made
 from helpers.small_eyes import small_eyes
 
@@ -163,6 +164,13 @@ def test_a_scene_gives_its_request_back() -> None:
     request = Request("flat", "train", 2, 5)
     assert request_of(stand_in(request).made_by) == request
     assert request_of(floor_plan_scene(generated_plan(request), 4).made_by) is None
+
+
+def test_a_room_is_begun_anew_where_its_process_crashes(monkeypatch, tmp_path) -> None:
+    monkeypatch.setattr(files, "_make", crashes_once)
+    monkeypatch.setattr(files, "check_mujoco", lambda: None)
+    assert make(REQUESTS[:1], tmp_path, workers=1) == [scene_path(REQUESTS[0], tmp_path)]
+    assert (tmp_path / "begun").exists()
 
 
 @pytest.mark.slow

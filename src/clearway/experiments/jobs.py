@@ -17,9 +17,8 @@ from clearway.errors import RunError
 from clearway.experiments.job import do, run_folder
 from clearway.experiments.plan import Job
 from clearway.learn.run_folder import METRICS_FILE
-from clearway.spread.workers import Work, workers_for
+from clearway.spread.workers import ATTEMPTS, Work, workers_for
 
-ATTEMPTS = 3  # a job whose process is killed is begun so many times, each from its last checkpoint
 POLL_S = 0.2
 JOB_BYTES = 1_000_000_000  # a job on the four default rooms was seen to take 650 MB
 

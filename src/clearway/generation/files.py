@@ -23,7 +23,7 @@ from clearway.scenes.contents import check_contents
 from clearway.scenes.floor_plans import GENERATED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.spread.workers import Work, workers_for
+from clearway.spread.workers import ATTEMPTS, Work, workers_for
 
 if TYPE_CHECKING:
     from clearway.perception.encoder import Encoder
@@ -107,7 +107,7 @@ def generate_scenes(
     check_mujoco()
     folder.mkdir(parents=True, exist_ok=True)
     maker = partial(_open_maker, folder.resolve(), seen, record)
-    work = Work(maker, _make, _died, attempts=1, environment=_environment(), keeps_messages=True)
+    work = Work(maker, _make, _died, attempts=ATTEMPTS, environment=_environment(), keeps_messages=True)
     count = workers if ray is not None else min(workers or core_count(), len(missing))
     with workers_for(work, workers=count, ray=ray) as crew:
         for number, _ in enumerate(crew.results(missing), len(there) + 1):

@@ -19,7 +19,7 @@ from clearway.spread.worker import done, packed
 from clearway.spread.workers import Part, Result, Tool, Work
 
 GRACE_S = 60.0  # for parts under way to end when they are told to: training saves a checkpoint first
-ATTEMPTS = 4  # where the work does not say
+ATTEMPTS_ON_RAY = 4  # where the work does not say
 LOOKS_EVERY_S = 2.0
 LOST_S = 60.0  # with no node that has room, until the work is given up; Ray would wait for ever
 
@@ -35,7 +35,7 @@ def on_ray(
     with connected(address, None if workers is None else workers * work.cores) as ray:
         _check_room(ray, work)
         message, key = ray.put(packed(work.set_up, work.do)), uuid4().hex
-        attempts = work.attempts if work.attempts > 1 else ATTEMPTS
+        attempts = work.attempts if work.attempts > 1 else ATTEMPTS_ON_RAY
         options = {"num_cpus": work.cores, "memory": work.memory_bytes or None, "max_retries": attempts - 1}
         remote = ray.remote(**options)(_done_on_node)
         under_way: dict[Any, Future[Result]] = {}

@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 from clearway.errors import ClearwayError
 
 Tool = TypeVar("Tool")
+ATTEMPTS = 3  # for work that goes on where it was, or whose libraries crash now and then, as renderers do
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 

@@ -12,7 +12,7 @@ from clearway.rooms.build import check_mujoco
 from clearway.rooms.render import core_count
 from clearway.rooms.render_worker import renderer_environment
 from clearway.scenes.thor_v1 import read_scene
-from clearway.spread.workers import Work, workers_for
+from clearway.spread.workers import ATTEMPTS, Work, workers_for
 from clearway.views.settings import ViewSettings, differing
 from clearway.views.shard import is_shard, read_shard, room_key, write_shard
 from clearway.views.take import room_views
@@ -67,7 +67,7 @@ def take_missing(
     folder.mkdir(parents=True, exist_ok=True)
     environment = {**renderer_environment(THREADS), "OMP_NUM_THREADS": str(THREADS)}
     maker = partial(_Maker, folder.resolve(), settings)
-    work = Work(maker, _make, _died, attempts=1, environment=environment, keeps_messages=True)
+    work = Work(maker, _make, _died, attempts=ATTEMPTS, environment=environment, keeps_messages=True)
     count = workers if ray is not None else min(workers or core_count(), len(missing))
     with workers_for(work, workers=count, ray=ray) as crew:
         for number, _ in enumerate(crew.results([path.resolve() for path in missing]), there + 1):
