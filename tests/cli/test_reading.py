@@ -1,11 +1,15 @@
 """How options are told of in help, and read."""
 
+import os
 import re
+import subprocess
+import sys
+from contextlib import suppress
 
 import pytest
 
 from clearway.cli.known import command_of, options, subcommands
-from clearway.cli.main import Command
+from clearway.cli.main import Command, main
 from clearway.cli.train import Train
 
 
@@ -37,6 +41,10 @@ def test_a_run_s_settings_are_offered_to_train_alone(clearway, words):
         (("train", "--frmes", 5), "Did you mean --frames? Help: clearway train --help"),
         (("scenes", "build", "bathroom"), "Did you mean --room bathroom? Help: clearway scenes build --help"),
         (("trian",), "Did you mean train?"),
+        (
+            ("train", "x.h5", "--seed", "q"),
+            "a whole number, such as 600000 or 6e5. Help: clearway train --help",
+        ),
     ],
 )
 def test_a_refusal_names_what_was_meant_and_the_command_s_own_help(clearway, words, part):
@@ -51,6 +59,33 @@ def test_help_is_as_wide_as_the_terminal_and_its_headings_are_plain(clearway, mo
     assert max(map(len, text.splitlines())) <= 70
     for internal in ("parameters options", "room options", "perturbations options", "these fields", "(default: '')"):
         assert internal not in text
+
+
+def test_help_in_colours_keeps_its_frames():
+    """On a terminal, where lines hold more letters than are seen."""
+    pty = pytest.importorskip("pty")
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "clearway", "train", "--help"]
+    environment = os.environ | {"COLUMNS": "80", "TERM": "xterm-256color", "PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment):
+        os.close(theirs)
+        printed = b""
+        with suppress(OSError):  # its end
+            while part := os.read(ours, 65536):
+                printed += part
+    os.close(ours)
+    assert b"\x1b[" in printed
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in printed.decode().splitlines()]
+    framed = lines[next(number for number, line in enumerate(lines) if line.startswith("╭")) :]
+    assert all(line.startswith(tuple("╭│╰")) and len(line) == 80 for line in framed) and len(framed) > 50
+
+
+def test_what_is_no_help_is_printed_as_it_is(capsys):
+    with pytest.raises(SystemExit):
+        main(["--tyro-print-completion", "bash"])
+    script = capsys.readouterr().out
+    assert len(script) > 10_000
+    assert subprocess.run(["bash", "-n"], input=script, text=True, capture_output=True).returncode == 0
 
 
 def test_choices_stand_in_the_order_written(clearway):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import io
 import re
-import shutil
-import sys
-import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from typing import TextIO, get_args, get_type_hints
+from contextlib import contextmanager, redirect_stderr
+from typing import get_args, get_type_hints
 
+from clearway.cli.help_text import help_wrapped
 from clearway.cli.known import command_of, options, subcommands
 from clearway.cli.reading import without_none
 from clearway.errors import ClearwayError
@@ -19,45 +17,8 @@ from clearway.spelling import did_you_mean
 CORNERS = ("╭", "╰")
 LENGTHY = ("Perhaps you meant", "Argument helptext")  # parts of a refusal that --help says better
 _UNKNOWN = re.compile(r"Unrecognized options: (.+)")
-_FULL_HELP = re.compile(r"For full helptext, run:? .*$")
+_FULL_HELP = re.compile(r"For full helptext, (?:run|see):? .*$")
 _NO_CHOICE = re.compile(r"invalid choice '(.*)' for argument ")
-
-
-class _Kept(io.StringIO):
-    """What is printed, kept; it looks like the stream that it stands for, by which the printer chooses its letters."""
-
-    def __init__(self, stream: TextIO) -> None:
-        super().__init__()
-        self._stream = stream
-
-    @property
-    def encoding(self) -> str | None:  # type: ignore[override]
-        """Of the stream."""
-        return getattr(self._stream, "encoding", None)
-
-    def isatty(self) -> bool:
-        """Of the stream."""
-        return self._stream.isatty()
-
-    def fileno(self) -> int:
-        """Of the stream."""
-        return self._stream.fileno()
-
-
-def _wrapped(helped: str) -> str:
-    """Help with its first lines, usage and description, as wide as the terminal, as its frames are already."""
-    width = shutil.get_terminal_size().columns
-    lines = helped.splitlines(keepends=True)
-    framed = (*CORNERS, "│", "|", "+")
-    whole = (len(line) <= width + 1 or line.startswith(framed) for line in lines)
-    return "".join(line if kept else _folded(line, width) for line, kept in zip(lines, whole, strict=True))
-
-
-def _folded(line: str, width: int) -> str:
-    usage = line.startswith("usage:")
-    text = line.replace(",", ", ") if usage else line
-    indent = " " * len("usage: ") if usage else ""
-    return textwrap.fill(text, width, subsequent_indent=indent, break_on_hyphens=False) + "\n"
 
 
 @contextmanager
@@ -68,9 +29,9 @@ def refusals_in_one_line(words: Sequence[str], commands: object) -> Iterator[Non
         words: that are read.
         commands: the union of all commands' classes.
     """
-    said, helped = io.StringIO(), _Kept(sys.stdout)
+    said = io.StringIO()
     try:
-        with redirect_stderr(said), redirect_stdout(helped):
+        with redirect_stderr(said), help_wrapped():
             yield
     except SystemExit as leaving:
         if not leaving.code:
@@ -78,8 +39,6 @@ def refusals_in_one_line(words: Sequence[str], commands: object) -> Iterator[Non
         refused = _FULL_HELP.sub("", one_line(said.getvalue()))
         named = " ".join(["clearway", *words[: command_of(words, commands)[1]]])
         raise ClearwayError(f"{_with_suggestion(refused, words, commands).strip()} Help: {named} --help") from leaving
-    finally:
-        sys.stdout.write(_wrapped(helped.getvalue()))
 
 
 def _with_suggestion(refused: str, words: Sequence[str], commands: object) -> str:
