@@ -199,11 +199,16 @@ class GoogleStore(_Files):
     """The part of Google's JSON interface that lists and reads the objects of one bucket."""
 
     objects: dict[str, bytes]
+    cuts = 0  # how many downloads break off in their midst
 
     def do_GET(self) -> None:
         path = urlsplit(self.path).path
         name = unquote(path.partition("/b/rooms/o")[2].lstrip("/"))
-        if path.startswith("/download"):
+        if path.startswith("/download") and type(self).cuts:
+            type(self).cuts -= 1
+            self._send(self.objects[name], "application/octet-stream", sent=len(self.objects[name]) * 2 // 3)
+            self.close_connection = True
+        elif path.startswith("/download"):
             self._send(self.objects[name], "application/octet-stream")
         elif name in self.objects:
             self._send(json.dumps(self._described(name)).encode())
@@ -216,12 +221,12 @@ class GoogleStore(_Files):
         size = str(len(self.objects[name]))
         return {"name": name, "bucket": "rooms", "size": size, "generation": "1", "etag": "a"}
 
-    def _send(self, content: bytes, kind: str = "application/json") -> None:
+    def _send(self, content: bytes, kind: str = "application/json", sent: int | None = None) -> None:
         self.send_response(200)
         self.send_header("Content-Type", kind)
         self.send_header("Content-Length", str(len(content)))
         self.end_headers()
-        self.wfile.write(content)
+        self.wfile.write(content[:sent])
 
 
 @contextmanager

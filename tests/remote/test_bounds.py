@@ -62,6 +62,7 @@ def test_sizes_that_no_file_has(size: int) -> None:
         RemoteFile("s3://rooms/a.h5", size, "")
 
 
+@pytest.mark.parametrize("header", ["Location", "URI"])
 @pytest.mark.parametrize(
     ("first", "then", "followed"),
     [
@@ -72,9 +73,9 @@ def test_sizes_that_no_file_has(size: int) -> None:
         ("http://host/a.h5", "https://host/a.h5", True),
     ],
 )
-def test_https_is_not_left(first: str, then: str, followed: bool) -> None:
+def test_https_is_not_left(first: str, then: str, followed: bool, header: str) -> None:
     (look,) = store._options("https")["client_kwargs"]["trace_configs"][0].on_request_redirect
-    step = SimpleNamespace(url=URL(first), response=SimpleNamespace(headers={"Location": then}))
+    step = SimpleNamespace(url=URL(first), response=SimpleNamespace(headers={header: then}))
     with nullcontext() if followed else pytest.raises(OSError, match="from https to http"):
         asyncio.run(look(None, None, step))
 

@@ -4,6 +4,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -13,12 +14,13 @@ import clearway
 from clearway.cli.main import main
 from clearway.cli.run_names import longer
 from clearway.envs.registration import ENV_ID, LIVE_ENV_ID
-from clearway.errors import ClearwayError, EnvError
+from clearway.errors import ClearwayError, EnvError, RunError
 from clearway.learn.load import run_scenes
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.remote import cache
 from clearway.remote.address import fetched_folder
+from clearway.remote.records import with_origins
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene_files import scene_files
 from clearway.scenes.thor_v1 import write_scene
@@ -82,6 +84,22 @@ def test_a_damaged_scene_elsewhere_is_refused(
     told = capsys.readouterr().err
     assert told.startswith("error: s3://rooms/set/one.h5: cannot be opened as HDF5")
     assert str(fetched_folder()) not in told
+
+
+@pytest.mark.parametrize("name", ["one", "my room"])
+def test_files_are_told_of_by_their_addresses(name: str, s3: Callable[[str, bytes], None], files: Path) -> None:
+    s3(f"set/{name}.h5", (files / "one.h5").read_bytes())
+    (path,) = scene_files([Path(f"s3://rooms/set/{name}.h5")])
+    assert with_origins(f"'{path}': damaged") == f"'s3://rooms/set/{name}.h5': damaged"
+
+
+def test_a_run_s_scene_is_no_folder_elsewhere(s3: Callable[[str, bytes], None], files: Path) -> None:
+    for path in files.iterdir():
+        s3(f"set/{path.name}", path.read_bytes())
+    record = record_of(small_request())
+    elsewhere = replace(record, scenes=tuple(replace(scene, path="s3://rooms/set") for scene in record.scenes))
+    with pytest.raises(RunError, match="s3://rooms/set: the run's scene is no scene file"):
+        run_scenes(elsewhere)
 
 
 def test_environments_take_addresses(s3: Callable[[str, bytes], None], files: Path) -> None:

@@ -254,6 +254,15 @@ def test_google_s_store(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [path.read_bytes() for path in paths] == [b"one", b"two", b"two"]
 
 
+def test_google_s_package_begins_a_download_anew_that_broke_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    GoogleStore.objects = {"a/1.h5": b"x" * 300_000}
+    monkeypatch.setattr(GoogleStore, "cuts", 2)
+    with web_server(GoogleStore) as address:
+        monkeypatch.setenv("STORAGE_EMULATOR_HOST", address)
+        (path,) = fetched(["gs://rooms/a/1.h5"], SUFFIXES)
+    assert path.read_bytes() == b"x" * 300_000 and GoogleStore.cuts == 0
+
+
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 

@@ -1,7 +1,5 @@
 """Pages that list the files of a web server's folder are not trusted."""
 
-import time
-
 import pytest
 
 from clearway.remote import web_folder
@@ -45,13 +43,14 @@ def test_a_folder_that_moved_is_followed() -> None:
     assert found('<a href="a.h5">', "https://other/new/") == ["https://other/new/a.h5"]
 
 
-@pytest.mark.parametrize(
-    "page", ["<a" + " " * 4_000_000, "<a" * 100_000, "<!--" * 100_000, "<a href=x.h5>" * 100_000, "<a href='" * 100_000]
-)
-def test_hostile_pages_end_soon(page: str) -> None:
-    began = time.process_time()
-    found(page)
-    assert time.process_time() - began < 10
+NO_LISTS = ("<a x='", "<a/", "<!--", "<a href='", "<a b=c ", "&#", "</", "<![", "<a" + " " * 200_000)
+
+
+@pytest.mark.parametrize("part", NO_LISTS, ids=lambda part: part[:10])
+def test_pages_that_are_no_lists_are_refused_soon(part: str) -> None:
+    page = part * (web_folder.MAX_PAGE_BYTES // len(part))
+    with pytest.raises(PageTooLong, match=r"a tag of more than 64 KiB|is no HTML"):
+        found(page)
 
 
 def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

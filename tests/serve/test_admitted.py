@@ -82,3 +82,14 @@ def test_a_token_taken_back_between_its_check_and_its_connection_is_noticed() ->
     (look,) = connection.loop.call_soon_threadsafe.call_args.args
     look()
     connection.revoke.assert_called_once()
+
+
+def test_a_connection_that_cannot_be_ended_keeps_no_other_open() -> None:
+    admitted = Admitted(Mock(has=lambda owner, token: False))
+    broken, other = Mock(revoke=Mock(side_effect=OSError("gone"))), Mock()
+    for connection in (other, broken):
+        admitted.add(connection, OWNER, TOKEN)
+    with pytest.raises(OSError, match="gone"):
+        admitted._look()
+    broken.revoke.assert_called_once_with()
+    other.revoke.assert_called_once_with()

@@ -110,9 +110,10 @@ class CleanRuns:
 
         total = count = 0
         for folder in find_runs(self.folder):
+            if not old_checkpoints(folder):
+                continue
             try:
-                removes = self.yes and old_checkpoints(folder)
-                with folder.held() if removes else nullcontext():  # none that is being written; looking leaves no lock
+                with folder.held() if self.yes else nullcontext():  # none that is being written; looking leaves no lock
                     for path in old_checkpoints(folder):
                         size = size_of(path)
                         if self.yes:

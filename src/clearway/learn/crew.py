@@ -265,7 +265,7 @@ def done_by(task: Task, place: Place, server: dist.Store) -> str | None:
         dist.init_process_group(
             "nccl" if cuda else "gloo", store=store, rank=place.rank, world_size=place.count, timeout=PATIENCE
         )
-        patient = dist.new_group(timeout=READING)
+        patient = None if cuda else dist.new_group(timeout=READING)  # NCCL would not tell of an error in time
     except RuntimeError as error:  # of whatever backend
         raise LostPeer(str(error)) from error
     name = f"{socket.gethostname()}, process {os.getpid()}"

@@ -22,7 +22,7 @@ from clearway.model.feature_map import FeatureMap, prepared_features
 from clearway.model.lookup import LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.policy import ScenePolicy
-from clearway.remote.address import address_of, is_fetched
+from clearway.remote.address import address_of, file_name, is_fetched
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES
@@ -179,12 +179,21 @@ def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -
 
 
 def _places(record: RunRecord) -> dict[str, str]:
-    """Where the scenes of a run that lie elsewhere are on this machine, by address; they are fetched."""
+    """Where the scenes of a run that lie elsewhere are on this machine, by address; they are fetched.
+
+    Raises:
+        RunError: one of the addresses is that of a folder.
+        ClearwayError: one cannot be had.
+    """
     addresses = [scene.path for scene in record.scenes if scene.path is not None and address_of(scene.path)]
     if not addresses:
         return {}
     from clearway.remote.cache import fetched
 
+    for address in addresses:
+        if not file_name(address).endswith(SCENE_SUFFIXES):
+            problem = f"{address}: the run's scene is no scene file ({', '.join(SCENE_SUFFIXES)})"
+            raise RunError(f"{problem}. Give the right file with --scenes")
     return dict(zip(addresses, map(str, fetched(addresses, SCENE_SUFFIXES, may_pass=True)), strict=True))
 
 

@@ -20,7 +20,12 @@ class Bounds(fsspec.Callback):
 
     def __init__(self, size: int) -> None:
         super().__init__()
-        self._left, self._since, self._came = size, time.monotonic(), 0
+        self._most = size
+        self.set_size(size)
+
+    def set_size(self, size: int | None) -> None:
+        """A download begins, perhaps anew."""
+        self._left, self._since, self._came = self._most, time.monotonic(), 0
 
     def relative_update(self, inc: int = 1) -> None:
         """So many bytes came. Raises OtherThanSaid."""
@@ -35,7 +40,7 @@ class Bounds(fsspec.Callback):
 
 
 def bounded(system: Any, size: int) -> Callable[..., Coroutine[Any, Any, None]]:
-    """The download of a file of so many bytes, in `Bounds` that begin anew with every try."""
+    """The download of a file of so many bytes, in `Bounds`."""
 
     async def get(address: str, path: str, **options: Any) -> None:
         await system._get_file(address, path, callback=Bounds(size), **options)

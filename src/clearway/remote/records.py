@@ -11,7 +11,7 @@ from pathlib import Path
 from clearway.errors import ClearwayError
 from clearway.files import cache_faults_named, json_text, locked, read_json
 from clearway.regular_files import read_text
-from clearway.remote.address import ENTRY, fetched_folder, is_fetched, without_secrets
+from clearway.remote.address import ENTRY, fetched_folder, file_name, is_fetched, without_secrets
 
 RECORDS = ".records"  # in the cache folder, by the entry's name
 MAX_RECORD_BYTES = 64 * 1024
@@ -58,8 +58,11 @@ def origin(path: Path) -> str:
 
 def with_origins(text: str) -> str:
     """A text in which files that were fetched are named by their addresses."""
-    place = re.compile(rf"{re.escape(str(fetched_folder()))}/{ENTRY.pattern}/[^\s:]+")
-    return place.sub(lambda found: origin(Path(found[0])), text)
+    for entry in re.finditer(rf"{re.escape(str(fetched_folder()))}/{ENTRY.pattern}/", text):
+        with suppress(*_NO_RECORD):
+            address = _address(Path(entry[0]) / "any")
+            text = text.replace(entry[0] + file_name(address), address)
+    return text
 
 
 def records_of(paths: Iterable[Path]) -> dict[str, str]:

@@ -263,7 +263,8 @@ def _kept_private() -> Any:
     import aiohttp
 
     async def look(session: object, context: object, redirected: Any) -> None:
-        there = urljoin(str(redirected.url), redirected.response.headers.get("Location", ""))
+        headers = redirected.response.headers
+        there = urljoin(str(redirected.url), headers.get("Location") or headers.get("URI", ""))  # as aiohttp does
         if redirected.url.scheme == "https" and not there.startswith("https:"):
             raise OSError("its server leads from https to http, which is not followed")
 

@@ -17,7 +17,7 @@ PIECE = 64 * 1024  # characters that are looked through at a time
 
 
 class PageTooLong(OSError):
-    """A page says more than is read."""
+    """A page says more than is read, or what nobody can read."""
 
 
 async def files_of_page(system: Any, folder: str) -> list[dict[str, Any]]:
@@ -67,6 +67,15 @@ class FilesOfPage(HTMLParser):
         self._page, self._places = page, {_place(folder), _place(page)}
         self._seen: set[str] = set()
         self.found: dict[str, None] = {}
+
+    def feed(self, data: str) -> None:
+        """See `HTMLParser`. Raises PageTooLong."""
+        try:
+            super().feed(data)
+        except AssertionError as fault:  # so it says that this is no HTML
+            raise PageTooLong(f"its page of files is no HTML ({fault})") from fault
+        if len(self.rawdata) > PIECE:  # what it waits for the end of; every piece would be looked through again
+            raise PageTooLong(f"its page of files has a tag of more than {PIECE // 1024} KiB")
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """See `HTMLParser`. Raises PageTooLong."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Protocol
 
 from clearway.serve.tokens import Tokens
@@ -46,7 +46,8 @@ class Admitted:
                 connection.loop.call_soon_threadsafe(self._look)
 
     def _look(self) -> None:
-        for connection, (owner, token) in list(self._open.items()):
-            if not self._tokens.has(owner, token):
-                self.remove(connection)
-                connection.revoke()
+        with ExitStack() as revoked:  # one that fails keeps no other open
+            for connection, (owner, token) in list(self._open.items()):
+                if not self._tokens.has(owner, token):
+                    self.remove(connection)
+                    revoked.callback(connection.revoke)
