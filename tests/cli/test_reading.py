@@ -61,11 +61,12 @@ def test_help_is_as_wide_as_the_terminal_and_its_headings_are_plain(clearway, mo
         assert internal not in text
 
 
-def test_help_in_colours_keeps_its_frames():
+@pytest.mark.parametrize("words", [(), ("train",)])
+def test_help_in_colours_keeps_its_frames(words):
     """On a terminal, where lines hold more letters than are seen."""
     pty = pytest.importorskip("pty")
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "clearway", "train", "--help"]
+    command = [sys.executable, "-m", "clearway", *words, "--help"]
     environment = os.environ | {"COLUMNS": "80", "TERM": "xterm-256color", "PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment):
         os.close(theirs)
@@ -76,11 +77,13 @@ def test_help_in_colours_keeps_its_frames():
     os.close(ours)
     assert b"\x1b[" in printed
     lines = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in printed.decode().splitlines()]
+    assert max(map(len, lines)) == 80
     framed = lines[next(number for number, line in enumerate(lines) if line.startswith("╭")) :]
-    assert all(line.startswith(tuple("╭│╰")) and len(line) == 80 for line in framed) and len(framed) > 50
+    assert all(line.startswith(tuple("╭│╰")) and len(line) == 80 for line in framed) and len(framed) > 20
 
 
-def test_what_is_no_help_is_printed_as_it_is(capsys):
+def test_what_is_no_help_is_printed_as_it_is(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
     with pytest.raises(SystemExit):
         main(["--tyro-print-completion", "bash"])
     script = capsys.readouterr().out
