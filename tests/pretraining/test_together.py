@@ -51,7 +51,7 @@ def doubles(first: PretrainRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator
     """Pictures, parameters and whatever is computed from them in float64."""
     torch.set_default_dtype(torch.float64)
     plain = trainer_module.standardised
-    monkeypatch.setattr(trainer_module, "standardised", lambda levels: plain(levels).astype(np.float64))
+    monkeypatch.setattr(trainer_module, "standardised", lambda levels: plain(levels).double())
     monkeypatch.setattr(trainer_module, "multiplies_bfloat16", lambda device: False)
     monkeypatch.setattr(torch.Tensor, "float", torch.Tensor.double)
     yield first

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from clearway.perception.around import PLACES_M
 from clearway.perception.eyes_network import NEAREST_M, Eyes
-from clearway.pretraining.augment import relit, standardised
+from clearway.pretraining.augment import chances, relit, standardised
 from clearway.pretraining.labels import pair_labels, token_depth_m
 from clearway.pretraining.losses import OVERLAPPING, SHALLOWEST_M
 from clearway.scenes.sensors import DEPTH, RGB
@@ -84,20 +84,20 @@ def judge_rooms(eyes: Eyes, views: Views, seed: int = 0, *, relight: bool = True
     """
     training = eyes.training
     eyes.eval()
-    rngs = [np.random.default_rng([seed, room]) for room in range(len(views.shards))]
     with torch.inference_mode():
-        found = [_in_room(eyes, shard, rng, relight) for shard, rng in zip(views.shards, rngs, strict=True)]
+        found = [_in_room(eyes, shard, [seed, room], relight) for room, shard in enumerate(views.shards)]
     eyes.train(training)
     return found
 
 
-def _in_room(eyes: Eyes, shard: Shard, rng: np.random.Generator, relight: bool) -> dict[str, float]:
+def _in_room(eyes: Eyes, shard: Shard, numbers: list[int], relight: bool) -> dict[str, float]:
+    """The figures of a room, by chances that follow from numbers."""
     every = slice(None)
     table, depth, pictures = shard.table, shard.seen(DEPTH, every), shard.seen(RGB, every)
-    levels = pictures.astype(np.float32)
+    levels = torch.from_numpy(pictures.astype(np.float32))
     if relight:
-        levels[1::2] = relit(pictures[1::2], rng)
-    pixels = torch.from_numpy(standardised(levels))
+        levels[1::2] = relit(torch.from_numpy(pictures[1::2]), chances(numbers, levels.device))
+    pixels = standardised(levels)
     tokens = torch.cat([eyes(pixels[first : first + BATCH]) for first in range(0, len(pixels), BATCH)])
     glance = eyes.glance(tokens)
     free_m = (glance.free.exp() - NEAREST_M).numpy()
@@ -111,7 +111,7 @@ def _in_room(eyes: Eyes, shard: Shard, rng: np.random.Generator, relight: bool) 
         "stands": float(stands_right.mean()),
         "step_ahead": float(stands_right[:, STEP_AHEAD].mean()),
         "depth": float(np.median(np.abs(told_m / true_m - 1))),
-        **_relative_poses(eyes, tokens, glance.depth, shard, rng),
+        **_relative_poses(eyes, tokens, glance.depth, shard, np.random.default_rng(numbers)),
     }
 
 

@@ -20,7 +20,7 @@ from clearway.model.precision import multiplies_bfloat16
 from clearway.perception.eyes import EyesEncoder
 from clearway.perception.eyes_network import Eyes
 from clearway.pretraining.ahead import made_ahead
-from clearway.pretraining.augment import relit, standardised
+from clearway.pretraining.augment import chances, relit, standardised
 from clearway.pretraining.labels import pair_labels
 from clearway.pretraining.losses import Lesson, drawn_pairs, losses
 from clearway.pretraining.settings import PretrainSettings
@@ -143,7 +143,8 @@ class Pretrainer:
         """This worker's part of the batch of an update, relit and paired by that update's chances."""
         update, batch = numbered
         settings, number = self.settings, [self.request.seed, update]
-        levels = relit(batch.seen[RGB], np.random.default_rng([*number, LIGHT]))
+        pictures = torch.from_numpy(batch.seen[RGB]).to(self.device)
+        levels = relit(pictures, chances([*number, LIGHT], self.device))
         rng = np.random.default_rng([*number, PARTNERS])
         first, second = drawn_pairs(len(batch), settings.partners, 2 * settings.together, rng)
         part, whole = self._own, len(batch)
@@ -151,7 +152,7 @@ class Pretrainer:
         first, second = first[ours] - part.start, second[ours] - part.start
         own = batch[part]
         labels = pair_labels(own.table, own.seen[DEPTH], first, second, settings.shape.grid)
-        return Lesson(own, torch.from_numpy(standardised(levels[part])), first, second, labels, part, whole)
+        return Lesson(own, standardised(levels[part]), first, second, labels, part, whole)
 
     def update(self, lesson: Lesson) -> dict[str, float]:
         """Learn from the next lesson; gives its figures."""
