@@ -57,7 +57,7 @@ def test_it_learns_what_the_processor_learns(name: str) -> None:
         assert here == pytest.approx(there, abs=1e-6, rel=1e-6)  # some are summed in float32
     assert ends[0].keys() == ends[1].keys()
     for key, tensor in ends[0].items():
-        torch.testing.assert_close(tensor, ends[1][key], rtol=1e-9, atol=1e-9, msg=lambda m, k=key: f"{k}: {m}")
+        torch.testing.assert_close(tensor, ends[1][key], rtol=1e-5, atol=1e-6, msg=lambda m, k=key: f"{k}: {m}")
 
 
 def test_the_default_recipe_learns(tmp_path: Path) -> None:
