@@ -12,6 +12,7 @@ from clearway.agents.generalist import Generalist
 from clearway.agents.tour_map import map_of
 from clearway.mapping.beliefs import LatticePose
 from clearway.mapping.following import SURE
+from clearway.mapping.lattice import HEADINGS
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.routes import FAR, first_action, ways_from
 from clearway.mapping.sight import Sight
@@ -30,7 +31,8 @@ class Retrieval:
     def __init__(self, sight: Sight, known: RoomMap) -> None:
         self._sight, self._known = sight, known
         self._described = sight.description(known.features.astype(np.float32))
-        self._price = np.where(known.room >= SURE, 1, FAR).astype(np.float32)[None, None].repeat(4, axis=1)
+        free = np.where(known.room >= SURE, 1, FAR).astype(np.float32)
+        self._price = np.broadcast_to(free, (1, 2, HEADINGS, *free.shape))
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
         """Where the target was taken, for good."""

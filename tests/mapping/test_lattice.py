@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.beliefs import SEEN, LatticePose, add_sighting, add_standing, likeliest
+from clearway.mapping.beliefs import NEXT, NEXT_AT_0, SEEN, LatticePose, add_sighting, add_standing, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT, lattice_of
 from clearway.perception.around import PLACES_M
 from clearway.perception.whereabouts import ELSEWHERE, WHEREABOUTS, bin_of
@@ -90,11 +90,24 @@ def test_eyes_are_never_as_sure_of_a_cell_as_who_tried_it():
     room = np.zeros((SIDE, SIDE), np.float32)
     room[11, 10] = -10.0
     evidence = np.zeros(len(PLACES_M), np.float32)
-    for place in ((0.5, 0.0), (1.0, 0.5)):
+    for place in ((0.5, 0.0), (0.5, 0.5), (1.0, 0.5)):
         evidence[PLACES_M.index(place)] = 3.0
     for _ in range(5):
         add_standing(room, LatticePose(0, 10, 10), evidence, 1.0, HALF)
-    assert room[11, 10] == -10.0 and room[12, 11] == SEEN and room.sum() == SEEN - 10
+    assert room[11, 10] == -10.0 and room[11, 11] == room[12, 11] == SEEN and room.sum() == 2 * SEEN - 10
+
+
+def test_of_the_cell_straight_ahead_the_last_look_tells_all():
+    pose, side = LatticePose(1, 10, 10), LatticePose(0, 10, 9)
+    look = np.full(len(PLACES_M), 2.0, np.float32)
+    room = np.zeros((SIDE, SIDE), np.float32)
+    for _ in range(3):
+        add_standing(room, pose, look, 1.0, HALF)
+    assert room[10, 11] == pytest.approx(NEXT_AT_0 + 2 * NEXT) and room[11, 11] == SEEN  # one beside it, by all looks
+    add_standing(room, pose, -look, 1.0, HALF)
+    assert room[10, 11] == pytest.approx(NEXT_AT_0 - 2 * NEXT) and room[11, 11] == 2
+    add_standing(room, side, look, 1.0, HALF)  # seen from elsewhere it is as all others
+    assert room[10, 11] == pytest.approx(NEXT_AT_0 - 2 * NEXT + 2)
 
 
 def test_by_shorter_steps_a_bin_is_of_more_poses_and_a_place_tells_of_the_cells_around_it():

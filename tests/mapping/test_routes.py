@@ -16,14 +16,14 @@ SIDE = 7
 def neighbours(pose: LatticePose, entering: np.ndarray):
     """Action, pose and cost of every step that stays in the lattice."""
     steps = (
-        (Action.MOVE_FORWARD, pose.moved(1), pose.heading),
-        (Action.MOVE_BACKWARD, pose.moved(-1), (pose.heading + 2) % HEADINGS),
+        (Action.MOVE_FORWARD, pose.moved(1), (0, pose.heading)),
+        (Action.MOVE_BACKWARD, pose.moved(-1), (1, (pose.heading + 2) % HEADINGS)),
         (Action.TURN_RIGHT, pose.turned(1), None),
         (Action.TURN_LEFT, pose.turned(-1), None),
     )
-    for action, there, direction in steps:
+    for action, there, move in steps:
         if 0 <= there.row < SIDE and 0 <= there.column < SIDE:
-            yield action, there, 1.0 if direction is None else float(entering[direction, there.row, there.column])
+            yield action, there, 1.0 if move is None else float(entering[*move, there.row, there.column])
 
 
 def plain_costs(start: LatticePose, entering: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ def plain_costs(start: LatticePose, entering: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(5))
 def test_ways_are_the_cheapest_and_first_actions_lead_along_them(seed):
     rng = np.random.default_rng(seed)
-    entering = rng.uniform(1, 6, (1, HEADINGS, SIDE, SIDE)).astype(np.float32)
+    entering = rng.uniform(1, 6, (1, 2, HEADINGS, SIDE, SIDE)).astype(np.float32)
     entering[rng.random(entering.shape) < 0.2] = FAR
     start = LatticePose(*rng.integers((HEADINGS, SIDE, SIDE)).tolist())
     cost = ways_from([start], entering)

@@ -48,6 +48,19 @@ def test_without_a_tour_cells_that_were_only_seen_cost_what_they_turn_out_to_be(
     assert steps(tried, cost=200.0) == Action.MOVE_FORWARD
 
 
+def test_backwards_is_dearer_where_a_cell_was_only_seen():
+    room = np.full((SIDE, SIDE), SURE, np.float32)
+    room[4, 4] = 4.0
+    evidence, done = np.zeros((1, 4, SIDE, SIDE), np.float32), np.zeros((1, 4, SIDE, SIDE), bool)
+    evidence[0][END.turned(2).index] = 30.0
+    settings = MappingSettings(collision_cost=100.0)
+    asked = [START.turned(2)], evidence, done, room[None], done, settings
+    assert search_steps(*asked)[0].tolist()[0] in (Action.TURN_LEFT, Action.TURN_RIGHT)
+    assert search_steps(*asked, toured=True)[0].tolist() == [Action.MOVE_BACKWARD]
+    room[4, 4] = SURE
+    assert search_steps(*asked)[0].tolist() == [Action.MOVE_BACKWARD]
+
+
 def test_no_way_leads_where_a_move_was_blocked_or_a_body_cannot_stand():
     free = np.full((SIDE, SIDE), SURE, np.float32)
     assert steps(free) == Action.MOVE_FORWARD

@@ -69,6 +69,11 @@ class Lattice:
         return near.astype(np.float32)
 
     @cached_property
+    def next_ahead(self) -> np.ndarray:
+        """(N,) bool: which of the cells around is the next one, straight ahead."""
+        return (self._steps_around == (1, 0)).all(axis=1)
+
+    @cached_property
     def _steps_around(self) -> np.ndarray:
         """(N, 2) int64, steps ahead and to the right of the cells among `around.PLACES_M`."""
         ahead, right = int(AHEAD_M[-1] / self.step_m + 1e-9), int(RIGHT_M[-1] / self.step_m + 1e-9)

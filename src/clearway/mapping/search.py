@@ -17,7 +17,7 @@ from clearway.mapping.settings import MappingSettings
 
 DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body can hardly stand
 NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
-MOST_FREE = 0.95  # probability, at most, that a body can stand in a cell that was only seen
+MOST_FREE, BEHIND = 0.95, 0.9  # probability, at most, that a body can stand in a cell that was only seen; backwards
 TURNS_OUT, TURNS_OUT_AT_0 = 1.8, 1.53  # log-odds per log-odds held, and where 0 is held, of such cells in `validation`
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
 IN_VIEW, VIEW_ALONG, VIEW_ACROSS = 0.1, 7, 3  # likewise, of what is within so many cells: eyes compare these well
@@ -56,7 +56,8 @@ def search_steps(
         in_view: share of what is likely in view of a pose that counts as its own: 0 where poses are to be come to.
         toured: cells cost what is held of them, as after a tour; else, if only seen, what such cells turn out to be.
     """
-    price = _entering(_as_held(room) if toured else _as_it_turns_out(room), room, shut, settings.collision_cost)
+    free = (_as_held(room),) * 2 if toured else (_as_it_turns_out(room), _as_it_turns_out(room, BEHIND))
+    price = np.stack([_entering(one, room, shut, settings.collision_cost) for one in free], axis=1)
     cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
@@ -73,9 +74,9 @@ def _as_held(room: np.ndarray) -> np.ndarray:
     return 1 / (1 + np.exp(-room))
 
 
-def _as_it_turns_out(room: np.ndarray) -> np.ndarray:
+def _as_it_turns_out(room: np.ndarray, most: float = MOST_FREE) -> np.ndarray:
     """How often a body can stand in a cell of which so much is held; of one that was only seen it is never certain."""
-    seen = np.minimum(_as_held(TURNS_OUT * room + TURNS_OUT_AT_0), MOST_FREE)
+    seen = np.minimum(_as_held(TURNS_OUT * room + TURNS_OUT_AT_0), most)
     return np.where(np.abs(room) > SEEN, _as_held(room), seen)
 
 
