@@ -85,10 +85,18 @@ def add_sighting(
     belief[:, rows, columns] = after
 
 
-def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weight: float, lattice: Lattice) -> None:
+def add_standing(
+    room: np.ndarray,
+    pose: LatticePose,
+    evidence: np.ndarray,
+    weight: float,
+    lattice: Lattice,
+    *,
+    last_look: bool = False,
+) -> None:
     """Add evidence (63,) of where a body could stand, seen from a pose, to log-odds (G, G) of cells not tried yet.
 
-    Of the cell straight ahead it takes the place of what was told before.
+    last_look: of the cell straight ahead it takes the place of what was told before.
     """
     side = len(room)
     rows, columns = (lattice.around[pose.heading] + np.array(pose.cell)).T
@@ -96,7 +104,9 @@ def add_standing(room: np.ndarray, pose: LatticePose, evidence: np.ndarray, weig
     cells = rows[inside], columns[inside]
     before = room[cells]
     told = (lattice.shares @ evidence)[inside]
-    seen = np.where(lattice.next_ahead[inside], NEXT_AT_0 + NEXT * told, before + weight * told)
+    seen = before + weight * told
+    if last_look:
+        seen = np.where(lattice.next_ahead[inside], NEXT_AT_0 + NEXT * told, seen)
     room[cells] = np.where(np.abs(before) > SEEN, before, np.clip(seen, -SEEN, SEEN))
 
 

@@ -42,12 +42,20 @@ class Follower:
         settings: how things are weighed.
         known: what a tour of this room has found; None: the room is unknown.
         pictures: N, that are kept of a walk in an unknown room, one of each of the first poses; else none are.
+        last_look: of the cell ahead in an unknown room the last look tells all, see `add_standing`.
     """
 
     def __init__(
-        self, sight: Sight, settings: MappingSettings, known: RoomMap | None = None, pictures: int = KEPT
+        self,
+        sight: Sight,
+        settings: MappingSettings,
+        known: RoomMap | None = None,
+        pictures: int = KEPT,
+        *,
+        last_look: bool = False,
     ) -> None:
         self._sight, self._settings, self._known = sight, settings, known
+        self._last_look = last_look and known is None
         self._moved_bins = moved_bins(settings)
         self._pictures = pictures if known is None else 0
         if known is not None:
@@ -112,8 +120,8 @@ class Follower:
             kept = {name: after[name][row] for name in KEPT_AT}
             put_right(before[row], poses[row], Action(int(state["action"][row])), kept)
         for row, (pose, stands) in enumerate(zip(poses, self._sight.stands(seen), strict=True)):
-            if not after["been"][row][pose.index]:
-                add_standing(room[row], pose, stands, self._settings.standing_weight, self._settings.lattice)
+            weight = 0.0 if after["been"][row][pose.index] else self._settings.standing_weight  # the same look again
+            add_standing(room[row], pose, stands, weight, self._settings.lattice, last_look=self._last_look)
             room[row][pose.cell] = SURE
             if mark[row][pose.index] not in (0, marks[row]):
                 repeats[row] = NEVER

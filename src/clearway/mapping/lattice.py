@@ -70,8 +70,8 @@ class Lattice:
 
     @cached_property
     def next_ahead(self) -> np.ndarray:
-        """(N,) bool: which of the cells around is the next one, straight ahead."""
-        return (self._steps_around == (1, 0)).all(axis=1)
+        """(N,) bool: which of the cells around is the next one, straight ahead; none where it is no place of the eyes."""
+        return (self._steps_around == (1, 0)).all(axis=1) & (self.step_m == PLACE_M)
 
     @cached_property
     def _steps_around(self) -> np.ndarray:

@@ -18,6 +18,7 @@ from clearway.mapping.settings import MappingSettings
 DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body can hardly stand
 NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
 MOST_FREE, BEHIND = 0.95, 0.9  # probability, at most, that a body can stand in a cell that was only seen; backwards
+UNSEEN = 1.25  # times as much a collision costs backwards: who turns, sees first
 TURNS_OUT, TURNS_OUT_AT_0 = 1.8, 1.53  # log-odds per log-odds held, and where 0 is held, of such cells in `validation`
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
 IN_VIEW, VIEW_ALONG, VIEW_ACROSS = 0.1, 7, 3  # likewise, of what is within so many cells: eyes compare these well
@@ -56,8 +57,7 @@ def search_steps(
         in_view: share of what is likely in view of a pose that counts as its own: 0 where poses are to be come to.
         toured: cells cost what is held of them, as after a tour; else, if only seen, what such cells turn out to be.
     """
-    free = (_as_held(room),) * 2 if toured else (_as_it_turns_out(room), _as_it_turns_out(room, BEHIND))
-    price = np.stack([_entering(one, room, shut, settings.collision_cost) for one in free], axis=1)
+    price = _prices(room, shut, settings.collision_cost, toured)
     cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
@@ -69,13 +69,23 @@ def search_steps(
     return np.array(found, np.int64), lost
 
 
+def _prices(room: np.ndarray, shut: np.ndarray, collision_cost: float, toured: bool) -> np.ndarray:
+    """(B, 2, 4, G, G) of moves ahead and backwards, see `ways_from`."""
+    if toured:
+        ahead = behind = _entering(_as_held(room), room, shut, collision_cost)
+    else:
+        ahead = _entering(_as_it_turns_out(room, MOST_FREE), room, shut, collision_cost)
+        behind = _entering(_as_it_turns_out(room, BEHIND), room, shut, UNSEEN * collision_cost)
+    return np.stack([ahead, behind], axis=1)
+
+
 def _as_held(room: np.ndarray) -> np.ndarray:
     """Probability that a body can stand in a cell, by log-odds held of it."""
     return 1 / (1 + np.exp(-room))
 
 
-def _as_it_turns_out(room: np.ndarray, most: float = MOST_FREE) -> np.ndarray:
-    """How often a body can stand in a cell of which so much is held; of one that was only seen it is never certain."""
+def _as_it_turns_out(room: np.ndarray, most: float) -> np.ndarray:
+    """How often a body can stand in a cell of which so much is held: in one that was only seen `most` often at most."""
     seen = np.minimum(_as_held(TURNS_OUT * room + TURNS_OUT_AT_0), most)
     return np.where(np.abs(room) > SEEN, _as_held(room), seen)
 
