@@ -11,6 +11,7 @@ seconds making the trainer and its updates.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -23,6 +24,7 @@ from clearway.evaluation.episodes import EPISODES_PER_TARGET
 from clearway.learn.adapt import Adapt
 from clearway.learn.learner import Learner
 from clearway.learn.presets import DEFAULT
+from clearway.learn.provenance import hardware, package_versions
 from clearway.learn.train import RunRequest, set_threads
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.scene import Scene
@@ -54,6 +56,7 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="+", type=int, default=[0])
     parser.add_argument("--threads", type=int)
     parser.add_argument("--without-walks", action="store_true", help="adapting with a tour of one step, too")
+    parser.add_argument("--json", type=Path, help="where the record is written, after each row")
     args = parser.parse_args()
     set_threads(args.threads)
     learners: dict[str, Learner] = {"adapted": Adapt(), "from nothing": DEFAULT}
@@ -61,6 +64,7 @@ def main() -> None:
         learners["adapted without walks"] = replace(Adapt(), tour_steps=1, walks=1, walk_steps=1)
     print("| scene | targets | seed | " + " | ".join(f"{name}: frames, s" for name in learners) + " |")
     print("|---" * (3 + len(learners)) + "|")
+    rows: list[dict[str, object]] = []
     for path in args.scenes:
         scene = read_scene(path)
         for count in args.targets:
@@ -68,6 +72,12 @@ def main() -> None:
                 found = [solved_after(scene, seeded_targets(scene, count), one, seed) for one in learners.values()]
                 cells = ["not solved" if one is None else f"{one[0]:,}, {one[1]:.1f}" for one in found]
                 print(f"| {scene.name} | {count} | {seed} | " + " | ".join(cells) + " |", flush=True)
+                rows.append(
+                    {"scene": scene.name, "targets": count, "seed": seed, **dict(zip(learners, found, strict=True))}
+                )
+                if args.json:
+                    about = {"versions": package_versions(), "hardware": hardware(), "frames, seconds": rows}
+                    args.json.write_text(json.dumps(about) + "\n")
 
 
 if __name__ == "__main__":

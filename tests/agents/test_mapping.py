@@ -15,12 +15,13 @@ from clearway.evaluation import metrics
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.takes import Takes
 from clearway.evaluation.tours import Touring, walk_tour
-from clearway.mapping.beliefs import likeliest
+from clearway.mapping.beliefs import NEXT, NEXT_AT_0, likeliest
 from clearway.mapping.eyes_sight import EyesSight
 from clearway.mapping.following import Follower
 from clearway.mapping.moves import STAYED
 from clearway.mapping.room_map import RoomMap
 from clearway.mapping.settings import MappingSettings
+from clearway.perception.around import PLACES_M
 from clearway.perception.whereabouts import ELSEWHERE
 from clearway.world.world import make_world
 from helpers.agents import check_agent
@@ -117,6 +118,17 @@ def test_after_a_tour_it_walks_almost_the_shortest_paths(world, tour):
     assert metrics.success(table).mean() == 1 and metrics.spl(table).mean() > 0.9
     assert table.collisions.mean() <= 0.05
     assert table.told_arrival is not None and table.told_arrival.mean() > 0.9
+
+
+def test_without_a_tour_the_last_look_alone_tells_of_the_cell_ahead(scene, tour):
+    """Where there is a tour, looks add up."""
+    target, seen = {FEATURES: scene.features[9:10]}, {FEATURES: scene.features[5:6]}
+    told = NEXT_AT_0 + NEXT * PerfectSight(scene).stands(scene.features[5:6])[0, PLACES_M.index((0.5, 0.0))]
+    held = []
+    for agent in (MappingAgent(PerfectSight(scene), settings=SETTINGS), tour[0].after(tour[1].state)):
+        _, after = agent.act(seen, agent.reset(target, np.zeros(1, np.uint64)))
+        held.append(np.isclose(after["room"][0], told).any())
+    assert held == [True, False]
 
 
 class Misled(PerfectSight):

@@ -3,11 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.beliefs import IMPOSSIBLE, LatticePose
+from clearway.mapping.beliefs import IMPOSSIBLE, SEEN, LatticePose
 from clearway.mapping.following import SURE, Follower, been_now, put_right
 from clearway.mapping.lattice import AHEAD, HEADINGS, RIGHT
 from clearway.mapping.routes import shifted
 from clearway.mapping.settings import MappingSettings
+from clearway.perception.around import PLACES_M
 from clearway.scenes.actions import BLOCKED, Action
 from helpers.made import grid_scene
 from helpers.perfect_sight import PerfectSight, seen_perfectly
@@ -37,6 +38,28 @@ def test_it_knows_where_it_is_and_which_moves_were_blocked(seed):
     _, after = follower.follow(scene.features[here], state)
     assert blocked and {tuple(edge) for edge in np.argwhere(after["shut"][0]).tolist()} == blocked
     assert (after["room"][0] == SURE).sum() == len(visited(after["room"][0]))
+
+
+class Hopeful(PerfectSight):
+    """Whatever is ahead, it takes for free."""
+
+    def stands(self, features):
+        return np.full((len(features), len(PLACES_M)), 4.0, np.float32)
+
+
+@pytest.mark.parametrize("last_look", [True, False])
+def test_the_look_that_was_wrong_does_not_make_good_what_was_bumped_into(last_look):
+    scene = seen_perfectly(grid_scene(0, width=5, depth=5))
+    state = np.flatnonzero(scene.graph[:, Action.MOVE_FORWARD] == BLOCKED)[:1]
+    follower = Follower(Hopeful(scene), SETTINGS, last_look=last_look)
+    (pose,), after = follower.follow(scene.features[state], begun := follower.begin(1))
+    ahead = pose.moved(1).cell
+    assert after["room"][0][ahead] > 0
+    told = {**begun, **after, "been": been_now(after["been"], [pose]), "action": np.array([int(Action.MOVE_FORWARD)])}
+    _, after = follower.follow(scene.features[state], told)
+    assert after["shut"][0][pose.index] and after["room"][0][ahead] < -SEEN
+    follower.follow(scene.features[state], {**told, **after, "action": np.array([int(Action.TURN_LEFT)])})
+    assert after["room"][0][ahead] < -SEEN
 
 
 def errs_and_goes_on(seed: int, *, pictures: int) -> tuple[list[bool], dict[str, np.ndarray]]:

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from clearway.mapping.beliefs import LatticePose
 from clearway.mapping.following import SURE
-from clearway.mapping.search import probabilities, search_steps
+from clearway.mapping.routes import FAR
+from clearway.mapping.search import prices, probabilities, search_steps
 from clearway.mapping.settings import MappingSettings
 from clearway.scenes.actions import Action
 
@@ -59,6 +61,21 @@ def test_backwards_is_dearer_where_a_cell_was_only_seen():
     assert search_steps(*asked, toured=True)[0].tolist() == [Action.MOVE_BACKWARD]
     room[4, 4] = SURE
     assert search_steps(*asked)[0].tolist() == [Action.MOVE_BACKWARD]
+
+
+def test_moves_cost_what_a_collision_is_likely_to():
+    room = np.array([[[4.0, 0.0], [SURE, -SURE]]])
+    shut = np.zeros((1, 4, 2, 2), bool)
+    found = prices(room, shut, 16.0)[0]
+    ahead, behind = found[:, 2]  # into the first row; from outside the lattice no move leads
+    assert (ahead[0, 0], behind[0, 0]) == pytest.approx((1.8, 3.0))  # 0.05 of 16, 0.1 of 20
+    assert (ahead[0, 1], behind[0, 1]) == pytest.approx((3.848, 4.56), abs=1e-3)  # 0.178 of 16 and of 20
+    ahead, behind = found[:, 0]  # into the second
+    assert (ahead[1, 0], behind[1, 0]) == pytest.approx((1, 1), abs=2e-4)
+    assert ahead[1, 1] == behind[1, 1] == FAR
+    ahead, behind = prices(room, shut, 16.0, toured=True)[0, :, 2]
+    np.testing.assert_array_equal(ahead, behind)
+    assert ahead[0, 0] == pytest.approx(1 + 16 / (1 + np.exp(4)))
 
 
 def test_no_way_leads_where_a_move_was_blocked_or_a_body_cannot_stand():

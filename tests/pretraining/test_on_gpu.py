@@ -10,6 +10,7 @@ import torch
 from clearway.perception.eyes import find_record, from_record, read_card
 from clearway.perception.eyes_network import EyesShape
 from clearway.pretraining import trainer as trainer_module
+from clearway.pretraining.augment import NOISE, chances, relit
 from clearway.pretraining.pretrain import pretrain
 from clearway.pretraining.settings import PretrainSettings
 from clearway.pretraining.trainer import Pretrainer, PretrainRequest
@@ -52,8 +53,10 @@ def test_pictures_are_relit_where_they_are(views: Views) -> None:
     assert first.is_cuda and torch.equal(first, again)
     plain = next(Pretrainer(replace(request, device="cpu")).lessons()).pixels
     assert first.shape == plain.shape and first.stride() == plain.stride() and first.dtype == plain.dtype
-    assert first.cpu().mean((2, 3)) == pytest.approx(plain.mean((2, 3)), abs=1.5)  # under another light
-    assert not torch.equal(first.cpu(), plain)
+    grey = torch.full((64, 24, 32, 3), 100, dtype=torch.uint8, device="cuda")
+    levels = relit(grey, chances([3, 5], grey.device))
+    light, noise = levels.mean((1, 2, 3)) / 100, levels.std((1, 2)).mean(1)
+    assert 0.55 < light.min() < 0.85 and 1.15 < light.max() < 1.45 and NOISE / 2 < noise.max() < NOISE + 2
 
 
 def test_a_training_goes_on_on_the_gpu_and_the_processor_sees_with_the_eyes(tmp_path: Path, views: Views) -> None:

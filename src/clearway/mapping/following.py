@@ -24,6 +24,9 @@ from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
 BUMPED = SURE / 2  # log-odds that a blocked move takes from the cell before it
+TRIED = (
+    -beliefs.SEEN - 1
+)  # log-odds at most of a cell into which a move was blocked, and which looks tell nothing more of
 KEPT, LATEST = 64, 2
 """Pictures that are kept of a walk, and how many of the last ones say nothing of the pose: they share its errors."""
 RECOGNISED = 20.0
@@ -208,6 +211,8 @@ class Follower:
             belief["shut"][direction, before.row, before.column] = True
             if room[beyond.cell] < SURE:
                 room[beyond.cell] -= BUMPED
+                if self._last_look:  # which would make good again what was bumped into
+                    room[beyond.cell] = min(room[beyond.cell], TRIED)
 
 
 def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mapping[str, np.ndarray]) -> None:

@@ -70,7 +70,7 @@ class Lattice:
 
     @cached_property
     def next_ahead(self) -> np.ndarray:
-        """(N,) bool: which of the cells around is the next one, straight ahead; none where it is no place of the eyes."""
+        """(N,) bool: which cell around is the next one, straight ahead; none where that is no place of the eyes."""
         return (self._steps_around == (1, 0)).all(axis=1) & (self.step_m == PLACE_M)
 
     @cached_property

@@ -57,7 +57,7 @@ def search_steps(
         in_view: share of what is likely in view of a pose that counts as its own: 0 where poses are to be come to.
         toured: cells cost what is held of them, as after a tour; else, if only seen, what such cells turn out to be.
     """
-    price = _prices(room, shut, settings.collision_cost, toured)
+    price = prices(room, shut, settings.collision_cost, toured=toured)
     cost = ways_from(poses, price)
     within = cost < FAR
     left = within & ~done
@@ -69,8 +69,8 @@ def search_steps(
     return np.array(found, np.int64), lost
 
 
-def _prices(room: np.ndarray, shut: np.ndarray, collision_cost: float, toured: bool) -> np.ndarray:
-    """(B, 2, 4, G, G) of moves ahead and backwards, see `ways_from`."""
+def prices(room: np.ndarray, shut: np.ndarray, collision_cost: float, *, toured: bool = False) -> np.ndarray:
+    """(B, 2, 4, G, G) of moves ahead and backwards, see `ways_from` and `search_steps`."""
     if toured:
         ahead = behind = _entering(_as_held(room), room, shut, collision_cost)
     else:
