@@ -1,7 +1,7 @@
 """Eyes that learn: what to train them on, and the update of one batch of views.
 
-What an update does follows from the settings, the seed and its own number alone: which pictures, under which light,
-compared with which. So a checkpoint holds the network, the optimiser and that number.
+What an update does follows from the settings, the seed, its own number and the kind of device alone: which pictures,
+under which light, compared with which. So a checkpoint holds the network, the optimiser and that number.
 """
 
 from __future__ import annotations
