@@ -40,7 +40,7 @@ class MappingAgent:
         settings: MappingSettings | None = None,
     ) -> None:
         self._sight, self._settings, self._has_toured = sight, settings or MappingSettings(), known is not None
-        self._follower = Follower(sight, self._settings, known, last_look=True)
+        self._follower = Follower(sight, self._settings, known, last_look=not self._has_toured)
         self._features = Encoded(encoder)
         self.sees: tuple[str, ...] = (self._features.sees,)
 

@@ -24,9 +24,7 @@ from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
 BUMPED = SURE / 2  # log-odds that a blocked move takes from the cell before it
-TRIED = (
-    -beliefs.SEEN - 1
-)  # log-odds at most of a cell into which a move was blocked, and which looks tell nothing more of
+TRIED = -beliefs.SEEN - 1  # log-odds at most of a cell into which a move was blocked: looks tell no more of it
 KEPT, LATEST = 64, 2
 """Pictures that are kept of a walk, and how many of the last ones say nothing of the pose: they share its errors."""
 RECOGNISED = 20.0
@@ -45,7 +43,7 @@ class Follower:
         settings: how things are weighed.
         known: what a tour of this room has found; None: the room is unknown.
         pictures: N, that are kept of a walk in an unknown room, one of each of the first poses; else none are.
-        last_look: of the cell ahead in an unknown room the last look tells all, see `add_standing`.
+        last_look: of the cell ahead the last look tells all, see `add_standing`.
     """
 
     def __init__(
@@ -58,7 +56,7 @@ class Follower:
         last_look: bool = False,
     ) -> None:
         self._sight, self._settings, self._known = sight, settings, known
-        self._last_look = last_look and known is None
+        self._last_look = last_look
         self._moved_bins = moved_bins(settings)
         self._pictures = pictures if known is None else 0
         if known is not None:

@@ -6,6 +6,7 @@ Where the pictures are, on a GPU or not, all is drawn and computed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import torch
@@ -26,11 +27,15 @@ def chances(numbers: Sequence[int], device: torch.device) -> torch.Generator:
 
 def relit(pictures: Tensor, drawn: torch.Generator) -> Tensor:
     """Pictures (B, height, width, 3) uint8 under another light each, with noise, float32 grey levels from 0 to 255."""
-    count, device = len(pictures), pictures.device
-    light = 1 + LIGHT * (2 * torch.rand((count, 1, 1, 1), generator=drawn, device=device, dtype=torch.float32) - 1)
-    colour = 1 + COLOUR * (2 * torch.rand((count, 1, 1, 3), generator=drawn, device=device, dtype=torch.float32) - 1)
-    noise = NOISE * torch.rand((count, 1, 1, 1), generator=drawn, device=device, dtype=torch.float32)
-    each = torch.randn(pictures.shape, generator=drawn, device=device, dtype=torch.float32)
+    count = len(pictures)
+    uniform, normal = (
+        partial(draw, generator=drawn, device=pictures.device, dtype=torch.float32)
+        for draw in (torch.rand, torch.randn)
+    )
+    light = 1 + LIGHT * (2 * uniform((count, 1, 1, 1)) - 1)
+    colour = 1 + COLOUR * (2 * uniform((count, 1, 1, 3)) - 1)
+    noise = NOISE * uniform((count, 1, 1, 1))
+    each = normal(pictures.shape)
     return (pictures * (light * colour)).addcmul_(each, noise).clamp_(0, WHITE)
 
 
