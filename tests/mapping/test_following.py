@@ -58,7 +58,8 @@ def test_the_look_that_was_wrong_does_not_make_good_what_was_bumped_into(last_lo
     told = {**begun, **after, "been": been_now(after["been"], [pose]), "action": np.array([int(Action.MOVE_FORWARD)])}
     _, after = follower.follow(scene.features[state], told)
     assert after["shut"][0][pose.index] and after["room"][0][ahead] < -SEEN
-    follower.follow(scene.features[state], {**told, **after, "action": np.array([int(Action.TURN_LEFT)])})
+    beside = scene.graph[state, Action.TURN_LEFT]
+    _, after = follower.follow(scene.features[beside], {**told, **after, "action": np.array([int(Action.TURN_LEFT)])})
     assert after["room"][0][ahead] < -SEEN
 
 

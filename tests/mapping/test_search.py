@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clearway.mapping.beliefs import LatticePose
+from clearway.mapping.beliefs import NO_ROOM, LatticePose
 from clearway.mapping.following import SURE
 from clearway.mapping.routes import FAR
 from clearway.mapping.search import prices, probabilities, search_steps
@@ -73,6 +73,8 @@ def test_moves_cost_what_a_collision_is_likely_to():
     ahead, behind = found[:, 0]  # into the second
     assert (ahead[1, 0], behind[1, 0]) == pytest.approx((1, 1), abs=2e-4)
     assert ahead[1, 1] == behind[1, 1] == FAR
+    bumped = prices(np.full((1, 2, 2), NO_ROOM), shut, 16.0)[0, 0, 0]
+    assert bumped[1].tolist() == pytest.approx([34.9, 34.9], abs=0.1)  # dear, not impossible: eyes took it for free
     ahead, behind = prices(room, shut, 16.0, toured=True)[0, :, 2]
     np.testing.assert_array_equal(ahead, behind)
     assert ahead[0, 0] == pytest.approx(1 + 16 / (1 + np.exp(4)))

@@ -24,7 +24,6 @@ from clearway.scenes.actions import Action
 
 SURE = 12.0  # log-odds of what was tried
 BUMPED = SURE / 2  # log-odds that a blocked move takes from the cell before it
-TRIED = -beliefs.SEEN - 1  # log-odds at most of a cell into which a move was blocked: looks tell no more of it
 KEPT, LATEST = 64, 2
 """Pictures that are kept of a walk, and how many of the last ones say nothing of the pose: they share its errors."""
 RECOGNISED = 20.0
@@ -56,7 +55,7 @@ class Follower:
         last_look: bool = False,
     ) -> None:
         self._sight, self._settings, self._known = sight, settings, known
-        self._last_look = last_look
+        self._last_look = last_look and bool(settings.lattice.next_ahead.any())
         self._moved_bins = moved_bins(settings)
         self._pictures = pictures if known is None else 0
         if known is not None:
@@ -209,8 +208,8 @@ class Follower:
             belief["shut"][direction, before.row, before.column] = True
             if room[beyond.cell] < SURE:
                 room[beyond.cell] -= BUMPED
-                if self._last_look:  # which would make good again what was bumped into
-                    room[beyond.cell] = min(room[beyond.cell], TRIED)
+                if self._last_look:  # else the same look would make good again what was bumped into
+                    room[beyond.cell] = min(room[beyond.cell], beliefs.NO_ROOM)
 
 
 def put_right(before: LatticePose, now: LatticePose, action: Action, kept: Mapping[str, np.ndarray]) -> None:

@@ -10,15 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from clearway.mapping.beliefs import IMPOSSIBLE, SEEN, LatticePose, likeliest
+from clearway.mapping.beliefs import IMPOSSIBLE, NO_ROOM, SEEN, LatticePose, likeliest
 from clearway.mapping.lattice import AHEAD, HEADINGS
 from clearway.mapping.routes import FAR, first_action, shifted, ways_from
 from clearway.mapping.settings import MappingSettings
 
 DOUBT_COST, DOUBT_POWER = 20.0, 16  # steps besides, for a cell in which a body can hardly stand
-NO_ROOM = -5.0  # log-odds below which a body cannot stand in a cell: it was tried
-MOST_FREE, BEHIND = 0.95, 0.9  # probability, at most, that a body can stand in a cell that was only seen; backwards
-UNSEEN = 1.25  # times as much a collision costs backwards: who turns, sees first
+MOST_FREE, MOST_FREE_BEHIND = 0.95, 0.9  # probability, at most, that a body can stand in a cell that was only seen
+DEARER_BEHIND = 1.25  # times as much a collision costs backwards: who turns, sees first
 TURNS_OUT, TURNS_OUT_AT_0 = 1.8, 1.53  # log-odds per log-odds held, and where 0 is held, of such cells in `validation`
 BESIDE = 0.25  # share of what is likely beside a pose that counts as its own
 IN_VIEW, VIEW_ALONG, VIEW_ACROSS = 0.1, 7, 3  # likewise, of what is within so many cells: eyes compare these well
@@ -75,7 +74,7 @@ def prices(room: np.ndarray, shut: np.ndarray, collision_cost: float, *, toured:
         ahead = behind = _entering(_as_held(room), room, shut, collision_cost)
     else:
         ahead = _entering(_as_it_turns_out(room, MOST_FREE), room, shut, collision_cost)
-        behind = _entering(_as_it_turns_out(room, BEHIND), room, shut, UNSEEN * collision_cost)
+        behind = _entering(_as_it_turns_out(room, MOST_FREE_BEHIND), room, shut, DEARER_BEHIND * collision_cost)
     return np.stack([ahead, behind], axis=1)
 
 

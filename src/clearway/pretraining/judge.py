@@ -24,6 +24,7 @@ NEAR_M, NEAR_DEG = 0.5, 30.0  # poses no farther apart count as one step
 CLOSE_M, CLOSE_DEG = 0.5, 15.0  # relative poses told no worse are right
 FREE_M = 0.25  # free ways told no worse are right
 STEP_AHEAD = PLACES_M.index((0.5, 0.0))
+LIGHT, PAIRED = 0, 1  # streams of random numbers of a room
 PAIRS = 4000  # of a room
 BATCH = 64
 
@@ -96,7 +97,7 @@ def _in_room(eyes: Eyes, shard: Shard, numbers: list[int], relight: bool) -> dic
     table, depth, pictures = shard.table, shard.seen(DEPTH, every), shard.seen(RGB, every)
     levels = torch.from_numpy(pictures.astype(np.float32))
     if relight:
-        levels[1::2] = relit(torch.from_numpy(pictures[1::2]), chances(numbers, levels.device))
+        levels[1::2] = relit(torch.from_numpy(pictures[1::2]), chances([*numbers, LIGHT], levels.device))
     pixels = standardised(levels)
     tokens = torch.cat([eyes(pixels[first : first + BATCH]) for first in range(0, len(pixels), BATCH)])
     glance = eyes.glance(tokens)
@@ -111,7 +112,7 @@ def _in_room(eyes: Eyes, shard: Shard, numbers: list[int], relight: bool) -> dic
         "stands": float(stands_right.mean()),
         "step_ahead": float(stands_right[:, STEP_AHEAD].mean()),
         "depth": float(np.median(np.abs(told_m / true_m - 1))),
-        **_relative_poses(eyes, tokens, glance.depth, shard, np.random.default_rng(numbers)),
+        **_relative_poses(eyes, tokens, glance.depth, shard, np.random.default_rng([*numbers, PAIRED])),
     }
 
 
