@@ -15,9 +15,9 @@ IMPOSSIBLE = -60.0
 SEEN = 4.0  # log-odds at most of a cell that was seen, not tried
 NO_ROOM = -SEEN - 1  # log-odds below which a body cannot stand in a cell: it was tried
 NEXT, NEXT_AT_0 = 0.64, 0.37
-"""What is held of the cell next to a body, straight ahead, per log-odds that eyes tell of it, and where these are 0: what
-`search` makes of it is how moves into such cells turned out in `validation`, so that both change together. The last look
-tells all there: what others told before adds nothing."""
+"""What is held of the cell next to a body, straight ahead, per log-odds that eyes tell of it, and where these are 0.
+What `search` makes of it is how moves into such cells turned out in `validation`, so that both change together. The
+last look tells all there: what others told before adds nothing."""
 VISIBLE = 0.9  # probability that something would be seen in a cell that is surely free: others may be behind a wall
 HALF_SURE = 2.0  # log-odds of a cell at which that is half as much
 
