@@ -15,7 +15,7 @@ import pytest
 
 from clearway.serve.client import Client
 from clearway.serve.limits import Limits
-from clearway.serve.own_number import holders
+from helpers.holders import holders
 from helpers.on_ray import MARKS, cluster_here
 from helpers.running import PATIENT_S
 from helpers.serving import TOKEN, TOKENS

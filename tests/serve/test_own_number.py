@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import subprocess
 import sys
@@ -10,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from clearway.errors import DeployError
-from clearway.serve.own_number import beats_in, holders, new_folder, own_number
+from clearway.serve.own_number import beats_in, new_folder, own_number
+from helpers.holders import holders
 from helpers.running import PATIENT_S
 from helpers.serving import ENVIRONMENT
 
@@ -63,6 +66,19 @@ def test_the_folder_of_replicas_that_are_just_restarted_stays(tmp_path: Path, mo
     monkeypatch.setattr("clearway.serve.own_number.SPARED_S", 0.0)
     new_folder(tmp_path)
     assert not folder.exists()
+
+
+def test_who_has_locked_a_number_and_not_written_yet_is_not_told(tmp_path: Path) -> None:
+    with subprocess.Popen(["true"]) as dead:
+        dead.wait(PATIENT_S)
+    for name, text in (("0", ""), ("1", str(dead.pid)), ("2", str(os.getpid()))):
+        with open(tmp_path / f"{name}.number", "w") as file:
+            file.write(text)
+    with contextlib.ExitStack() as held:
+        for path in tmp_path.glob("*.number"):
+            fcntl.flock(held.enter_context(path.open()), fcntl.LOCK_EX)
+        assert holders(tmp_path) == [os.getpid()]
+    assert not holders(tmp_path)
 
 
 def test_beats_that_nobody_gave_spare_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

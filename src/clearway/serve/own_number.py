@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import DeployError
-from clearway.regular_files import read_bytes, read_text
+from clearway.regular_files import read_bytes
 from clearway.serve.replica import Beats
 
-MAX_NUMBER_BYTES = 32  # a process id
 MAX_BEATS_BYTES = 1 << 16
 SPARED_S = 3600.0  # after the last beat there, for which a folder is kept: its replicas may just be restarted
 
@@ -44,11 +43,6 @@ def own_number(folder: Path, most: int) -> int:
     raise DeployError(f"{folder}: {most} replicas run there already. End some of them")
 
 
-def holders(folder: Path) -> list[int]:
-    """Process ids of those that hold a number now."""
-    return [int(read_text(path, MAX_NUMBER_BYTES)) for path in folder.glob("*.number") if _is_held(path)]
-
-
 def beats_in(folder: Path, most: int) -> Beats:
     """The beats of all that share the folder, in a file that each of them maps."""
     with (folder / "beats").open("ab+") as file:
@@ -63,7 +57,7 @@ def new_folder(parent: Path) -> Path:
     Others are removed in which no process holds a number and none has beaten within `SPARED_S`.
     """
     for other in parent.glob("*"):
-        if not (_has_beaten_lately(other) or any(map(_is_held, other.glob("*.number")))):
+        if not (_has_beaten_lately(other) or any(map(is_held, other.glob("*.number")))):
             shutil.rmtree(other, ignore_errors=True)
     return parent / secrets.token_hex(8)
 
@@ -89,7 +83,8 @@ def _locked(path: Path) -> int | None:
     return file
 
 
-def _is_held(path: Path) -> bool:
+def is_held(path: Path) -> bool:
+    """Whether a process holds the number of this file."""
     if (file := _locked(path)) is not None:
         os.close(file)
     return file is None
