@@ -6,7 +6,7 @@ Axis letters: T steps, N environments, C scenes, B = T * N rows, M targets.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -15,7 +15,7 @@ from clearway.learn.figures import Figures, check_finite
 from clearway.learn.hindsight import hindsight_batch
 from clearway.learn.learner import next_steps
 from clearway.learn.lookahead import Observed, better_policy
-from clearway.learn.losses import Batch, LossSettings, LossTerms, loss_gradient, merged
+from clearway.learn.losses import Batch, LossSettings, loss_gradient, merged
 from clearway.learn.minibatches import Minibatch, dealt_epochs
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.on_policy import OnPolicy
@@ -26,6 +26,7 @@ from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, b
 from clearway.learn.rotation import Rotation, check_division, divided_envs, scene_of_envs
 from clearway.learn.share import Share
 from clearway.learn.statistics import EpisodeStatistics
+from clearway.learn.step_figures import StepFigures, loss_figures, row_figures
 from clearway.model.lookup import Activations, LookupNetwork
 from clearway.model.network import NetworkShape, SiameseActorCritic
 from clearway.model.precision import factor_dtype
@@ -36,17 +37,6 @@ from clearway.world.streams import Streams
 from clearway.world.world import World
 
 SHUFFLE_SALT = 1_000_003
-
-
-@dataclass(frozen=True)
-class StepFigures:
-    """What came of a minibatch: its loss, the gradient's norm before clipping, and how much it was."""
-
-    loss: LossTerms
-    norm: Tensor
-    rows: int
-    pairs: int
-    histories: int
 
 
 class Trainer:
@@ -153,8 +143,8 @@ class Trainer:
             self.own_goals.see(rollout.arrived)
         self._rebalance()
         result = {
-            **self._loss_figures(steps, explained),
-            **self._row_figures(steps, len(batch) - rows),
+            **loss_figures(steps, explained, self.peers, clips=not math.isinf(learner.ratio_clip)),
+            **row_figures(steps, len(batch) - rows, self.peers),
             "lr": lr,
             "entropy_weight": settings.entropy_weight,
         }
@@ -338,30 +328,6 @@ class Trainer:
             return 0, None
         sent_as = torch.bfloat16 if self.learner.sent_gradients == "bfloat16" else None
         return self.share.add_up_gradients(self.network, self.learner.heads_by_scene, siamese_moves, sent_as)
-
-    def _row_figures(self, steps: list[StepFigures], hindsight_rows: int) -> Figures:
-        """Figures of what was learnt from, by all workers."""
-        own = [hindsight_rows, *(sum(getattr(step, name) for step in steps) for name in ("rows", "pairs", "histories"))]
-        hindsight, rows, pairs, histories = (int(sum(numbers)) for numbers in zip(*self.peers.told(*own), strict=True))
-        return {
-            "hindsight_rows": hindsight,
-            "distinct_pairs": pairs / rows,
-            "distinct_histories": histories / rows,
-        }
-
-    def _loss_figures(self, steps: list[StepFigures], explained: Tensor) -> Figures:
-        """Figures of the loss, read from the device at once: means over steps, and the explained variance."""
-        names = ("loss", "policy_loss", "value_loss", "entropy", "clipped", "gradient_norm")
-        told = torch.stack(
-            [torch.stack([s.loss.total, s.loss.policy, s.loss.value, s.loss.entropy, s.loss.clipped]) for s in steps]
-        )
-        self.peers.add_up(told)
-        norm = torch.stack([s.norm for s in steps])[:, None]
-        *means, last = torch.cat([torch.cat([told, norm], 1).mean(0), explained[None]]).tolist()
-        figures = {**dict(zip(names, means, strict=True)), "explained_variance": last}
-        if math.isinf(self.learner.ratio_clip):
-            del figures["clipped"]
-        return figures
 
     def _rebalance(self) -> None:
         """Draw targets more often that are reached less often, and own goals as far as there are any."""
