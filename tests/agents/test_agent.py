@@ -10,17 +10,14 @@ import torch
 from clearway.agents.agent import FEATURES, POSE, Agent, Decisions, Observation, joined, rows
 from clearway.agents.by_features import FeatureAgent
 from clearway.agents.by_pose import RandomWalk, network_on_poses, shortest_paths
-from clearway.agents.recurrent import RecurrentAgent
 from clearway.agents.selection import Argmax, ArgmaxUntried
 from clearway.evaluation.optimum import optimum_agents, world_yardsticks
 from clearway.learn.q_learning import QLearning, TrainedTable
 from clearway.learn.run_record import record_of
-from clearway.model.recurrent import RecurrentActorCritic, RecurrentShape, SeenPairs
-from clearway.perception.eyes_network import EyesShape
 from clearway.reward import COLLISION_AWARE
 from clearway.world.world import World
 from helpers.agents import alike, by_rule, check_agent, equal
-from helpers.small_eyes import small_eyes
+from helpers.small_eyes import recurrent
 from helpers.small_runs import small_learner, small_request, small_world, trained_network
 
 EPISODES, STEPS = 9, 7
@@ -38,13 +35,6 @@ def trained_table() -> TrainedTable:
 def network(world: World) -> Agent:
     found = trained_network()
     return network_on_poses(found.lookup(world), world, found.record.learner.reward_scale)
-
-
-def recurrent(world: World) -> Agent:
-    """One that has learnt nothing, by eyes whose features are as many as the world's."""
-    pairs = SeenPairs(small_eyes(0, EyesShape((4, 4, 4), 4, 4, 8, height_px=16, width_px=32)))
-    assert world.features is not None and world.features.shape[1] == 4 + 2 * 4
-    return RecurrentAgent(RecurrentActorCritic(RecurrentShape(pairs.count, 8)), pairs)
 
 
 def optimum(world: World, which: int) -> Agent:

@@ -8,12 +8,16 @@ from pathlib import Path
 import pytest
 import torch
 
+from clearway.agents.agent import Agent
 from clearway.agents.generalist import Generalist
+from clearway.agents.recurrent import RecurrentAgent
 from clearway.mapping.settings import MappingSettings
+from clearway.model.recurrent import RecurrentActorCritic, RecurrentShape, SeenPairs
 from clearway.perception import encode_scenes
 from clearway.perception.eyes import find_record, from_record, write_eyes
 from clearway.perception.eyes_network import Eyes, EyesShape
 from clearway.scenes.scene import Scene
+from clearway.world.world import World
 
 SMALL = EyesShape(widths=(8, 8, 8), token_width=4, description_width=16, hidden_width=16, height_px=48, width_px=64)
 
@@ -44,3 +48,10 @@ def small_generalist(folder: Path) -> Generalist:
 def ship(generalist: Generalist, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let this one be the shipped generalist."""
     monkeypatch.setattr(Generalist, "shipped", classmethod(lambda cls: generalist))
+
+
+def recurrent(world: World) -> Agent:
+    """One that has learnt nothing, by eyes whose features are as many as the world's."""
+    pairs = SeenPairs(small_eyes(0, EyesShape((4, 4, 4), 4, 4, 8, height_px=16, width_px=32)))
+    assert world.features is not None and world.features.shape[1] == 4 + 2 * 4
+    return RecurrentAgent(RecurrentActorCritic(RecurrentShape(pairs.count, 8)), pairs)

@@ -30,6 +30,9 @@ POSE = "pose"
 FEATURES = "features"
 """(B, F) float32: what the scenes' encoder made of a picture."""
 
+LAST_ACTION = "last action"
+"""(B,) int64, in the state of an agent that remembers it: who chooses another one than the agent puts it right."""
+
 
 @dataclass(frozen=True, eq=False)
 class Decisions:

@@ -10,15 +10,19 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.agent import LAST_ACTION, Decisions, Observation, State
+from clearway.agents.blocked import add_blocked, nothing_blocked, without_blocked
 from clearway.agents.chance import CHANCE, chance_of, drawn
 from clearway.agents.encoded import Encoded
+from clearway.mapping.again import marks_of
 from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, SeenPairs, last_step, likeness
 from clearway.perception.encoder import Encoder
 
 
 class RecurrentAgent:
     """Draws its actions by a recurrent network, and says by it whether it has arrived.
+
+    A move that was blocked is not tried again in the same episode where the very same picture is seen.
 
     Args:
         network: the parameters.
@@ -40,8 +44,9 @@ class RecurrentAgent:
             "hidden": np.zeros((count, self._network.shape.width), np.float32),
             "begun": np.zeros(count, bool),
             "seen": np.zeros_like(features),
-            "action": np.zeros(count, np.int64),
+            LAST_ACTION: np.zeros(count, np.int64),
             CHANCE: chance_of(seed),
+            **nothing_blocked(count),
         }
 
     @torch.inference_mode()
@@ -50,17 +55,22 @@ class RecurrentAgent:
         seen = self._features(observation)
         now, target, before = (torch.from_numpy(features) for features in (seen, state["target"], state["seen"]))
         alike = likeness(self._pairs.description(now), self._pairs.description(before))
-        last = last_step(torch.from_numpy(state["action"]), alike)
+        last = last_step(torch.from_numpy(state[LAST_ACTION]), alike)
         last = torch.where(torch.from_numpy(state["begun"])[:, None], last, torch.zeros(LAST_COUNT))
         said = self._network(self._pairs(now, target), last, torch.from_numpy(state["hidden"]))
-        probabilities = torch.softmax(said.scores, dim=1, dtype=torch.float64)
-        decisions, chance = drawn(probabilities.numpy(), state[CHANCE], said.value.numpy())
+        mark = marks_of(seen)
+        same = state["begun"] & (mark == marks_of(state["seen"]))
+        blocked = add_blocked(state, mark, state[LAST_ACTION], same)
+        probabilities = torch.softmax(said.scores, dim=1, dtype=torch.float64).numpy()
+        allowed = without_blocked(blocked, mark, probabilities)
+        decisions, chance = drawn(allowed, state[CHANCE], said.value.numpy())
         decisions = replace(decisions, arrived=said.arrived.numpy() > 0)
         after = {
             "hidden": said.hidden.numpy(),
             "begun": np.ones_like(state["begun"]),
             "seen": seen,
-            "action": decisions.action,
+            LAST_ACTION: decisions.action,
             CHANCE: chance,
+            **blocked,
         }
         return decisions, {**state, **after}

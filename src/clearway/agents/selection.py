@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from clearway.agents.agent import POSE, Agent, Decisions, Observation, State
+from clearway.agents.agent import LAST_ACTION, POSE, Agent, Decisions, Observation, State
 from clearway.errors import AgentError
 from clearway.scenes.actions import ACTION_COUNT
 
@@ -55,7 +55,8 @@ class Argmax:
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """See `Agent.act`."""
         decisions, after = self._agent.act(observation, state)
-        return most_probable(decisions), after
+        decisions = most_probable(decisions)
+        return decisions, _having_taken(decisions.action, after)
 
 
 class ArgmaxUntried:
@@ -88,7 +89,11 @@ class ArgmaxUntried:
         now = before | (1 << action).astype(np.uint8)
         tried = state[_TRIED].copy()
         tried[place] = np.where(now == _ALL_TRIED, 0, now)
-        return replace(decisions, action=action, certain=None), {**after, _FIRST: state[_FIRST], _TRIED: tried}
+        return replace(decisions, action=action, certain=None), {
+            **_having_taken(action, after),
+            _FIRST: state[_FIRST],
+            _TRIED: tried,
+        }
 
     def _its_own(self, seen: Observation) -> Observation:
         """What the other agent sees of it."""
@@ -99,6 +104,11 @@ def most_probable(decisions: Decisions) -> Decisions:
     """The same with the most probable actions, the first among equals. Raises AgentError: none are told."""
     action = _probabilities(decisions).argmax(1)
     return replace(decisions, action=action, certain=np.ones(len(action), bool))
+
+
+def _having_taken(action: np.ndarray, state: State) -> State:
+    """The state of an agent that would have taken others; where it remembers its last action, these (B,) are it."""
+    return {**state, LAST_ACTION: action} if LAST_ACTION in state else state
 
 
 def _probabilities(decisions: Decisions) -> np.ndarray:
