@@ -76,6 +76,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_tables_of_the_site_fit_a_phone(site: Path) -> None:
     """What is too wide nevertheless, scrolls within a box."""
     wide = """wraps => wraps.filter(wrap => wrap.scrollWidth > wrap.clientWidth).length"""

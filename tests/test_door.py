@@ -112,6 +112,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_once_installed_gymnasium_makes_it_without_being_told(installed, tmp_path) -> None:
     from clearway.scenes.thor_v1 import write_scene
 

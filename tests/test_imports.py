@@ -132,5 +132,6 @@ def test_what_a_robot_imports_needs_no_torch(module: str) -> None:
     assert not loaded & {"torch", "scipy", "h5py", "gymnasium", "transformers", "onnx", "onnxruntime"}
 
 
+@pytest.mark.slow
 def test_a_module_that_needs_torch_would_be_noticed() -> None:
     assert "torch" in imported_by("import clearway.agents.by_pose")

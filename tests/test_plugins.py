@@ -54,6 +54,7 @@ def test_the_built_in_names_are_those_that_there_are() -> None:
     assert set(BUILT_IN) == set(KINDS)
 
 
+@pytest.mark.slow
 def test_one_of_each_kind_is_listed_after_our_own(package, tmp_path) -> None:
     listed = clearway_with(package, words=("plugins", "--json"), cache=tmp_path)
     assert listed.returncode == 0, listed.stderr
@@ -75,6 +76,7 @@ def test_one_of_each_kind_is_listed_after_our_own(package, tmp_path) -> None:
     assert any(line.split() == ["encoders", "mean-colour", "tiny-plugins", "1.2"] for line in table.splitlines())
 
 
+@pytest.mark.slow
 def test_its_importer_and_its_encoder_make_scenes(package, tmp_path) -> None:
     write_scene(grid_scene(1), tmp_path / "grid.h5")
     (tmp_path / "two.txt").write_text("grid.h5\n")
@@ -119,6 +121,7 @@ def test_rewards_agents_and_algorithms_are_found_by_name(here) -> None:
         plugin_of("rewards", "cheap")
 
 
+@pytest.mark.slow
 def test_its_algorithm_trains_for_its_reward_and_its_agent_walks_beside(here, tmp_path, capsys) -> None:
     write_scene(grid_scene(1), tmp_path / "grid.h5")
     chosen = ("--algorithm", "hasty", "--reward", "dear", "--frames", "4000", "--targets", "5")
@@ -218,6 +221,7 @@ def test_importers_that_are_no_plugins_are_refused(tmp_path) -> None:
         plugged_scenes("odd", [tmp_path])
 
 
+@pytest.mark.slow
 def test_scenes_with_features_are_written_as_they_are(tmp_path) -> None:
     module = f"import sys\nsys.path.append({str(Path(__file__).parent)!r})\nfrom helpers.made import corridor_scene\n"
     site = offer(tmp_path / "site", "importers", "made = others:read", f"{module}def read(p): return corridor_scene()")

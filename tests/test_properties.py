@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+import pytest
 import torch
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -111,6 +112,7 @@ def test_zones_are_those_of_the_definition(scene: Scene) -> None:
         assert (by_cell[own[0]] == Zone.COLLISION) == (found[own] == Zone.COLLISION).any()
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from([SHORTEST, COLLISION_AWARE, BUMP]), st.integers(0, 2**31), st.integers(1, 12))
 def test_environments_follow_the_graph_and_the_reward_s_rules(
@@ -143,6 +145,7 @@ def earned(reward: Reward, scene: Scene, there: int, target: int, blocked: bool)
     return reward.parameters.get(name, reward.parameters["alpha"])
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from([SHORTEST, COLLISION_AWARE, BUMP]))
 def test_the_optimal_policy_has_the_values_of_value_iteration(scene: Scene, reward: Reward) -> None:
@@ -159,6 +162,7 @@ def test_the_optimal_policy_has_the_values_of_value_iteration(scene: Scene, rewa
         np.testing.assert_allclose(expected(task, policy).steps, task.steps_to_go[task.starts].mean())
 
 
+@pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from([SHORTEST, COLLISION_AWARE, BUMP]))
 def test_the_soft_policy_is_the_softmax_of_its_own_values(scene: Scene, reward: Reward) -> None:

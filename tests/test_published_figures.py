@@ -147,6 +147,7 @@ def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
         expect("93.3", 93.36, "far")
 
 
+@pytest.mark.slow
 def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
     records["unpack"](DOCS / "records" / "memory-bathroom.tar.xz", tmp_path / "memory")
@@ -277,6 +278,7 @@ def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> 
         assert failed == f"{len(set(episodes['target'][~episodes['reached'].astype(bool)].tolist()))} of 20"
 
 
+@pytest.mark.slow
 def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records, folder = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py")), tmp_path / "bedroom"
     records["unpack"](DOCS / "records" / "bedroom.tar.xz", folder)
@@ -306,6 +308,7 @@ def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
     assert compared == 8
 
 
+@pytest.mark.slow
 def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
     records["unpack"](DOCS / "records" / "off-grid-bathroom.tar.xz", tmp_path / "off-grid")

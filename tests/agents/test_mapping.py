@@ -71,6 +71,7 @@ def test_who_holds_itself_for_shut_in_forgets_that_and_finds_its_target(scene, w
     assert here == target
 
 
+@pytest.mark.slow
 def test_who_sees_no_obstacles_bumps_into_them(scene, world):
     blind = PerfectSight(scene)
     blind.stands = lambda features: np.zeros((len(features), 63), np.float32)
@@ -92,6 +93,7 @@ def tour(scene, world):
     return toured(scene, world, PerfectSight(scene))
 
 
+@pytest.mark.slow
 def test_a_tour_comes_near_every_pose_before_it_comes_to_all():
     hall = seen_perfectly(grid_scene(1, width=14, depth=14, obstacle_share=0.25))
     targets = make_world([hall], {hall.name: [5, 9]})
@@ -160,6 +162,7 @@ class Misled(PerfectSight):
         return found
 
 
+@pytest.mark.slow
 def test_a_tour_whose_pictures_never_repeat_goes_back_to_what_it_doubts(monkeypatch):
     small = seen_perfectly(grid_scene(2, width=5, depth=5, obstacle_share=0.25))
     around, takes = make_world([small], {small.name: [5, 9]}), Takes(1, {FEATURES: [small.features[:, None]]})

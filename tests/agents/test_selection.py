@@ -172,6 +172,7 @@ def test_it_is_argmax_as_long_as_no_pose_comes_back(world):
         assert np.array_equal(getattr(greedy, name), getattr(untried, name))
 
 
+@pytest.mark.slow
 def test_it_is_deterministic_and_the_same_whatever_runs_beside_it(world):
     agent, settings = by_rule(world, RULES[1]), {"selection": "argmax-untried", "episodes_per_target": 20}
     whole = run_episodes(world, agent, **settings)
@@ -197,6 +198,7 @@ def test_sampling_never_counts_as_a_loop_and_a_failure_need_not_be_one(world):
     assert not table.reached.all() and not table.looped.any()
 
 
+@pytest.mark.slow
 def test_evaluations_report_the_share_that_loops(world):
     found = evaluate_agents(world, {"agent": by_rule(world, TURNING)}, encoder="made-up", episodes_per_target=30)
     looped = {(e.agent, e.protocol.action_selection): e.to_json()["average"]["looped"] for e in found}

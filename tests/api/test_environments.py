@@ -47,6 +47,7 @@ def test_options_that_do_not_fit_are_refused(options, part) -> None:
     assert isinstance(caught.value, clearway.ClearwayError)
 
 
+@pytest.mark.slow
 def test_a_live_one_and_many(tmp_path) -> None:
     plan = floor_plan_scene(FloorPlan.of_map("small", np.ones((3, 2), bool), cell_size_m=0.5), feature_count=4)
     write_scene(plan, tmp_path / "small.h5")

@@ -19,6 +19,7 @@ def trained(tmp_path_factory):
     return clearway.train(folder / "corridor.h5", [16, 8], out=folder / "run", **SMALL)
 
 
+@pytest.mark.slow
 def test_it_is_the_command_s_evaluation_of_a_folder_an_agent_or_a_training(trained) -> None:
     agent = clearway.load_agent(trained.folder)
     expected = evaluate_run(agent, run_scenes(agent.record), episodes_per_target=4, step_limit=50, seed=1)

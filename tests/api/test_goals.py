@@ -52,6 +52,7 @@ def test_an_agent_of_one_s_own_and_its_maker(run):
         assert own.scenes == random.scenes
 
 
+@pytest.mark.slow
 def test_others_walk_in_the_scenes_of_their_training_alone(tmp_path):
     write_scene(corridor_scene(5, feature_count=12), tmp_path / "corridor.h5")
     trained = clearway.train(tmp_path / "corridor.h5", [16, 8], out=tmp_path / "run", **SMALL)
@@ -78,6 +79,7 @@ def taken(monkeypatch):
     return asked
 
 
+@pytest.mark.slow
 def test_perturbed_takes_are_seen_by_the_agent_s_own_eyes(run, taken, monkeypatch):
     # takes never come again to the bit, so that nothing is held for blocked: here neither among the scenes' own
     monkeypatch.setattr("clearway.agents.recurrent.without_blocked", lambda state, mark, probabilities: probabilities)
@@ -157,6 +159,7 @@ def test_the_generalist_walks_anywhere_and_says_where_it_has_arrived(shipped):
     assert evaluate_goals("generalist", [grid_scene(3)], goals=5, step_limit=30, seed=2)[0] == told
 
 
+@pytest.mark.slow
 def test_it_looks_around_first_where_it_may(shipped):
     scenes = [grid_scene(3), corridor_scene(5)]
     toured, random, _ = evaluate_goals("generalist", scenes, goals=5, step_limit=30, tour=40)
@@ -174,6 +177,7 @@ def test_a_tour_of_a_room_without_ways_out_is_one_line(shipped):
         evaluate_goals("generalist", cell, goals=2, tour=10)
 
 
+@pytest.mark.slow
 def test_it_walks_by_steps_of_other_lengths_but_by_one_at_a_time(shipped):
     scene = grid_scene(3)
     about, exact = (

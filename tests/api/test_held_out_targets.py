@@ -74,6 +74,7 @@ def test_environments_on_the_grid_heed_them(room, held) -> None:
         clearway.make_env(corridor_scene(), targets="held-out")
 
 
+@pytest.mark.slow
 def test_a_live_room_knows_them_whatever_its_origin(room, held) -> None:
     live = live_room(room)
     assert live.origin_m != (0.0, 0.0)

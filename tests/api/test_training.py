@@ -24,6 +24,7 @@ def corridor():
     return corridor_scene(5, feature_count=FEATURES)
 
 
+@pytest.mark.slow
 def test_it_trains_what_a_request_would(tmp_path) -> None:
     """The same bits as by way of the deep imports."""
     learner = small_learner(DEFAULT, **SMALL)

@@ -103,6 +103,7 @@ def test_a_preset_s_settings_go_with_another_algorithm(clearway, trained, tmp_pa
     assert not {"epochs", "hindsight", "optimiser"} & set(vars(learner))
 
 
+@pytest.mark.slow
 def test_from_generalist_is_adapting_it(clearway, trained, tmp_path, monkeypatch):
     scene = seen(trained.scene, tmp_path)
     ship(small_generalist(tmp_path / "eyes"), monkeypatch)

@@ -129,6 +129,7 @@ def test_the_other_agents_stand_beside(evaluated):
     assert others["random"]["average"]["collisions"] > others["shortest path"]["average"]["collisions"] == 0
 
 
+@pytest.mark.slow
 def test_evaluate_prints_tables_and_draws(clearway, trained, tmp_path):
     words = ("--episodes", 2, "--step-limit", 40, "--targets", "--pictures", tmp_path / "pictures")
     answer = clearway("evaluate", trained.run, *words)
@@ -183,6 +184,7 @@ def test_several_scenes_with_targets_each(clearway, dump, tmp_path, small):
     assert record["reward"]["name"] == "shortest"
 
 
+@pytest.mark.slow
 def test_another_seed_walks_other_episodes(clearway, trained):
     words = ("evaluate", trained.run, "--episodes", 3, "--step-limit", 100, "--json")
     first, again, other = (clearway(*words, "--seed", seed).json for seed in (0, 0, 1))

@@ -25,6 +25,7 @@ def test_the_list_has_a_command_for_each(clearway):
     assert content["made_by"] and content["sha256"]
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_list_open_pages(clearway, served):
     for command in clearway("examples", "--json").json["open"].values():
         answer = clearway(*command.split()[1:])
@@ -42,6 +43,7 @@ def test_an_altered_example_is_refused_in_one_line(clearway, served, monkeypatch
     assert served == []
 
 
+@pytest.mark.slow
 def test_a_page_is_saved(clearway, served, trained, tmp_path):
     words = ("--episode", "#start=3&walk=FR&seed=2", "--save", tmp_path / "page", "--episodes", 1)
     answer = clearway("view", trained.run, *words)

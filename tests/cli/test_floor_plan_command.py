@@ -11,6 +11,7 @@ def plans(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_plan_becomes_a_furnished_room(clearway, tmp_path, monkeypatch):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     (tmp_path / "nook.txt").write_text(".#\n..\n")

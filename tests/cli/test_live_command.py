@@ -70,6 +70,7 @@ def test_two_runs_are_compared_and_the_run_folder_keeps_the_tables(clearway, run
         assert (tmp_path / "pictures" / name).read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_one_run_alone_is_a_table(clearway, runs):
     answer = clearway("evaluate", runs.bold, *SHORT, "--selection", "argmax")
     assert answer.code == 0, answer
@@ -77,6 +78,7 @@ def test_one_run_alone_is_a_table(clearway, runs):
     assert "on the grid" in answer.out
 
 
+@pytest.mark.slow
 def test_the_grid_beside_it_is_the_evaluation_on_the_grid(clearway, runs):
     live = clearway("evaluate", runs.bold, *SHORT, "--json").json["grid"]["agents"]["shortest"]
     grid = clearway("evaluate", runs.bold, *SHORT[1:], "--json").json["average"]
@@ -154,6 +156,7 @@ def test_a_sweep_that_is_interrupted_leaves_what_is_complete_and_the_results_bef
     assert [result["setting"] for result in json.loads((runs.wary / "live.json").read_text())["results"]] == ["none"]
 
 
+@pytest.mark.slow
 def test_a_checkpoint_is_the_first_run_s_own(clearway, runs):
     """That of --against is its newest."""
     own, other = (newest_checkpoint(RunFolder(run).checkpoints) for run in (runs.bold, runs.wary))

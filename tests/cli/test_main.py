@@ -213,6 +213,7 @@ def test_warnings_are_shown_once_whatever_python_was_told(capsys):
     assert shown.err == "warning: another encoder stands in\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("into", "code", "told"), [("> /dev/full", 2, "No space left on device"), ("| true", 0, ""), ("| head -n 1", 0, "")]
 )
@@ -233,6 +234,7 @@ def test_a_version_that_cannot_be_printed_is_told_in_one_line():
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
 
 
+@pytest.mark.slow
 def test_a_terminal_without_the_letters_gets_others(trained):
     command = [sys.executable, "-m", "clearway", "evaluate", str(trained.run), "--episodes", "1", "--step-limit", "1"]
     done = subprocess.run(

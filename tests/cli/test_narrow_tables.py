@@ -25,6 +25,7 @@ def narrow(clearway, monkeypatch):
     return call
 
 
+@pytest.mark.slow
 def test_evaluate_prints_three_rows_and_all_where_they_are_asked_for(narrow, trained):
     words = ("evaluate", trained.run, "--episodes", 3, "--step-limit", 200)
     lines = narrow(*words)
@@ -45,6 +46,7 @@ def test_a_long_evaluation_tells_how_far_it_is(clearway, trained, monkeypatch):
     assert answer.json["others"] and answer.err.startswith("evaluating: 1 of 7 agents\n")
 
 
+@pytest.mark.slow
 def test_rows_of_targets_fit(narrow, trained):
     for further in ((), ("--all",)):
         lines = narrow("evaluate", trained.run, "--episodes", 3, "--step-limit", 200, "--targets", *further)

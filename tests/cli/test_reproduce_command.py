@@ -93,6 +93,7 @@ def test_an_experiment_from_dumps_to_report(clearway, first, out: Path) -> None:
     assert {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.safetensors")} == runs
 
 
+@pytest.mark.slow
 def test_a_report_from_what_is_complete(clearway, first, out: Path) -> None:
     gone, _ = sorted((out / "runs").iterdir())
     shutil.rmtree(gone)
@@ -105,6 +106,7 @@ def test_a_report_from_what_is_complete(clearway, first, out: Path) -> None:
     assert whole.json["sections"] == first.answer.json["sections"]
 
 
+@pytest.mark.slow
 def test_a_second_experiment_joins_the_report(clearway, first, out: Path) -> None:
     def names(answer) -> list[str]:
         return [section["name"] for section in answer.json["sections"]]

@@ -47,6 +47,7 @@ def test_rewards_that_cannot_be(name: str, parameters: dict[str, float], message
         chosen_reward(name, RewardParameters(**parameters))
 
 
+@pytest.mark.slow
 def test_a_reward_of_the_current_folder(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "from clearway.reward import Arrival, Reward, Time\ndear = Reward('dear', (Time(-0.5), Arrival()))\n"

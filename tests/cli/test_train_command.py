@@ -8,6 +8,7 @@ from clearway.cli.run_names import free_run_folder, longer
 from clearway.learn.run_folder import RunFolder
 
 
+@pytest.mark.slow
 def test_a_training_without_a_folder_gets_a_new_one(clearway, trained, small, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words = ("train", trained.scene, "--reward", "bump", "--alpha", "-0.02", "--seed", 3, *small)
@@ -33,6 +34,7 @@ def test_names_of_folders(tmp_path, monkeypatch):
     assert str(free_run_folder(files[:1], "../my:reward", "ppo", 1)) == "runs/a-my-reward-ppo-s1"
 
 
+@pytest.mark.slow
 def test_unsolved_targets_and_the_command_to_go_on(clearway, trained, small, tmp_path):
     run = tmp_path / "a run"
     answer = clearway("train", trained.scene, "--out", run, "--targets", 26, 37, *small)
@@ -74,6 +76,7 @@ def test_a_training_may_end_once_all_is_solved(clearway, trained, tmp_path):
     assert RunFolder(run).metrics()[-1]["frames"] < 200_000
 
 
+@pytest.mark.slow
 def test_frames_that_were_used_beyond_those_asked_for_are_said(clearway, trained, small, tmp_path):
     words = ("train", trained.scene, "--targets", 26, *small)
     answer = clearway(*words, "--frames", 650, "--out", tmp_path / "more")

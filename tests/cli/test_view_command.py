@@ -136,6 +136,7 @@ def test_a_generalist_that_cannot_be_shown(clearway, served, words, parts):
     assert served == []
 
 
+@pytest.mark.slow
 def test_the_generalist_is_filmed_with_what_it_holds(clearway, pictured, tmp_path):
     answer = clearway("video", GENERALIST, "--scene", pictured, "--most-steps", 4, "--out", tmp_path / "film.mp4")
     assert answer.code == 0, answer

@@ -107,6 +107,7 @@ def test_evaluated_on_the_grid_they_walk_the_episodes_of_the_network(
         assert len({walk.actions.tobytes() for walk in walks}) > 1, "all walks are alike: this shows nothing"
 
 
+@pytest.mark.slow
 def test_a_circle_is_found_by_pictures_too(deployed, cellar) -> None:
     """An agent of pictures that is certain of its actions is not walked to the cap, and its counts are the same."""
     settings = {"scenes": deployed.scenes[1:], "selection": "argmax", "episodes_per_target": 8, "step_limit": 401}

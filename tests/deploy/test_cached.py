@@ -8,6 +8,7 @@ import pytest
 from clearway.deploy import cached
 
 
+@pytest.mark.slow
 def test_a_run_is_exported_once_and_again_when_the_file_is_damaged(deployed, tmp_path, monkeypatch) -> None:
     exported: list[Path] = []
 

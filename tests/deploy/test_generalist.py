@@ -73,6 +73,7 @@ def test_the_file_sees_and_compares_as_the_eyes_do(one_file) -> None:
     np.testing.assert_array_equal(onnx.sight.description(features), torch.sight.description(features))
 
 
+@pytest.mark.slow
 def test_the_file_walks_whole_walks_as_pytorch_does(one_file) -> None:
     expected, found = walked(one_file.torch), walked(one_file.onnx)
     assert len({walk.actions.tobytes() for walk in expected.trajectories}) > 3, (
@@ -107,6 +108,7 @@ def test_it_keeps_the_protocol(one_file, made) -> None:
     assert check_agent(getattr(one_file, made), observations, {RGB: PICTURES[:3]}, draws=False).shape == (4, 3)
 
 
+@pytest.mark.slow
 def test_a_navigator_tours_then_goes_by_its_map_also_from_a_file(one_file, tmp_path) -> None:
     one, other, new = (clearway.Navigator(agent) for agent in (one_file.torch, one_file.path, one_file.onnx))
     assert toured(one) == toured(other)
@@ -258,6 +260,7 @@ def test_an_altered_file_is_refused(one_file, tmp_path) -> None:
         clearway.Navigator(tmp_path / "altered.onnx")
 
 
+@pytest.mark.slow
 def test_a_robot_with_the_file_needs_no_pytorch(one_file) -> None:
     statement = f"""
 import clearway, numpy

@@ -159,6 +159,7 @@ assert told == [(2500, 2500)]
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statements", [COPIED, COPIED_UNDER_WAY], ids=["idle", "while a thread waits for an answer"])
 def test_a_copy_of_a_process_has_its_own(statements: str) -> None:
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])

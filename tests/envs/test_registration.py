@@ -55,6 +55,7 @@ def test_make_vec_gives_the_native_batch() -> None:
         assert str(envs) == "ImageGoalVectorEnv(Clearway/ImageGoal-v0, num_envs=3)"
 
 
+@pytest.mark.slow
 def test_the_step_limit_of_make_vec() -> None:
     def truncated_at(**arguments: int | None) -> int | None:
         envs = gymnasium.make_vec(ENV_ID, num_envs=2, scenes=corridor_scene(5), targets={"corridor": [16]}, **arguments)
@@ -103,6 +104,7 @@ def test_make_vec_in_every_autoreset_mode(mode: AutoresetMode, vectorization: st
     envs.close()
 
 
+@pytest.mark.slow
 def test_make_vec_in_processes_lives_the_same_episodes() -> None:
     arguments = {"num_envs": 2, "scenes": grid_scene(0), "max_episode_steps": 9}
     native = gymnasium.make_vec(ENV_ID, **arguments)

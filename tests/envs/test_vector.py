@@ -50,6 +50,7 @@ def assert_same(left: Any, right: Any, where: str = "result") -> None:
         assert left == right, where
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("observations", ["features", "pictures"])
 @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.value)
 def test_it_equals_gymnasiums_vector_of_single_environments(mode: AutoresetMode, observations: str) -> None:

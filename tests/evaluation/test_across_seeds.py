@@ -33,6 +33,7 @@ def test_targets_that_one_run_learns_together_are_no_independent_evidence() -> N
     assert many.interval == pytest.approx(one.interval)
 
 
+@pytest.mark.slow
 def test_intervals_of_five_runs_hold_the_truth_nearly_as_often_as_they_say() -> None:
     rng = np.random.default_rng(0)
     trials = 600

@@ -1,8 +1,10 @@
 import numpy as np
+import pytest
 
 from clearway.evaluation.bootstrap import intervals, resampled_by_target
 
 
+@pytest.mark.slow
 def test_intervals_of_a_mean_agree_with_normal_theory():
     values = np.random.default_rng(1).normal(50, 7, (400, 1))
     low, high = intervals(resampled_by_target(values, np.ones((400, 1)), np.zeros(400, int), resamples=20_000))[:, 0, 0]

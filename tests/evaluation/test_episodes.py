@@ -81,6 +81,7 @@ def test_turning_for_ever_is_a_failure_with_the_steps_of_the_cap_and_no_collisio
     assert (table.steps[elsewhere] == 10_001).all() and (table.collisions == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_circles_completed_by_arithmetic_count_like_circles_walked(world, seed):
     agent = Argmax(by_rule(world, arbitrary(seed)))
@@ -91,6 +92,7 @@ def test_circles_completed_by_arithmetic_count_like_circles_walked(world, seed):
     assert same(skipped, walked)
 
 
+@pytest.mark.slow
 def test_an_agent_that_is_only_sometimes_certain_is_not_cut_short(world):
     def chances(history: Tensor, target: Tensor) -> Tensor:
         certain = torch.nn.functional.one_hot(arbitrary(1)(history, target).argmax(1), 4).double()
@@ -101,6 +103,7 @@ def test_an_agent_that_is_only_sometimes_certain_is_not_cut_short(world):
     assert same(run_episodes(world, agent, **settings), run_episodes(world, agent, record=True, **settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("random", [True, False])
 def test_an_episode_is_the_same_whatever_runs_beside_it(world, random):
     agent = RandomWalk() if random else by_rule(world, arbitrary(0, greed=0.5))
@@ -112,6 +115,7 @@ def test_an_episode_is_the_same_whatever_runs_beside_it(world, random):
     assert np.array_equal(more.steps[firsts], together.steps)
 
 
+@pytest.mark.slow
 def test_another_target_in_the_world_changes_no_episode():
     grid = grid_scene(3)
     alone = run_episodes(make_world([grid], {"grid": [13]}), RandomWalk(), episodes_per_target=20)
@@ -119,12 +123,14 @@ def test_another_target_in_the_world_changes_no_episode():
     assert np.array_equal(alone.steps, beside.steps[20:])
 
 
+@pytest.mark.slow
 def test_a_seed_repeats_and_another_differs(world):
     first, again, other = (run_episodes(world, RandomWalk(), episodes_per_target=20, seed=seed) for seed in (1, 1, 2))
     assert same(first, again)
     assert not np.array_equal(first.start, other.start)
 
 
+@pytest.mark.slow
 def test_all_agents_face_the_same_starts(world):
     walked = run_episodes(world, RandomWalk(), episodes_per_target=20)
     ideal = run_episodes(world, shortest_paths(world), episodes_per_target=20)

@@ -76,6 +76,7 @@ def test_a_walk_that_does_not_arrive_ends_at_the_cap():
     assert set(show.walks["stuck"].actions.tolist()) == {Action.TURN_RIGHT}
 
 
+@pytest.mark.slow
 def test_a_seed_repeats_and_another_one_differs():
     def starts(seed: int) -> list[tuple[int, int]]:
         found = showcases(WORLD, {"random": RandomWalk()}, seed=seed)

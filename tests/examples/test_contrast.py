@@ -3,12 +3,14 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image, ImageColor, ImageSequence
 
 from clearway.examples.contrast import FILE, contrast
 from clearway.viz.figures import BY_REWARD
 
 
+@pytest.mark.slow
 def test_the_example_s_episode_moves_under_the_contrast(tmp_path: Path) -> None:
     opening = contrast(tmp_path)
     lengths = []

@@ -27,6 +27,7 @@ def test_hardness_by_other_means() -> None:
     assert hardness(scene)[target] == pytest.approx(walked.steps.mean() * share, rel=0.08)
 
 
+@pytest.mark.slow
 def test_hard_targets_lie_apart_and_lead_the_ranking() -> None:
     scene = grid_scene(3, width=9, depth=9, obstacle_share=0.1)
     chosen = hard_targets(scene, 3)

@@ -102,6 +102,7 @@ def test_the_demo_leaves_a_page_with_its_pictures(first):
     assert answer.err.splitlines()[-1] == f"open {out / 'index.html'}"
 
 
+@pytest.mark.slow
 def test_a_second_demo_replaces_the_first_and_may_be_made_from_within(small, first, tmp_path, monkeypatch):
     out = Path(shutil.copytree(first[0], tmp_path / "demo"))
     for old in ("old.txt", "pictures/old.png", "runs/shortest/old.txt"):
@@ -117,6 +118,7 @@ def test_a_second_demo_replaces_the_first_and_may_be_made_from_within(small, fir
     assert json.loads(answer.out) == json.loads((out / "evaluation.json").read_text())
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_figures(small, first, tmp_path):
     result = run_demo(DemoRequest(tmp_path / "again", seed=0, frames=800, encoder="auto"))
     again = json.loads(json.dumps([evaluation.to_json() for evaluation in result.evaluations]))
@@ -142,6 +144,7 @@ def test_bad_numbers_are_refused_before_anything_is_touched(small, tmp_path, fra
     assert not (tmp_path / "demo").exists()
 
 
+@pytest.mark.slow
 def test_an_earlier_demo_stays_until_its_successor_has_a_room(small, first, monkeypatch):
     def fail(*_: object, **__: object) -> None:
         raise ClearwayError("no encoder today. Try tomorrow")

@@ -43,6 +43,7 @@ def test_a_job_that_is_done_is_left_alone(tmp_path: Path, monkeypatch: pytest.Mo
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json*")} == before
 
 
+@pytest.mark.slow
 def test_an_interrupted_job_ends_with_the_same_episodes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = made_job(tmp_path / "whole")
     do(tmp_path / "whole", job, threads=1)

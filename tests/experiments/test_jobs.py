@@ -31,6 +31,7 @@ def nothing(under_way: Sequence[Job]) -> None:
     """Show nothing."""
 
 
+@pytest.mark.slow
 @needs_proc
 def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
     """One worker is killed on the way and begins again."""
@@ -54,6 +55,7 @@ def test_jobs_in_processes_give_what_one_gives_here(tmp_path: Path) -> None:
         assert (tables[0].collisions == tables[1].collisions).all()
 
 
+@pytest.mark.slow
 def test_what_the_user_did_wrong_is_said_in_one_line(tmp_path: Path) -> None:
     setting = small_setting(tmp_path)
     jobs = jobs_of(setting)
@@ -80,6 +82,7 @@ def test_a_run_that_is_killed_every_time_is_given_up(tmp_path: Path, monkeypatch
     assert len(killed) == 2
 
 
+@pytest.mark.slow
 @needs_proc
 def test_an_interruption_stops_all_workers_and_leaves_what_can_be_resumed(tmp_path: Path) -> None:
     setting = small_setting(tmp_path)
@@ -111,6 +114,7 @@ def wait_until(happens: Callable[[], bool], process: subprocess.Popen[str]) -> N
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 @needs_proc
 def test_ctrl_c_is_said_once_and_not_by_workers(tmp_path: Path) -> None:
     """The terminal sends SIGINT to every process of the group, also to workers that have just been started."""

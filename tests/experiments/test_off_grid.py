@@ -69,6 +69,7 @@ def setting(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> 
     )
 
 
+@pytest.mark.slow
 def test_a_trial_s_file_says_what_live_evaluation_says(setting: Setting) -> None:
     run = setting.runs(setting.learners["paper"], COLLISION_AWARE)[0]
     trial = LiveTrial(SETTINGS, episodes_per_target=2, step_limit=4, seed=3)

@@ -85,6 +85,7 @@ def test_runs_are_shared_between_experiments(setting: Setting) -> None:
     assert all(is_done(setting.out, job) for job in jobs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solved", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_before_any_run_every_section_says_what_is_missing(
     tmp_path: Path, setting: Setting, sections: dict[str, Section], solved: bool
@@ -340,6 +341,7 @@ def test_the_analysis_is_solved_once(setting: Setting, monkeypatch: pytest.Monke
     assert analysis.section(setting).tables == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"scenes": {}}', "[" * 10**5, "found"])
 def test_a_damaged_file_of_kept_results_is_made_anew(
     setting: Setting, sections: dict, damage: str, monkeypatch: pytest.MonkeyPatch
@@ -358,6 +360,7 @@ def test_pareto_front_by_hand() -> None:
     assert pareto_front([(3, 1), (1, 3), (2, 2), (2, 3), (4, 1), (1, 4)]) == [(1, 3), (2, 2), (3, 1)]
 
 
+@pytest.mark.slow
 def test_the_report_is_complete_and_stands_alone(
     tmp_path: Path, setting: Setting, sections: dict[str, Section]
 ) -> None:
@@ -405,6 +408,7 @@ def failing(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> tuple[str, int
     return "kitchen", setting.targets[1][1]
 
 
+@pytest.mark.slow
 def test_a_failed_target_is_counted_named_and_listed_first(setting: Setting, failing: tuple[str, int]) -> None:
     section = table1.section(setting)
     table, by_target = section.tables
@@ -488,6 +492,7 @@ def test_a_report_takes_with_it_what_one_that_was_cut_off_left(
     assert [path.name for path in (tmp_path / "figures").iterdir()] == ["fig5.png"]
 
 
+@pytest.mark.slow
 def test_a_report_takes_with_it_what_an_earlier_one_left(
     tmp_path: Path, setting: Setting, sections: dict[str, Section]
 ) -> None:

@@ -41,6 +41,7 @@ def test_nothing_reaches_through_walls_and_all_furniture_is_named(monkeypatch, k
     assert len(room.parts) > 80 and 0 < through_walls_m(room, layout) < THROUGH_M
 
 
+@pytest.mark.slow
 def test_every_flat_has_a_way_in_and_windows(monkeypatch) -> None:
     doors = []
     entrance = decoration._entrance

@@ -62,6 +62,7 @@ def test_a_seed_out_of_range(made, seed):
     assert made == []
 
 
+@pytest.mark.slow
 def test_a_real_room_of_a_seed(tmp_path, monkeypatch):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     request = Request.of_seed(2)

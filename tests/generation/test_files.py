@@ -166,6 +166,7 @@ def test_a_scene_gives_its_request_back() -> None:
     assert request_of(floor_plan_scene(generated_plan(request), 4).made_by) is None
 
 
+@pytest.mark.slow
 def test_a_room_is_begun_anew_where_its_process_crashes(monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(files, "_make", crashes_once)
     monkeypatch.setattr(files, "check_mujoco", lambda: None)

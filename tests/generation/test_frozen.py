@@ -12,6 +12,7 @@ from clearway.scenes.floor_plans import FloorPlan
 FIRST_HASH = "30c14a2d017733e464209f47428026a1a77c505df316fbe1324515eb97040c28"
 
 
+@pytest.mark.slow
 def test_the_first_plans_of_the_test_split_never_change() -> None:
     """Nor does any other, which takes longer to see."""
     plans = [generated_plan(request) for request in frozen_requests() if request.number < 5]

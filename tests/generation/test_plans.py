@@ -106,6 +106,7 @@ KEY_PIECES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_room_of_fifty_has_what_makes_it_one(kind) -> None:
     for number in range(50):
@@ -137,6 +138,7 @@ def test_a_room_lies_within_the_real_rooms_ranges(request_: Request) -> None:
     assert area.use == ROOM_USES[request_.number % 4] and len(plan.doors) == 0
 
 
+@pytest.mark.slow
 def test_a_room_unlike_real_ones_is_drawn_again(monkeypatch) -> None:
     monkeypatch.setitem(ROOM_LIMITS, "cells", (11, 25))
     drawn = draw_plan(Request("room", "train", 0, 1))

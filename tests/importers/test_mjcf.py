@@ -36,6 +36,7 @@ def columns_of(picture: np.ndarray, rgb: tuple[float, float, float]) -> np.ndarr
     return np.flatnonzero((np.abs(picture - 255 * np.array(rgb)).max(axis=2) < 12).any(axis=0))
 
 
+@pytest.mark.slow
 def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
     world = FloorChoice(floor_m=2.0, camera_m=0.8, extent_m=(-1.3, 1.3, -3.3, 3.3), spawn_m=(0.0, 0.0))
     scene = read_mjcf(
@@ -70,6 +71,7 @@ def test_the_world_is_seen_the_right_way_round(path: Path) -> None:
     assert scene.made_by.notes["file"] == "posts.xml"
 
 
+@pytest.mark.slow
 def test_hidden_geoms_and_limits_of_the_model_s_own_hide_nothing(path: Path) -> None:
     hidden = '<geom type="box" size=".15 .15 .6" pos="1 3 2.5" group="3"/>'  # around the red post, to collide with
     far = '<statistic extent="200"/>'  # MuJoCo would draw nothing nearer than a hundredth of it
@@ -82,6 +84,7 @@ def test_hidden_geoms_and_limits_of_the_model_s_own_hide_nothing(path: Path) -> 
     assert columns_of(scene.top_view.image, RED).size
 
 
+@pytest.mark.slow
 def test_more_than_fits_is_refused_before_any_picture_is_taken(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importer, "sense", lambda *_, **__: pytest.fail("rendered"))
     monkeypatch.setattr(picture_limits, "MAX_PICTURE_BYTES", 20 << 20)

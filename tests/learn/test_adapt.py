@@ -46,6 +46,7 @@ def trainer_of(world: World, seed: int = 0) -> AdaptingTrainer:
     return LEARNER.trainer(world, COLLISION_AWARE, seed)
 
 
+@pytest.mark.slow
 def test_the_generalist_walks_by_the_rules_of_the_world_and_its_steps_are_frames(world: World):
     trainer = trainer_of(world)
     walked = guided_walks(world, trainer.generalist, LEARNER, seed=0)
@@ -61,6 +62,7 @@ def test_the_generalist_walks_by_the_rules_of_the_world_and_its_steps_are_frames
     assert len(other) != len(walked) or not torch.equal(other.state, walked.state)
 
 
+@pytest.mark.slow
 def test_a_walk_of_the_generalist_is_over_at_its_target(world: World):
     walked = guided_walks(world, trainer_of(world).generalist, replace(LEARNER, tour_steps=1, walk_steps=150), seed=0)
     assert len(walked) < 5 * LEARNER.walks * 150  # chance brings even these eyes there
@@ -81,6 +83,7 @@ def test_a_teacher_plans_in_what_was_seen_alone():
     assert teacher.value(target[:2], state[:2]).tolist() == pytest.approx([earned[0, 0, forward] + 0.5 * there, there])
 
 
+@pytest.mark.slow
 def test_in_mind_it_goes_only_where_steps_were_seen_to_lead(world: World):
     trainer = trainer_of(world)
     trainer.update()
@@ -101,6 +104,7 @@ def test_in_mind_it_goes_only_where_steps_were_seen_to_lead(world: World):
         assert sum(batch.rows_per_scene) == len(batch) == LEARNER.mind_walks * LEARNER.mind_steps
 
 
+@pytest.mark.slow
 def test_it_learns_every_target_in_a_few_hundred_frames(world: World):
     trainer = trainer_of(world)
     while not trainer.finished:
@@ -109,6 +113,7 @@ def test_it_learns_every_target_in_a_few_hundred_frames(world: World):
     assert (reached_from_everywhere(trainer) > 0.9).all()
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_bit_for_bit_and_says_what_was_adapted(scenes: list[Scene], tmp_path: Path, monkeypatch):
     request = RunRequest(scenes, TARGETS, replace(LEARNER, lessons=1), COLLISION_AWARE, seed=3)
     whole = train(request, tmp_path / "whole")

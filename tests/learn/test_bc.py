@@ -76,6 +76,7 @@ def test_an_update_equals_the_naive_one() -> None:
     assert (trainer.network.siamese_weight - start["siamese_weight"]).abs().max() > 0.5 * learner.lr_start
 
 
+@pytest.mark.slow
 def test_it_learns_the_shortest_paths() -> None:
     trainer = RECIPE.trainer(small_world(), COLLISION_AWARE, 0)
     first = trainer.update()
@@ -92,6 +93,7 @@ def test_every_pass_learns_from_the_whole_rollout() -> None:
     assert (once.frames, once.updates) == (twice.frames, twice.updates) == (80, 1)
 
 
+@pytest.mark.slow
 def test_told_the_wrong_actions_it_does_not_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = bc.shortest_path_actions
     monkeypatch.setattr(bc, "shortest_path_actions", lambda *arguments: ~whole(*arguments))

@@ -38,6 +38,7 @@ def tell_success(monkeypatch: pytest.MonkeyPatch, frames: int, success: list[flo
     monkeypatch.setattr(Trainer, "update", update)
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_made_longer_and_says_so(tmp_path: Path) -> None:
     train.train(of_frames(800), tmp_path)
     with pytest.warns(UserWarning, match="was finished after 800 frames, and goes on to 1,600; results"):
@@ -85,6 +86,7 @@ def test_unsolved_targets_by_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert unsolved_targets(train.train(of_frames(800), tmp_path)) == {"corridor": (8,), "grid": (22,)}
 
 
+@pytest.mark.slow
 def test_unsolved_targets_among_own_goals(tmp_path: Path) -> None:
     learner = small_learner(goals="seen")
     request = small_request(learner=learner)

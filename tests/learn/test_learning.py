@@ -38,6 +38,7 @@ def test_the_recipe_solves_a_small_world() -> None:
     assert solves_everything(RECIPE)
 
 
+@pytest.mark.slow
 def test_with_the_advantage_s_sign_turned_round_it_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trainer_module, "loss_gradient", flipped)
     assert not solves_everything(RECIPE)

@@ -31,6 +31,7 @@ LABELS = {"ppo": "PPO", "a2c": "A2C", "a3c": "A3C", "bc": "BC", "q-learning": "Q
 LABELS |= {"adapt": "Adapt"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_the_document_explains_every_figure_of_an_algorithm_and_no_other(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch

@@ -49,6 +49,7 @@ def test_a_recorded_run_has_the_algorithm_s_own_settings(
     assert record.same_experiment(now)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["ppo", "a2c"])
 def test_a_run_begun_then_goes_on_now_to_the_same_bits(
     algorithm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

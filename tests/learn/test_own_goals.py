@@ -166,6 +166,7 @@ def test_figures_are_those_of_the_given_targets() -> None:
     assert statistics.solved == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("learner", [SEEN, small_learner(A2C(), goals="seen"), replace(SEEN, balance=3.0)])
 def test_it_goes_on_to_the_same_bits(learner: OnPolicy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     request = small_request(learner=learner)

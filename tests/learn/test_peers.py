@@ -64,6 +64,7 @@ LEARNERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("doubles")
 @pytest.mark.parametrize(
     ("name", "workers"),

@@ -55,6 +55,7 @@ def test_steps_into_one_cell_move_it_by_the_mean_of_their_errors() -> None:
     assert trainer.values.count_nonzero() == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_limit", [12, 60])
 def test_the_table_becomes_that_of_the_exact_optimum(step_limit: int) -> None:
     """Not with cuts that count as ends, which the short limit would show."""
@@ -87,6 +88,7 @@ def test_the_target_s_own_values_stay_0_and_cut_episodes_begin_anew() -> None:
     assert totals[2] / totals[0] <= 3  # steps an episode
 
 
+@pytest.mark.slow
 def test_a_run_evaluates_at_the_shortest_paths_and_has_no_network(tmp_path: Path) -> None:
     request = small_request(learner=replace(SMALL, frames=40_000, envs=20), reward=SHORTEST)
     folder = train(request, tmp_path)

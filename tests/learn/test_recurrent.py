@@ -42,6 +42,7 @@ def trainer_of(world: World, learner: Recurrent = LEARNER, seed: int = 0) -> Rec
     return trainer
 
 
+@pytest.mark.slow
 def test_a_training_goes_on_bit_for_bit_in_both_parts(world: World):
     whole = trainer_of(world)
     told = [whole.update() for _ in range(6)]
@@ -64,6 +65,7 @@ def test_a_seed_repeats_and_another_does_not(world: World):
     assert one == again != other
 
 
+@pytest.mark.slow
 def test_it_learns_what_the_planner_teaches_and_walks_better_than_by_chance(tmp_path: Path, scenes: list[Scene]):
     learner = replace(LEARNER, frames=40_000, taught=0.8, envs=40, width=48, taught_lr_start=3e-3)
     request = RunRequest(scenes, TARGETS, learner, COLLISION_AWARE)
@@ -150,6 +152,7 @@ def test_a_network_that_forgets_says_the_same_whatever_went_before():
     torch.testing.assert_close(one.scores, other.scores)
 
 
+@pytest.mark.slow
 def test_it_learns_to_say_that_it_has_arrived(tmp_path: Path):
     world = make_world(seen_by_eyes(tmp_path / "eyes", corridor_scene(5)), {"corridor": [8, 16]})
     learner = replace(LEARNER, frames=20_000, taught=1.0, envs=40, width=48, teacher_share=0.0)

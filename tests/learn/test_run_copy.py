@@ -53,6 +53,7 @@ def without_times(folder: Path) -> list[dict[str, float]]:
     return [{name: value for name, value in row.items() if name != "seconds"} for row in RunFolder(folder).metrics()]
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_elsewhere_bit_for_bit(
     s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: Path
 ) -> None:
@@ -135,6 +136,7 @@ def test_what_was_cut_off_does_not_stay(s3: S3, two_moments: tuple[Path, Path]) 
         assert len(Store(ADDRESS).names(f"{ADDRESS}/checkpoints/{name}")) == 3
 
 
+@pytest.mark.slow
 def test_a_training_goes_on_without_a_store_and_says_so(
     s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -162,6 +164,7 @@ def test_a_disk_that_is_full_does_not_end_training(s3: S3, tmp_path: Path, monke
     assert not list((tmp_path / "run").glob(".copied-*"))
 
 
+@pytest.mark.slow
 def test_training_does_not_wait_for_a_copy(s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     upload, update, came_far = Store.upload, Trainer.update, threading.Event()
 
@@ -199,11 +202,13 @@ def test_what_cannot_be_copied_to_is_told_before_a_folder_is_made(s3: S3, tmp_pa
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_without_a_copy_resume_begins(s3: S3, tmp_path: Path) -> None:
     training.train(REQUEST, tmp_path / "run", resume=True, copy_to=ADDRESS)
     assert RunCopy(ADDRESS).holds_a_run
 
 
+@pytest.mark.slow
 def test_no_other_run_and_no_further_one_is_copied_over(
     s3: S3, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -194,6 +194,7 @@ with RunFolder(Path(sys.argv[1])).held():
 """
 
 
+@pytest.mark.slow
 def test_a_second_process_is_refused_until_the_first_lets_go(tmp_path: Path) -> None:
     command = [sys.executable, "-c", HOLD, str(tmp_path)]
     environment = {"PYTHONPATH": ":".join(sys.path)}

@@ -69,6 +69,7 @@ def test_another_picture_is_seen_at_every_step() -> None:
     assert torch.equal(trainer.navigation.history[:, :-1], history[:, 1:])  # what was seen stays
 
 
+@pytest.mark.slow
 def test_it_learns_by_them_and_goes_on_bit_for_bit(tmp_path) -> None:
     scenes = small_scenes()
     request = small_request(takes=takes_of(scenes, 0.3), takes_made=MADE)

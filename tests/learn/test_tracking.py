@@ -81,6 +81,7 @@ def test_tensorboard_has_each_figure_of_a_resumed_run_once(tmp_path: Path) -> No
     assert [json.loads(line) for line in path.read_text().splitlines()] == ROWS
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("fake_board")
 def test_a_run_is_tracked_where_it_is_asked_for_alone(tmp_path: Path) -> None:
     request = RunRequest(small_scenes(), small_targets(), small_learner(), COLLISION_AWARE)

@@ -59,6 +59,7 @@ def test_a_run_leaves_record_metrics_and_checkpoint(tmp_path: Path) -> None:
     assert progress.seconds == pytest.approx(rows[-1]["seconds"], abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["default", "paper"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_resumes_to_the_same_bits(
@@ -83,6 +84,7 @@ def test_an_interrupted_run_resumes_to_the_same_bits(
     assert without_seconds(whole) == without_seconds(parts)
 
 
+@pytest.mark.slow
 def test_resuming_from_an_earlier_checkpoint_cuts_the_metrics_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -98,6 +100,7 @@ def test_resuming_from_an_earlier_checkpoint_cuts_the_metrics_back(
     assert equal_bits(*[read_network(newest_checkpoint(f.checkpoints)) for f in (whole, folder)])
 
 
+@pytest.mark.slow
 def test_resuming_a_finished_run_touches_no_file(tmp_path: Path) -> None:
     folder = train.train(small_request(), tmp_path)
 
@@ -256,6 +259,7 @@ def test_parameters_that_are_not_finite_are_not_saved(tmp_path: Path) -> None:
     assert not folder.checkpoints.exists()
 
 
+@pytest.mark.slow
 def test_a_milestone_replaces_what_a_run_that_went_on_otherwise_left(tmp_path: Path) -> None:
     """Asynchronous runs come by at other frames each time, and the newest is that with the most."""
     folder = RunFolder(tmp_path)
@@ -352,6 +356,7 @@ def in_files(folder: Path) -> list[Scene]:
     return [read_scene(folder / f"{scene.name}.h5", features_in_file=True) for scene in small_scenes()]
 
 
+@pytest.mark.slow
 def test_a_training_reads_mapped_features_once_and_resumes_to_the_bits_of_one_in_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

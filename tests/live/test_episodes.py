@@ -111,6 +111,7 @@ def test_a_random_walk_is_the_grids_up_to_its_first_contact(live, world, random_
         np.testing.assert_allclose(walk[:same, :2], places_m, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_in_a_floor_plan_a_random_walk_is_the_plans_up_to_its_first_contact():
     reachable = np.ones((4, 3), bool)
     reachable[1, 1] = False

@@ -85,6 +85,7 @@ def test_who_holds_to_be_there_is_asked_where_it_is_and_where_it_is_not(live, cl
     assert figures.false_arrivals == float(claims) and figures.missed_arrivals == float(not claims)
 
 
+@pytest.mark.slow
 def test_a_tour_is_walked_off_the_grid_and_makes_the_agent(live, camera):
     tour = walk_live_tour(live, Ahead(), camera, Perturbations(), steps=6, seed=0)
     assert tour.state["steps"].tolist() == [6]

@@ -42,6 +42,7 @@ def test_the_camera_sees_the_new_obstacle_only_where_a_layout_puts_it(live):
     np.testing.assert_array_equal(body.pos, [0, 0, -10])
 
 
+@pytest.mark.slow
 def test_a_floor_plan_is_a_room_to_walk_in_whose_moves_are_those_of_the_plan():
     reachable = np.ones((4, 3), bool)
     reachable[1, 1] = False
@@ -57,6 +58,7 @@ def test_a_floor_plan_is_a_room_to_walk_in_whose_moves_are_those_of_the_plan():
             assert step.contact == (scene.graph[state, action] == BLOCKED), (state, action)
 
 
+@pytest.mark.slow
 def test_a_generated_room_is_one_to_walk_in_and_another_plan_is_not_taken_for_it():
     request = Request("room", "test", 0, 0)
     plan = generated_plan(request)
@@ -83,6 +85,7 @@ def test_a_room_of_another_version_of_the_generator_is_refused():
         live_room(replace(scene, made_by=Provenance("generated", seed=0, notes=notes)))
 
 
+@pytest.mark.slow
 def test_the_camera_sees_the_room_in_the_detail_of_the_scene():
     scene = build_floor_plan(plan_of("nook", ("..#", "#..")), 1, size_px=(30, 40), workers=1)
     assert scene.made_by.notes["detail"] == "small"

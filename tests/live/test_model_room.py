@@ -58,6 +58,7 @@ def test_the_moves_are_those_of_the_grid(live: LiveRoom) -> None:
     assert all(blocked == contact and off_m < 1e-9 for blocked, contact, off_m in found)
 
 
+@pytest.mark.slow
 def test_where_the_floor_ends_the_move_ends(tmp_path: Path) -> None:
     """A slab with nothing round it: the body stops before its middle is over the edge."""
     live = live_room(read_mjcf(written(tmp_path, SLAB), CHOICE, AGENT, workers=1, **SMALL))
@@ -68,6 +69,7 @@ def test_where_the_floor_ends_the_move_ends(tmp_path: Path) -> None:
     assert body.place_m[0] == pytest.approx(-2.1, abs=0.002)
 
 
+@pytest.mark.slow
 def test_a_model_that_was_trusted_is_walked_in_as_long_as_its_files_are_the_same(tmp_path: Path) -> None:
     (tmp_path / "home").mkdir()
     (tmp_path / "more.xml").write_text("<mujoco><custom/></mujoco>")
@@ -108,6 +110,7 @@ def test_two_bodies_in_one_model_are_two(live: LiveRoom) -> None:
     assert one.gap_m() == pytest.approx(0.2) and other.gap_m() == pytest.approx(0.8)
 
 
+@pytest.mark.slow
 def test_an_environment_sees_the_scene_s_pictures_there(scene: Scene) -> None:
     env = LiveImageGoalEnv(scene, height_px=33, width_px=45)
     seen, info = env.reset(seed=0, options={"start": 5, "target": 9})
@@ -118,6 +121,7 @@ def test_an_environment_sees_the_scene_s_pictures_there(scene: Scene) -> None:
     env.close()
 
 
+@pytest.mark.slow
 def test_gymnasiums_own_check_finds_nothing(scene: Scene) -> None:
     noisy = {"distance_noise": 0.05, "camera_height_jitter": 0.1, "light": 0.3, "pixel_noise": 5.0}
     env = LiveImageGoalEnv(scene, perturbations=noisy, sensors=("rgb", "depth", "clearance"), stop=True, **SMALL)
@@ -125,6 +129,7 @@ def test_gymnasiums_own_check_finds_nothing(scene: Scene) -> None:
     env.close()
 
 
+@pytest.mark.slow
 def test_a_model_s_file_is_a_room_by_itself(hall: Path) -> None:
     flat = hall.with_name("flat.xml")
     flat.write_text(MODEL.format(**PLANE).replace('pos="0 0 1"', 'pos="0 0 0"'))
@@ -141,6 +146,7 @@ def test_what_moves_things_is_refused_in_a_line(scene: Scene, name: str) -> None
         LiveImageGoalEnv(scene, perturbations={name: True if name == "new_obstacle" else 0.2}, **SMALL)
 
 
+@pytest.mark.slow
 def test_a_missing_or_changed_model_is_one_line(scene: Scene, hall: Path, tmp_path: Path) -> None:
     def moved_to(path: Path) -> Scene:
         return replace(scene, made_by=replace(scene.made_by, notes={**scene.made_by.notes, "path": str(path)}))

@@ -32,6 +32,7 @@ def episode(live, start, target, **changes) -> LiveEpisode:
     return Episodes(live, replace(RULES, **changes)).begin(0, start=start, target=target)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["collision-aware", "shortest", "bump"])
 def test_in_every_pose_of_the_grid_every_action_earns_what_it_earns_on_the_grid(live, name):
     scene, target = live.scene, state_at(live.scene, 0.25, 2.25, 0)
@@ -129,6 +130,7 @@ def test_continuous_actions_move_the_body(live):
     assert walk.step(np.array([-1.0, 0.0])).contact
 
 
+@pytest.mark.slow
 def test_ends_are_drawn_from_all_poses_and_are_apart(live):
     episodes = Episodes(live, RULES)
     drawn = [episodes.begin(seed) for seed in range(600)]

@@ -87,6 +87,7 @@ def test_on_the_grid_the_pictures_are_those_of_the_scene(live, make: Make) -> No
         np.testing.assert_array_equal(seen["observation"], scene.observations[state])
 
 
+@pytest.mark.slow
 def test_spaces_and_what_is_told(make: Make) -> None:
     env = make(sensors=("rgb", "depth", "clearance"), stop=True)
     assert env.observation_space == spaces.Dict(
@@ -131,6 +132,7 @@ def test_depth_and_clearance_are_metres(make: Make) -> None:
     assert seen["clearance"][0] == pytest.approx(0.001, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_a_history_holds_the_last_poses(plain: LiveImageGoalEnv, make: Make) -> None:
     short, long = plain, make(history_length=3)
     ends = {"start": (0.25, 0.25, 0.0), "target": (1.75, 0.25, 0.0)}
@@ -155,12 +157,14 @@ def walked(env: LiveImageGoalEnv, seed: int, steps: int = 12) -> list:
     return found
 
 
+@pytest.mark.slow
 def test_a_seed_repeats_pictures_and_all(make: Make) -> None:
     env, other = make(perturbations=STRONG), make(perturbations=STRONG.to_json())
     assert walked(env, 3) == walked(env, 3) == walked(other, 3)
     assert walked(env, 3) != walked(env, 4)
 
 
+@pytest.mark.slow
 def test_perturbations_change_what_is_seen_and_not_the_target(plain: LiveImageGoalEnv, make: Make) -> None:
     ends = {"start": (0.25, 0.25, 0.0), "target": (0.25, 2.25, 180.0)}  # from where furniture is seen
     unchanged, _ = plain.reset(seed=0, options=ends)

@@ -40,6 +40,7 @@ def plan_file(tmp_path: Path) -> str:
     return str(tmp_path / "small.h5")
 
 
+@pytest.mark.slow
 def test_it_lives_the_episodes_of_single_environments(live) -> None:
     options = {**SMALL, "perturbations": NOISY, "max_episode_steps": 7, "sensors": ("rgb", "clearance")}
     envs = LiveImageGoalVectorEnv(live, num_envs=3, autoreset_mode="SameStep", workers=2, **options)
@@ -104,12 +105,14 @@ def test_ends_for_all_or_for_each(live) -> None:
     envs.close()
 
 
+@pytest.mark.slow
 def test_gymnasiums_own_check_makes_it_anew_and_finds_nothing(plan_file: str) -> None:
     env = gymnasium.make(LIVE_ENV_ID, room=plan_file, render_mode="rgb_array", **SMALL)
     check_env(env.unwrapped)
     env.close()
 
 
+@pytest.mark.slow
 def test_make_and_make_vec_know_it(plan_file: str) -> None:
     env = gymnasium.make(LIVE_ENV_ID, room=plan_file, **SMALL)
     assert isinstance(env.unwrapped, LiveImageGoalEnv) and env.spec.max_episode_steps == 500
@@ -124,6 +127,7 @@ def test_make_and_make_vec_know_it(plan_file: str) -> None:
     envs.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("context", ["fork", pytest.param("forkserver", marks=pytest.mark.slow)])
 def test_in_processes_it_lives_the_same_episodes(plan_file: str, context: str) -> None:
     """From a process that has loaded PyTorch and MuJoCo, as this one has."""
@@ -146,6 +150,7 @@ def test_in_processes_it_lives_the_same_episodes(plan_file: str, context: str) -
         together.close()
 
 
+@pytest.mark.slow
 def test_small_pictures_are_those_of_the_scene_to_the_eye_and_others_to_the_bit(live) -> None:
     pose = (0.25, 0.25, 45.0)
     shots = (first_person_shot(*pose),)
@@ -159,6 +164,7 @@ def test_small_pictures_are_those_of_the_scene_to_the_eye_and_others_to_the_bit(
         env.close()
 
 
+@pytest.mark.slow
 def test_importing_it_is_light() -> None:
     loaded = imported_by("import clearway.live_envs.single, clearway.live.arrangement")
     assert "clearway.live_envs.vector" in loaded
@@ -199,6 +205,7 @@ def test_a_generated_flat_and_a_model_are_rooms_as_others(places: dict[str, str]
     _check_that_sb3_learns(places[place])
 
 
+@pytest.mark.slow
 def test_sb3_learns_from_it(live) -> None:
     _check_that_sb3_learns(live)
 

@@ -65,6 +65,7 @@ def scene():
     return seen_perfectly(grid_scene(1, width=8, depth=7, obstacle_share=0.25))
 
 
+@pytest.mark.slow
 def test_walks_are_put_right_where_single_moves_deceive(scene):
     alone, together = 0, 0
     for seed in range(8):

@@ -27,6 +27,7 @@ def test_a_feature_is_the_mean_logarithm_of_a_cells_depth() -> None:
     np.testing.assert_allclose(features[0], expected, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [None, 1])
 def test_scenes_with_depth_are_encoded_from_memory_and_from_files_alike(tmp_path: Path, workers: int | None) -> None:
     scenes = [bare(with_depth(scene)) for scene in (grid_scene(0), corridor_scene(5))]

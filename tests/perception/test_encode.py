@@ -99,6 +99,7 @@ def test_the_order_of_scenes_does_not_matter(own_cache: Path, monkeypatch: pytes
     assert np.array_equal(first[0].features, second[-1].features)
 
 
+@pytest.mark.slow
 def test_what_is_cached_needs_no_network(monkeypatch: pytest.MonkeyPatch, folder_model: str) -> None:
     asked = ("random-resnet50", folder_model)
     first = [encode_scenes(rooms(), encoder) for encoder in asked]
@@ -169,6 +170,7 @@ def test_the_calibration_takes_one_thread_whatever_torch_has(own_cache: Path, mo
     assert len(identities) == 1
 
 
+@pytest.mark.slow
 @needs_proc
 def test_an_encoding_process_that_is_killed_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = rooms()

@@ -78,6 +78,7 @@ def views(s3: Callable[[str, bytes], None], tmp_path: Path) -> Path:
     return tmp_path / "views"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("files", [1, 2.5, 4 / AHEAD])
 def test_views_come_in_the_same_order_within_the_limit(
     files: float, views: Path, monkeypatch: pytest.MonkeyPatch
@@ -98,6 +99,7 @@ def test_views_come_in_the_same_order_within_the_limit(
     assert count == 2 * here.batch_count(4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["one worker", "several workers"])
 def test_an_agent_learns_from_a_set_that_does_not_fit(
     workers: int, scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -137,6 +139,7 @@ def test_workers_on_ray_learn_from_a_set_that_does_not_fit(
     assert 0 < kept_bytes() <= limit
 
 
+@pytest.mark.slow
 def test_threads_read_side_by_side(scenes: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is room for one file, and every one of them is wanted by several at once."""
     limit = limit_to(1, scenes, monkeypatch)
@@ -411,6 +414,7 @@ def test_only_the_cache_s_own_files_come_and_go(scenes: Path, monkeypatch: pytes
         looked_at(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "kind"),
     [

@@ -204,6 +204,7 @@ def test_a_file_that_fails_ends_the_others(tmp_path: Path, capfd: pytest.Capture
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("server", ["silent", "slow"])
 def test_ctrl_c_ends_what_is_under_way(
     server: str,
@@ -254,6 +255,7 @@ def test_google_s_store(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [path.read_bytes() for path in paths] == [b"one", b"two", b"two"]
 
 
+@pytest.mark.slow
 def test_google_s_package_begins_a_download_anew_that_broke_off(monkeypatch: pytest.MonkeyPatch) -> None:
     GoogleStore.objects = {"a/1.h5": b"x" * 300_000}
     monkeypatch.setattr(GoogleStore, "cuts", 2)

@@ -44,6 +44,7 @@ def test_a_room_becomes_a_scene(small_room):
     assert set(scene.made_by.versions) == {"clearway", "mujoco", "numpy", "scipy"}
 
 
+@pytest.mark.slow
 def test_a_room_is_rendered_in_depth_on_request(small_room):
     colour = build_scene("bathroom", workers=1)
     scene = build_scene("bathroom", sensors=("rgb", "depth"), workers=1)
@@ -68,6 +69,7 @@ def test_sensors_that_cannot_be_had_are_refused(sensors, problem):
         build_scene("bathroom", sensors=sensors)
 
 
+@pytest.mark.slow
 def test_the_default_room_has_the_rooms_name(small_room):
     assert build_scene("bathroom", workers=1).name == "bathroom"
 

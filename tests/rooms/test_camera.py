@@ -41,6 +41,7 @@ def assert_colour(pixel: np.ndarray, rgb: tuple[float, float, float]) -> None:
     np.testing.assert_allclose(pixel, 255 * np.array(rgb), atol=12)
 
 
+@pytest.mark.slow
 def test_each_heading_looks_at_its_wall():
     headings_deg = np.array(list(WALLS))
     pictures = render(lit(coloured_room()), first_person_view(np.full((4, 2), 2.0), headings_deg), workers=1)
@@ -125,6 +126,7 @@ def test_an_edge_has_no_depth_between_that_of_its_two_sides():
     assert np.all((near_box < 1.3) | (near_box > 1.6))
 
 
+@pytest.mark.slow
 def test_depth_leaves_colour_as_it_is():
     view = first_person_view(np.full((4, 2), 2.0), np.array(list(WALLS)))
     model = lit(coloured_room())
@@ -166,6 +168,7 @@ def fast_and_not(model: mujoco.MjModel, view: View) -> tuple[np.ndarray, np.ndar
     return render(model, replace(view, fast=True), workers=1), render(model, view, workers=1)
 
 
+@pytest.mark.slow
 def test_fast_pictures_look_the_same():
     rng, room = np.random.default_rng(3), coloured_room()
     for x_m, z_m in rng.uniform(0, 4, (30, 2)):

@@ -53,6 +53,7 @@ def test_furniture_that_is_alike_is_drawn_together_within_a_block(block_m, geoms
     assert len(np.unique(model.geom_rgba, axis=0)) == 1
 
 
+@pytest.mark.slow
 def test_small_pictures_of_a_plan_look_the_same_in_small_detail():
     plan = plan_of("island", ISLAND)
     pictures, faces = [], []
@@ -77,6 +78,7 @@ def mean_colour(room: Room, material: str) -> np.ndarray:
     return np.zeros(3) if texture is None else np.frombuffer(texture.data, np.uint8).reshape(-1, 3).mean(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plan", "seed"),
     [

@@ -119,6 +119,7 @@ def test_another_room_seed_version_or_source_is_another_scene(cache, monkeypatch
     assert build.built == 2
 
 
+@pytest.mark.slow
 def test_three_processes_that_ask_for_one_scene_build_it_once(cache, tmp_path):
     log = tmp_path / "log"
     builders = [start_builder(log, "built", seconds=1.0) for _ in range(3)]
@@ -142,6 +143,7 @@ def test_a_killed_builder_leaves_no_scene_and_blocks_nobody(cache, tmp_path, kil
     assert files_in(cache) == [scene_path("kitchen", 7).name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kills", [3, pytest.param(20, marks=pytest.mark.slow)])
 def test_builders_killed_at_random_moments_leave_nothing_and_the_next_builds(cache, tmp_path, kills):
     log, moments, whole = tmp_path / "log", random.Random(kills), scene_path("kitchen", 7)

@@ -43,6 +43,7 @@ def view() -> View:
     return first_person_view(np.repeat([[0.5, 0.5], [1.5, 1.0]], 4, axis=0)[:7], np.arange(7) * 90 % 360)
 
 
+@pytest.mark.slow
 def test_any_number_of_workers_gives_the_same_pictures(model, view, capfd):
     alone = render(model, view, workers=1)
     assert alone.shape == (7, 300, 400, 3) and alone.dtype == np.uint8
@@ -87,6 +88,7 @@ def test_the_users_backend_is_respected_and_named_if_it_fails(model, view, monke
         render(model, view, workers=1)
 
 
+@pytest.mark.slow
 @needs_proc
 def test_a_renderer_that_is_killed_is_one_clear_error_and_ends_the_others(model, view):
     with studio(model, view, workers=2) as camera:
@@ -109,6 +111,7 @@ def test_fewer_than_one_worker_is_refused(model, view):
         render(model, view, workers=0)
 
 
+@pytest.mark.slow
 def test_a_studio_takes_the_same_pictures_a_few_at_a_time(model, view):
     together = render(model, view, workers=1)
     with studio(model, view, workers=2) as camera:

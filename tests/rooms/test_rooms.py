@@ -53,10 +53,12 @@ def test_the_package_loads_without_mujoco():
     assert "mujoco" not in imported_by("import clearway.rooms")
 
 
+@pytest.mark.slow
 def test_the_obstacles_do_not_depend_on_the_looks():
     assert np.array_equal(obstacles_of(build_bathroom(3, True, FULL)), obstacles_of(build_bathroom(3, False, FULL)))
 
 
+@pytest.mark.slow
 def test_a_seed_repeats_and_another_differs():
     first, again, other = build_bathroom(2, True, FULL), build_bathroom(2, True, FULL), build_bathroom(4, True, FULL)
     for one, two in zip(first.surfaces, again.surfaces, strict=True):
@@ -88,6 +90,7 @@ def cheap(room) -> bool:
     return bool(model.ngeom <= 450 and faces <= 70_000 and model.geom_rgba.min() >= 0)
 
 
+@pytest.mark.slow
 def test_the_bathroom_is_ready_to_render():
     room = build_room("bathroom")
     assert parts_outside(room) == []

@@ -33,6 +33,7 @@ def test_warnings_that_strangers_cause_are_few() -> None:
     assert [sparing.filter(record) for record in records] == [True, False, False, False, False]
 
 
+@pytest.mark.slow
 def test_a_service_writes_who_asked_for_what_and_never_the_token() -> None:
     with running(log=True) as service:
         headers = {"authorization": f"Bearer {TOKEN}"}
@@ -48,6 +49,7 @@ def test_a_service_writes_who_asked_for_what_and_never_the_token() -> None:
     assert all(each["time"].startswith("20") and each["seconds"] >= 0 for each in said) and TOKEN not in err
 
 
+@pytest.mark.slow
 def test_handshakes_steps_and_ends_of_streams_have_lines_too() -> None:
     """They once had none: what came by a WebSocket was not to be seen."""
     with running(log=True) as service, service.client() as client:

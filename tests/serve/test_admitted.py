@@ -21,6 +21,7 @@ GUEST, OTHER = 20 * "g", 20 * "o"
 REQUEST = "GET /agent HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {}\r\n\r\n"
 
 
+@pytest.mark.slow
 def test_streams_and_idle_connections_end_with_their_token_and_others_go_on(tmp_path: Path) -> None:
     """They went on for as long as they were used. A name's other token keeps its own."""
     path = tmp_path / "tokens"

@@ -234,6 +234,7 @@ asyncio.run(main())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
 def test_decoders_end_with_their_parent(number) -> None:
     with subprocess.Popen(

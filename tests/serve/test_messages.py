@@ -48,6 +48,7 @@ def close_code(stream: ClientConnection) -> int:
     return closed.value.rcvd.code
 
 
+@pytest.mark.slow
 def test_what_is_held_of_partial_messages_together_is_bounded() -> None:
     """Each could once hold as much as one message may have."""
     with running(body_bytes=60_000, bodies_bytes=100_000) as service:
@@ -64,6 +65,7 @@ def test_what_is_held_of_partial_messages_together_is_bounded() -> None:
             assert json.loads(second.recv(timeout=PATIENT_S))["error"]["code"] == "no_target"
 
 
+@pytest.mark.slow
 def test_a_message_that_trickles_is_given_up() -> None:
     with running(deadline_s=0.5) as service, streaming(service) as stream:
         stream.socket.sendall(begun(BINARY, b"x", 1000))

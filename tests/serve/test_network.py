@@ -83,6 +83,7 @@ def test_certificates_that_are_none(tmp_path) -> None:
             check_tls(first, second)
 
 
+@pytest.mark.slow
 def test_strangers_keep_no_connection_and_not_many() -> None:
     """Idle ones after `GET /health`, as many as the service has, once kept everybody else out."""
     with running(patience_s=1.0, connections=40, strangers=10) as service:
@@ -100,6 +101,7 @@ def test_strangers_keep_no_connection_and_not_many() -> None:
                 connection.close()
 
 
+@pytest.mark.slow
 def test_one_name_leaves_connections_for_another(tmp_path) -> None:
     """Once its token was right, a client could keep as many as there were."""
     path, guest = tmp_path / "tokens", {"authorization": f"Bearer {20 * 'g'}"}
@@ -121,6 +123,7 @@ def test_one_name_leaves_connections_for_another(tmp_path) -> None:
         assert greedy[3].get(f"{service.url}/agent").status_code == 200
 
 
+@pytest.mark.slow
 def test_health_and_metrics_on_a_port_of_their_own() -> None:
     with running(health=True) as service:
         own = f"http://127.0.0.1:{service.health_port}"
@@ -139,6 +142,7 @@ def test_health_and_metrics_on_a_port_of_their_own() -> None:
             pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("proxy", [None, "127.0.0.1"])
 def test_who_asks_is_told_by_a_trusted_proxy_alone(proxy) -> None:
     """The fourth wrong token of an address is too many; a header makes it another address where it is believed."""
@@ -171,6 +175,7 @@ def test_a_minute_forgives_wrong_tokens() -> None:
     assert attempts.may_try("here", "right")
 
 
+@pytest.mark.slow
 def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_path) -> None:
     """Also where nohup has told the process to ignore it."""
     path, new = tmp_path / "tokens", 20 * "n"
@@ -201,6 +206,7 @@ def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_pat
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("replicas", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_hangup_reads_the_certificate_again_and_keeps_the_old_where_it_cannot(replicas: int, tmp_path: Path) -> None:
     """The new one has a key of another kind."""

@@ -183,6 +183,7 @@ def test_tokens_that_change_while_a_replica_starts_reach_it(tmp_path: Path, monk
     assert code == -signal.SIGHUP
 
 
+@pytest.mark.slow
 def test_a_service_ends_where_no_replica_can_begin(monkeypatch, capfd) -> None:
     monkeypatch.setattr(replicas, "MOST_FAILED", 2)
     monkeypatch.setattr(replicas, "PAUSES_S", (0.0, 0.0))

@@ -68,6 +68,7 @@ def test_headers_that_do_not_come_and_headers_that_trickle(hasty) -> None:
     assert still_serves(hasty)
 
 
+@pytest.mark.slow
 def test_an_upload_that_trickles_is_refused_and_one_cut_off_changes_nothing(hasty) -> None:
     with hasty.client() as client, client.session(selection="argmax") as session:
         session.set_target(plain(0))
@@ -96,6 +97,7 @@ def test_an_upload_that_trickles_is_refused_and_one_cut_off_changes_nothing(hast
         assert session.act(plain(2)).value == 5
 
 
+@pytest.mark.slow
 def test_a_connection_stays_open_for_longer_than_clients_keep_theirs(hasty) -> None:
     """A robot that steps every few seconds would else send pictures while the service closes."""
     with hasty.connected() as connection:
@@ -109,6 +111,7 @@ def test_a_connection_stays_open_for_longer_than_clients_keep_theirs(hasty) -> N
             time.sleep(pause_s)
 
 
+@pytest.mark.slow
 def test_a_client_that_does_not_read_is_cut_off(hasty) -> None:
     """One by pipelining requests, one in a stream; neither holds the service up."""
     with hasty.connected() as connection, hasty.client() as client:
@@ -210,6 +213,7 @@ def test_two_hundred_sessions_for_a_minute() -> None:
     assert steps >= 400
 
 
+@pytest.mark.slow
 def test_what_is_under_way_is_answered_before_the_end() -> None:
     with running(seconds=1.0) as service, service.client() as client:
         session = client.session(selection="argmax")
@@ -226,6 +230,7 @@ def test_what_is_under_way_is_answered_before_the_end() -> None:
             session.act(plain(3))
 
 
+@pytest.mark.slow
 def test_streams_are_closed_at_the_end() -> None:
     with running() as service, service.client() as client:
         session = client.session()
@@ -239,6 +244,7 @@ def test_streams_are_closed_at_the_end() -> None:
         assert service.process.returncode == 0
 
 
+@pytest.mark.slow
 def test_a_kill_in_the_middle_is_an_error_that_says_so() -> None:
     with running(seconds=30, deadline_s=50) as service, service.client() as client:
         session = client.session()

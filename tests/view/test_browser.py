@@ -126,6 +126,7 @@ def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -
     expect(page.locator("#status")).to_contain_text("Film saved")
 
 
+@pytest.mark.slow
 def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=8&seed=52")
     page.locator("#speed").fill("5")
@@ -229,6 +230,7 @@ RENAMED = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("viewport", [{"width": 1280, "height": 800}, PHONE], ids=["screen", "phone"])
 def test_long_names_take_one_line_and_the_views_stand_level(opened: Callable[..., Page], viewport: dict) -> None:
     at = "scene=corridor&start=4&target=8"
@@ -270,6 +272,7 @@ def test_an_agent_has_one_colour_whatever_the_order(opened: Callable[..., Page])
         assert page.evaluate(script, walkers) == [*colours, purple]
 
 
+@pytest.mark.slow
 def test_the_star_is_seen_round_those_who_stand_on_it(opened: Callable[..., Page]) -> None:
     green = """(canvas) => {
         const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
@@ -322,6 +325,7 @@ def test_depth_is_a_switch_away_where_the_scene_has_it(opened: Callable[..., Pag
     expect(picture).to_have_attribute("src", re.compile("scenes/1/views/"))
 
 
+@pytest.mark.slow
 def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Callable[..., Page]) -> None:
     page = opened("scene=bare&start=59&target=30")
     page.locator("#scene").select_option("corridor")

@@ -170,6 +170,7 @@ def test_a_folder_that_holds_something_is_left_alone(stage: Stage, tmp_path: Pat
     assert [path.name for path in tmp_path.rglob("*")] == (["page"] if there == "file" else ["page", "mine.txt"])
 
 
+@pytest.mark.slow
 def test_nothing_half_written_stays(stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*words: object) -> None:
         raise OSError(28, "No space left on device")

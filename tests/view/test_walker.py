@@ -86,6 +86,7 @@ def test_a_start_at_the_target_is_the_end() -> None:
     assert walk.steps[0].reached
 
 
+@pytest.mark.slow
 def test_argmax_goes_on_for_ever_and_is_stopped() -> None:
     walk = walker(0, likes(corridor_world(), LEFT))
     while walk.step():
@@ -103,6 +104,7 @@ def test_argmax_untried_tries_another_action_in_the_same_pose() -> None:
     assert taken == [FORWARD, RIGHT]
 
 
+@pytest.mark.slow
 def test_sampled_actions_repeat_with_the_seed_and_follow_the_probabilities() -> None:
     def actions(seed: int) -> list[int]:
         agent = likes(corridor_world(), RIGHT, "sampled")

@@ -103,18 +103,21 @@ def test_scenes_are_never_written_over_nor_mixed_up(made, scenes, tmp_path) -> N
     assert made == []
 
 
+@pytest.mark.slow
 def test_workers_load_no_torch() -> None:
     assert "torch" not in imported_by(
         "import clearway.views.files, clearway.views.grid, clearway.api.views, clearway.views.stream"
     )
 
 
+@pytest.mark.slow
 def test_a_scene_that_is_no_room_is_told_by_its_worker(scenes, tmp_path) -> None:
     with pytest.raises(SceneError, match="there is no room to walk in: the scene comes from test"):
         take_missing(scenes[:1], tmp_path / "views", SETTINGS, workers=1)
     assert not list((tmp_path / "views").iterdir())
 
 
+@pytest.mark.slow
 def test_a_room_is_built_and_seen_in_a_worker_of_its_own(tmp_path) -> None:
     numbers = range(3, 40, 4)  # bathrooms
     plan = min((generated_plan(Request("room", "train", 0, n)) for n in numbers), key=lambda one: len(one.cells))

@@ -39,6 +39,7 @@ def _here(live, monkeypatch):
     monkeypatch.setattr(grid, "render", render_in_a_process)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_here")
 def test_unperturbed_takes_are_the_scene_s_own_pictures_and_light_and_noise_are_those_of_the_draws(live):
     own = live.scene.observations
@@ -93,6 +94,7 @@ def test_parts_of_the_scene_that_cannot_be_reached_are_perturbed_too(live):
     assert all(one.pose[:2] != parted.pose_of(number // 3)[:2] for number, one in enumerate(placed))
 
 
+@pytest.mark.slow
 def test_takes_are_kept_and_come_in_the_order_of_their_scenes(live, tmp_path, monkeypatch):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path))
     took: list[str] = []
@@ -128,6 +130,7 @@ def test_what_cannot_be_taken_is_told_before_anything_is(live):
         placed_takes(replace(live, room=None), asked(live, REFERENCE))
 
 
+@pytest.mark.slow
 def test_a_room_is_built_and_taken_in_a_worker_of_its_own(tmp_path, monkeypatch):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path))
     numbers = range(3, 40, 4)  # bathrooms

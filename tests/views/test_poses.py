@@ -71,6 +71,7 @@ def test_poses_are_anywhere_and_look_anywhere(live):
     assert set(on_grid.table.heading_deg) == {0, 90, 180, 270}
 
 
+@pytest.mark.slow
 def test_a_pose_follows_from_the_seed_the_room_and_its_number(live):
     def columns(taken: Taken) -> np.ndarray:
         return taken.table.to_array()
@@ -104,6 +105,7 @@ def test_a_perturbation_changes_its_own_between_takes(live, perturbation, change
     assert table.pose.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5] and table.take.tolist() == [0, 1] * 6
 
 
+@pytest.mark.slow
 def test_takes_see_the_room_in_layouts_of_their_own_or_as_it_was_built(live):
     table = drawn(live, replace(MOVING, poses=60, takes=3)).table
     arrangements = table.arrangement.reshape(-1, 3)
@@ -114,6 +116,7 @@ def test_takes_see_the_room_in_layouts_of_their_own_or_as_it_was_built(live):
         assert len(set(moved)) == len(moved)
 
 
+@pytest.mark.slow
 def test_distances_are_the_body_s(live):
     """In the corner free of furniture, facing along z: walls at x = 0 and z = 0, 2.5."""
     table = drawn(live, replace(STILL, poses=400)).table
@@ -142,6 +145,7 @@ def test_distances_are_the_body_s(live):
     assert a_metre_ahead[table.free_m[:, 0] > 1.0].all() and not a_metre_ahead[table.free_m[:, 0] < 0.7].all()
 
 
+@pytest.mark.slow
 def test_parts_that_cannot_be_reached_have_no_poses(live):
     """A cell that no move leads to or from, as another component."""
     scene, alone = live.scene, live.scene.cells == live.scene.cells.max()

@@ -36,6 +36,7 @@ def _small_room(live, monkeypatch) -> None:
     monkeypatch.setattr(take, "sense", sense_in_a_process)
 
 
+@pytest.mark.slow
 def test_pictures_are_of_the_poses_in_the_table(live) -> None:
     views = room_views(live.scene, SETTINGS)
     table = views.table
@@ -49,6 +50,7 @@ def test_pictures_are_of_the_poses_in_the_table(live) -> None:
         np.testing.assert_array_equal(render(live.model, view, workers=1), seen)
 
 
+@pytest.mark.slow
 def test_light_and_noise_are_those_of_the_draws(live) -> None:
     """As live agents see them; nothing else changes."""
     clean = room_views(live.scene, SETTINGS)
@@ -63,5 +65,6 @@ def test_light_and_noise_are_those_of_the_draws(live) -> None:
         assert (seen != plain).mean() > 0.3
 
 
+@pytest.mark.slow
 def test_odd_sizes_are_taken_too(live) -> None:
     assert room_views(live.scene, replace(SETTINGS, size_px=(17, 31))).rgb.shape == (6, 17, 31, 3)

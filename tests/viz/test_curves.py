@@ -56,6 +56,7 @@ def test_long_runs_are_drawn_faintly_and_their_running_mean_strongly(tmp_path, d
     assert np.array_equal(strong.get_ydata(), _running_mean(steps, 8)) and strong.get_alpha() is None
 
 
+@pytest.mark.slow
 def test_the_axis_can_be_time(tmp_path, drawn):
     for x in ("frames", "seconds"):
         draw_curves({"run": rows(20)}, tmp_path / "curves.png", x=x)

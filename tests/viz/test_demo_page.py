@@ -64,6 +64,7 @@ def test_every_link_leads_to_a_picture_beside_the_page(result, shown):
     assert all(shown.pictures.values())  # what those hear who do not see
 
 
+@pytest.mark.slow
 def test_it_opens_with_the_pictures_that_are_given(result):
     opening = Opening([KeyFigure("bumps", "0.1")], [Picture("pictures/map.png", "Both & each", "both")], "Chosen.")
     page = make_demo_page(result, COMMAND, opening).read_text(encoding="utf-8")
@@ -98,6 +99,7 @@ def test_four_rows_stand_open_and_all_are_folded(result, shown):
     assert len(re.findall('<th scope="row">', folded)) == len(result.evaluations) > 4
 
 
+@pytest.mark.slow
 def test_an_agent_has_one_colour_on_the_map_in_the_curves_and_in_the_viewer(result, monkeypatch):
     curves = []
     monkeypatch.setattr(demo_page, "draw_curves", lambda runs, path, looks: curves.append((list(runs), looks)))
@@ -116,6 +118,7 @@ def test_the_page_says_what_made_it(shown):
         assert f"\n{agent}\n" in shown.text
 
 
+@pytest.mark.slow
 def test_both_agents_are_drawn_on_one_map_from_one_start(result, monkeypatch):
     maps, sheets = [], []
     monkeypatch.setattr(demo_page, "draw_map", lambda scene, path, **drawn: maps.append(drawn))

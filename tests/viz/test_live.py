@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from clearway.agents.agent import Decisions, Observation, State
@@ -38,6 +39,7 @@ def colour_share(picture: np.ndarray, colour: str) -> float:
     return float((np.abs(picture.astype(int) - wanted).max(axis=2) < 12).mean())
 
 
+@pytest.mark.slow
 def test_a_row_a_setting_and_a_colour_an_agent(tmp_path: Path) -> None:
     sizes = []
     for count in (1, 4):
@@ -58,6 +60,7 @@ def test_a_place_lies_ahead_where_free_moves_lead_there() -> None:
     assert _moves_to(scene, 4 * 3, place_m) == 0  # stands there
 
 
+@pytest.mark.slow
 def test_the_view_is_what_the_agent_saw_in_that_episode() -> None:
     """At its start, under every perturbation: layout, light, jitter and noise are the episode's own."""
     live, seen = walkable_live(), []

@@ -68,6 +68,7 @@ def test_the_room_is_the_view_from_above_or_else_walls_and_free_cells(tmp_path, 
     assert all(np.allclose(colour(place), expected_floor, atol=1) for place in inside)
 
 
+@pytest.mark.slow
 def test_title_and_legend_say_what_is_drawn(tmp_path, drawn):
     scene, path = corridor_scene(5), tmp_path / "deep" / "map.png"
     walks = [Walk("first", PATH), Walk("second", PATH[:3])]
@@ -107,6 +108,7 @@ def test_star_and_line_stand_at_their_poses(tmp_path, drawn):
     assert [at(place_m) for place_m in on_line] == [rgb(LINES[0].colour)] * len(on_line)
 
 
+@pytest.mark.slow
 def test_zones_change_the_map_and_nothing_else_is_needed(tmp_path):
     scene = grid_scene(1)
     zones = scene_zones(scene)

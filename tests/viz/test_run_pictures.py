@@ -36,6 +36,7 @@ def is_png(path) -> bool:
         return picture.format == "PNG" and min(picture.size) > 100
 
 
+@pytest.mark.slow
 def test_every_scene_gets_a_map_and_its_views(run, tmp_path):
     made = draw_run_pictures(*run, small_scenes(), tmp_path / "new" / "pictures")
     names = ["curves.png", "map-corridor.png", "episode-corridor.png", "map-grid.png", "episode-grid.png"]
@@ -44,6 +45,7 @@ def test_every_scene_gets_a_map_and_its_views(run, tmp_path):
     assert all(is_png(path) for path in made)
 
 
+@pytest.mark.slow
 def test_scenes_without_pictures_get_no_contact_sheet(run, tmp_path):
     corridor, grid = small_scenes()
     made = draw_run_pictures(*run, [corridor, replace(grid, observations=None, top_view=None)], tmp_path)
@@ -69,6 +71,7 @@ def test_maps_and_sheets_show_one_walk_in_the_zones_of_the_run(run, tmp_path, mo
     assert rows["collision-aware"][-1]["frames"] == 160
 
 
+@pytest.mark.slow
 def test_the_seed_chooses_the_episode(run, tmp_path):
     pictures = [
         {path.name: path.read_bytes() for path in draw_run_pictures(*run, small_scenes(), tmp_path / name, seed=seed)}

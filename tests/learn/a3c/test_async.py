@@ -99,6 +99,7 @@ def test_one_process_repeats_and_resumes_bit_for_bit(tmp_path: Path, monkeypatch
     assert torch.allclose(probabilities.sum(1), torch.ones(2))
 
 
+@pytest.mark.slow
 def test_one_process_learns_and_counts_what_plain_a3c_does(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(statistics, "WINDOW", 1)
     learner = small_learner(PAPER_A3C, frames=300, rollout_steps=5, step_limit=200, lr_start=0.05, centre_features=True)
@@ -131,6 +132,7 @@ def two_processes() -> Iterator[AsyncTrainer]:
         yield trainer
 
 
+@pytest.mark.slow
 def test_pauses_go_on_and_a_killed_worker_is_named(two_processes: AsyncTrainer) -> None:
     trainer = two_processes
     numbers = [process.pid for process in trainer._processes]
@@ -222,6 +224,7 @@ def test_more_processes_than_workers_are_not_started() -> None:
     assert async_trainer(100, processes=64).process_count == 10
 
 
+@pytest.mark.slow
 def test_a_loss_that_is_not_finite_stops_training_and_is_not_saved_either() -> None:
     """What workers report while they pause for a checkpoint does not go through an update."""
     with closing(async_trainer(10_000_000, processes=1)) as trainer:
@@ -263,6 +266,7 @@ def test_memory_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) ->
         SharedTensors.holding({"a": torch.ones(3)})
 
 
+@pytest.mark.slow
 def test_workers_that_walk_on_until_a_checkpoint_skip_no_milestone_and_no_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

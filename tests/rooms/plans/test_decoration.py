@@ -135,6 +135,7 @@ def furnished_plan(number: int) -> FloorPlan:
     return replace(walled(f"room {number}", lines), furniture=(Furnishing("sofa", (2, 1), (3, 1), "north"),))
 
 
+@pytest.mark.slow
 def test_lamps_of_plans_that_name_their_furniture_differ() -> None:
     lamps = [decorated(0.9, seed, furnished_plan(0))[0].lamps[0] for seed in range(30)]
     assert len({tuple(lamp.colour) for lamp in lamps}) == 3

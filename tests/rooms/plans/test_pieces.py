@@ -125,6 +125,7 @@ def test_furniture_that_a_plan_names_is_drawn_where_it_says() -> None:
         assert tops_m[0] in {one.top_m for one in NAMED[kind]}
 
 
+@pytest.mark.slow
 def test_rooms_between_walls_have_themes_of_their_own() -> None:
     def themes_in(seed: int) -> set[bool]:
         rooms = []

@@ -129,6 +129,7 @@ def test_plans_that_are_no_rooms(plan: FloorPlan, seed: int, message: str) -> No
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_limits_need_no_simulator() -> None:
     assert "mujoco" not in imported_by("import clearway.rooms.plans.buildable")
 
@@ -227,6 +228,7 @@ def test_no_camera_stands_in_a_wall_or_a_frame(two_rooms: Furnished) -> None:
     assert nearest_m > 0.2
 
 
+@pytest.mark.slow
 def test_both_rooms_are_lit_and_the_way_shows_from_above(two_rooms: Furnished) -> None:
     places_m = two_rooms.places_m[[0, len(two_rooms.places_m) - 1]]
     view = first_person_view(np.repeat(places_m, 4, axis=0), np.tile(list(STEPS), 2))
