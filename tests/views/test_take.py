@@ -36,7 +36,6 @@ def _small_room(live, monkeypatch) -> None:
     monkeypatch.setattr(take, "sense", sense_in_a_process)
 
 
-@pytest.mark.slow
 def test_pictures_are_of_the_poses_in_the_table(live) -> None:
     views = room_views(live.scene, SETTINGS)
     table = views.table
