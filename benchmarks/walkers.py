@@ -4,14 +4,16 @@
 
 The name of a run is its kind, a hyphen and its seed. All walk to the same goals from the same starts. A claim about two
 kinds compares the means over seeds, room by room: it holds where the interval over rooms leaves out zero, after
-correction for all claims of that figure (Holm), and every seed says the same of the two kinds.
+correction for all claims of that figure (Holm), and every seed says the same of the two kinds. With `--trying-again
+KIND` its agents walk once more, as KIND-again, and may try again what was blocked where they see the same picture.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +21,7 @@ import numpy as np
 from by_scene import column, p_of_mean, print_table, shown, write_record
 
 import clearway
+import clearway.agents.recurrent
 from clearway.evaluation.goals import GoalEvaluation
 from clearway.experiments.correction import LEVEL, holm
 from clearway.learn.provenance import hardware, package_versions
@@ -68,6 +71,17 @@ def print_judged(found: Mapping[str, GoalEvaluation], runs: Sequence[str], name:
         print(f"p = {claim.p:.2g}: {held}")
 
 
+@contextmanager
+def trying_again() -> Iterator[None]:
+    """Agents keep their probabilities, whatever was blocked."""
+    kept = clearway.agents.recurrent.without_blocked
+    clearway.agents.recurrent.without_blocked = lambda state, mark, probabilities: probabilities
+    try:
+        yield
+    finally:
+        clearway.agents.recurrent.without_blocked = kept
+
+
 def main() -> None:
     """Measure, print, judge, and write the record."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -78,6 +92,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--fewer", nargs=2, action="append", default=[], metavar="KIND", help="collisions: the first's")
     parser.add_argument("--higher", nargs=2, action="append", default=[], metavar="KIND", help="SPL: the first's")
+    parser.add_argument("--trying-again", metavar="KIND", help="whose agents walk once more")
     parser.add_argument("--json", type=Path, help="where the record is written")
     args = parser.parse_args()
     files = sorted(args.scenes.glob("*.h5"))[args.first :]
@@ -86,8 +101,14 @@ def main() -> None:
     for run in args.runs:
         own, *beside = clearway.evaluate_goals(clearway.load_agent(run), files, **asked)
         found |= {run.name: own} | {other.agent: other for other in beside}
-    print_table(found)
     runs = [run.name for run in args.runs]
+    for run in args.runs:
+        kind, _, seed = run.name.rpartition("-")
+        if kind == args.trying_again:
+            runs.append(f"{kind}-again-{seed}")
+            with trying_again():
+                found[runs[-1]] = clearway.evaluate_goals(clearway.load_agent(run), files, **asked)[0]
+    print_table(found)
     print_judged(found, runs, "collisions", [[other, kind] for kind, other in args.fewer])
     print_judged(found, runs, "spl", args.higher)
     if args.json:
