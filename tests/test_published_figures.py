@@ -19,7 +19,7 @@ AGENTS = r"collision-aware|dearer|shuffled|shortest"
 COLUMNS = ("success", "success_4x", "spl", "collisions")
 ARRIVALS = ("false_arrivals", "missed_arrivals")
 SHARES = ("success", "success_4x", "spl")
-THIRD, FOURTH, FIFTH = (f"generalist-test-{number}.json" for number in ("third", "fourth", "fifth"))
+THIRD, FOURTH, FIFTH, SIXTH = (f"generalist-test-{number}.json" for number in ("third", "fourth", "fifth", "sixth"))
 TOURS = "generalist-tours.json"
 ROWS = [
     (FIFTH, "rooms", "generalist", "| rooms | 100 % | 93.8"),
@@ -56,6 +56,8 @@ ROWS = [
     (TOURS, "held-out-perturbed-tour", "generalist", "| known room, targets held out |"),
     (TOURS, "rooms-perturbed", "generalist", "| not toured, perturbed |"),
     (TOURS, "rooms", "generalist", "| not toured, nothing perturbed |"),
+    (SIXTH, "real", "generalist", "| all real plans |"),
+    (SIXTH, "real", "random", "| all real plans, random walk |"),
     (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
 ]
 
@@ -113,20 +115,21 @@ def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_sai
 
 
 @pytest.mark.parametrize(
-    ("begins", "parts"),
+    ("begins", "record", "parts"),
     [
-        ("| rooms, no tour:", ["rooms"]),
-        ("| the same by the eyes", ["rooms-eyes-1", "rooms-eyes-2"]),
-        ("| flats, no tour:", ["flats"]),
+        ("| rooms, no tour:", FIFTH, ["rooms"]),
+        ("| the same by the eyes", FIFTH, ["rooms-eyes-1", "rooms-eyes-2"]),
+        ("| flats, no tour:", FIFTH, ["flats"]),
+        ("| real plans, moves of 0.25 m, no tour:", SIXTH, ["real"]),
     ],
 )
-def test_the_summary_says_what_the_tables_say(begins: str, parts: list[str]) -> None:
+def test_the_summary_says_what_the_tables_say(begins: str, record: str, parts: list[str]) -> None:
     (line,) = [line for line in PAGE.splitlines() if line.startswith(begins)]
     written = numbers(re.sub(r"\(.*?\)", "", line.split("|")[3]))
     names = ("success", "spl", "collisions")[: len(written) // len(parts)]
     asked = [(part, name) for part in parts for name in names]
     for (part, name), figure in zip(asked, written, strict=True):
-        value = np.mean([scene[name] for scene in scenes_of(FIFTH, part, "generalist")])
+        value = np.mean([scene[name] for scene in scenes_of(record, part, "generalist")])
         expect(figure, float(value) * (100 if name in SHARES else 1), f"{name} of {part} in {begins}")
 
 
