@@ -32,13 +32,6 @@ def interval(values: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def p_of_mean(values: np.ndarray) -> float:
-    """That the mean over scenes is zero, two-sided: twice the share of redrawn means on the other side of it."""
-    drawn = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
-    means = np.nanmean(values[drawn], axis=1)
-    return min(1.0, 2 * (1 + min(int((means <= 0).sum()), int((means >= 0).sum()))) / (RESAMPLES + 1))
-
-
 def shown(name: str, values: np.ndarray) -> str:
     """Mean and interval."""
     if np.isnan(values).all():

@@ -1,6 +1,8 @@
 """What an episode has seen to be blocked: a move after which the very same picture came again.
 
-Pictures are told apart by marks (`mapping.again`). Where pictures never repeat, nothing is ever held for blocked.
+Pictures are told apart by marks (`mapping.again`). Where pictures never repeat, nothing is ever held for blocked. Where
+two poses show the same picture, what was blocked in one is not tried in the other; so an agent that knows no other way
+out keeps its probabilities, and the oldest pictures are forgotten.
 
 Axis letters: B episodes, A actions, K pictures that are remembered, the last ones.
 """

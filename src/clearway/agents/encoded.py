@@ -7,8 +7,6 @@ import numpy as np
 from clearway.agents.agent import FEATURES, Observation
 from clearway.perception.encoder import Encoder, sensor_of
 
-PICTURES_AT_ONCE = 32
-
 
 class Encoded:
     """What is seen, as features.
@@ -25,12 +23,15 @@ class Encoded:
         self.sees = FEATURES if encoder is None else sensor_of(encoder.record)
 
     def __call__(self, seen: Observation) -> np.ndarray:
-        """Features (B, F) float32 of B observations."""
+        """Features (B, F) float32 of B observations.
+
+        Pictures are encoded one by one: the last bits of features differ with how many are encoded at once, and an
+        agent may know a picture again by them, whatever runs beside it.
+        """
         given = seen[self.sees]
         if self._encoder is None:
             return given
-        parts = range(0, len(given), PICTURES_AT_ONCE)
-        return np.concatenate([self._encoder.encode(given[b : b + PICTURES_AT_ONCE]) for b in parts])
+        return np.concatenate([self._encoder.encode(given[row : row + 1]) for row in range(len(given))])
 
     def of_target(self, target: Observation) -> np.ndarray:
         """Features (B, F) float32 of targets, taken where they are known."""

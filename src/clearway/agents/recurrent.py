@@ -22,7 +22,7 @@ from clearway.perception.encoder import Encoder
 class RecurrentAgent:
     """Draws its actions by a recurrent network, and says by it whether it has arrived.
 
-    A move that was blocked is not tried again in the same episode where the very same picture is seen.
+    What was blocked is not tried again where the very same picture is seen, see `blocked`; unless the network forgets.
 
     Args:
         network: the parameters.
@@ -60,7 +60,7 @@ class RecurrentAgent:
         said = self._network(self._pairs(now, target), last, torch.from_numpy(state["hidden"]))
         mark = marks_of(seen)
         same = state["begun"] & (mark == marks_of(state["seen"]))
-        blocked = add_blocked(state, mark, state[LAST_ACTION], same)
+        blocked = add_blocked(state, mark, state[LAST_ACTION], same & self._network.shape.remembers)
         probabilities = torch.softmax(said.scores, dim=1, dtype=torch.float64).numpy()
         allowed = without_blocked(blocked, mark, probabilities)
         decisions, chance = drawn(allowed, state[CHANCE], said.value.numpy())

@@ -56,7 +56,7 @@ class Argmax:
         """See `Agent.act`."""
         decisions, after = self._agent.act(observation, state)
         decisions = most_probable(decisions)
-        return decisions, _having_taken(decisions.action, after)
+        return decisions, having_taken(decisions.action, after)
 
 
 class ArgmaxUntried:
@@ -90,7 +90,7 @@ class ArgmaxUntried:
         tried = state[_TRIED].copy()
         tried[place] = np.where(now == _ALL_TRIED, 0, now)
         return replace(decisions, action=action, certain=None), {
-            **_having_taken(action, after),
+            **having_taken(action, after),
             _FIRST: state[_FIRST],
             _TRIED: tried,
         }
@@ -106,7 +106,7 @@ def most_probable(decisions: Decisions) -> Decisions:
     return replace(decisions, action=action, certain=np.ones(len(action), bool))
 
 
-def _having_taken(action: np.ndarray, state: State) -> State:
+def having_taken(action: np.ndarray, state: State) -> State:
     """The state of an agent that would have taken others; where it remembers its last action, these (B,) are it."""
     return {**state, LAST_ACTION: action} if LAST_ACTION in state else state
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from clearway.agents.selection import most_probable
+from clearway.agents.selection import having_taken, most_probable
 from clearway.deploy.agent import DeployedAgent, aspect_problem
 from clearway.deploy.navigator import Selection, arrival_of, check_selection, decision_of, episode_seed
 from clearway.errors import DeployError
@@ -143,6 +143,7 @@ class Service:
                     decisions, state = await self.batcher.act(session.owner, picture, before.state)
                 if session.selection == "argmax":
                     decisions = most_probable(decisions)
+                    state = having_taken(decisions.action, state)
                 answer = Answer(decision_of(decisions), arrival_of(decisions), before.steps + 1)
                 if await self.sessions.keep(
                     session, before, Progress(before.episode, answer.step, state, file, answer)

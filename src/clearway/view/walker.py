@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from clearway.agents.agent import POSE, Agent, Decisions, State
-from clearway.agents.selection import ActionSelection, selecting
+from clearway.agents.selection import ActionSelection, having_taken, selecting
 from clearway.evaluation.sight import Sight
 from clearway.mapping.held import Held
 from clearway.reward import Reward
@@ -121,6 +121,7 @@ class Walker:
             action = self.steps[-1].next
         if action is None:
             return None
+        self.memory = having_taken(np.array([action]), self.memory)
         happened = self.env.step(torch.tensor([action]))
         self.steps.append(
             self._arrived(
