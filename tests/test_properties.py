@@ -112,7 +112,6 @@ def test_zones_are_those_of_the_definition(scene: Scene) -> None:
         assert (by_cell[own[0]] == Zone.COLLISION) == (found[own] == Zone.COLLISION).any()
 
 
-@pytest.mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from([SHORTEST, COLLISION_AWARE, BUMP]), st.integers(0, 2**31), st.integers(1, 12))
 def test_environments_follow_the_graph_and_the_reward_s_rules(

@@ -172,7 +172,6 @@ def test_it_is_argmax_as_long_as_no_pose_comes_back(world):
         assert np.array_equal(getattr(greedy, name), getattr(untried, name))
 
 
-@pytest.mark.slow
 def test_it_is_deterministic_and_the_same_whatever_runs_beside_it(world):
     agent, settings = by_rule(world, RULES[1]), {"selection": "argmax-untried", "episodes_per_target": 20}
     whole = run_episodes(world, agent, **settings)

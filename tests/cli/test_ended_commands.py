@@ -63,7 +63,6 @@ CASES = [
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "number"), CASES)
 def test_nothing_is_left_of_a_command_that_is_ended(name: str, number: signal.Signals, tmp_path: Path) -> None:
     words, count = COMMANDS[name]

@@ -103,7 +103,6 @@ def test_an_agent_that_is_only_sometimes_certain_is_not_cut_short(world):
     assert same(run_episodes(world, agent, **settings), run_episodes(world, agent, record=True, **settings))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("random", [True, False])
 def test_an_episode_is_the_same_whatever_runs_beside_it(world, random):
     agent = RandomWalk() if random else by_rule(world, arbitrary(0, greed=0.5))
@@ -123,14 +122,12 @@ def test_another_target_in_the_world_changes_no_episode():
     assert np.array_equal(alone.steps, beside.steps[20:])
 
 
-@pytest.mark.slow
 def test_a_seed_repeats_and_another_differs(world):
     first, again, other = (run_episodes(world, RandomWalk(), episodes_per_target=20, seed=seed) for seed in (1, 1, 2))
     assert same(first, again)
     assert not np.array_equal(first.start, other.start)
 
 
-@pytest.mark.slow
 def test_all_agents_face_the_same_starts(world):
     walked = run_episodes(world, RandomWalk(), episodes_per_target=20)
     ideal = run_episodes(world, shortest_paths(world), episodes_per_target=20)

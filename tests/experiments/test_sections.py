@@ -85,7 +85,6 @@ def test_runs_are_shared_between_experiments(setting: Setting) -> None:
     assert all(is_done(setting.out, job) for job in jobs)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("solved", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_before_any_run_every_section_says_what_is_missing(
     tmp_path: Path, setting: Setting, sections: dict[str, Section], solved: bool

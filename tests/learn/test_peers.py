@@ -64,7 +64,6 @@ LEARNERS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("doubles")
 @pytest.mark.parametrize(
     ("name", "workers"),

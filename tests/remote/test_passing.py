@@ -99,7 +99,6 @@ def test_views_come_in_the_same_order_within_the_limit(
     assert count == 2 * here.batch_count(4)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)], ids=["one worker", "several workers"])
 def test_an_agent_learns_from_a_set_that_does_not_fit(
     workers: int, scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

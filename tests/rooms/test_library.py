@@ -143,7 +143,6 @@ def test_a_killed_builder_leaves_no_scene_and_blocks_nobody(cache, tmp_path, kil
     assert files_in(cache) == [scene_path("kitchen", 7).name]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kills", [3, pytest.param(20, marks=pytest.mark.slow)])
 def test_builders_killed_at_random_moments_leave_nothing_and_the_next_builds(cache, tmp_path, kills):
     log, moments, whole = tmp_path / "log", random.Random(kills), scene_path("kitchen", 7)

@@ -206,7 +206,6 @@ def test_hangup_reads_the_tokens_again_and_keeps_the_old_where_it_cannot(tmp_pat
         signal.signal(signal.SIGHUP, before)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("replicas", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_hangup_reads_the_certificate_again_and_keeps_the_old_where_it_cannot(replicas: int, tmp_path: Path) -> None:
     """The new one has a key of another kind."""
