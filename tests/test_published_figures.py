@@ -20,7 +20,8 @@ COLUMNS = ("success", "success_4x", "spl", "collisions")
 ARRIVALS = ("false_arrivals", "missed_arrivals")
 SHARES = ("success", "success_4x", "spl")
 THIRD, FOURTH, FIFTH, SIXTH = (f"generalist-test-{number}.json" for number in ("third", "fourth", "fifth", "sixth"))
-TOURS = "generalist-tours.json"
+TOURS, WALKERS = "generalist-tours.json", "walkers-test.json"
+KINDS = ("collision-aware", "shortest", "bump", "clearance")
 ROWS = [
     (FIFTH, "rooms", "generalist", "| rooms | 100 % | 93.8"),
     (FIFTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing | 100 % | 93.2"),
@@ -58,12 +59,17 @@ ROWS = [
     (TOURS, "rooms", "generalist", "| not toured, nothing perturbed |"),
     (SIXTH, "real", "generalist", "| all real plans |"),
     (SIXTH, "real", "random", "| all real plans, random walk |"),
+    *((WALKERS, None, f"{kind}-{seed}", f"| {kind}, seed {seed} |") for kind in KINDS for seed in range(3)),
+    *((WALKERS, None, f"collision-aware-again-{n}", f"| collision-aware, seed {n}, may try") for n in range(3)),
+    (WALKERS, None, "random", "| walk at random in these rooms |"),
     (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
 ]
 
 
-def scenes_of(record: str, part: str, agent: str) -> list[dict[str, float]]:
-    return json.loads((DOCS / "figures" / record).read_text(encoding="utf-8"))[part][agent]["scenes"]
+def scenes_of(record: str, part: str | None, agent: str) -> list[dict[str, float]]:
+    """Figures by scene; of a record without parts, None."""
+    content = json.loads((DOCS / "figures" / record).read_text(encoding="utf-8"))
+    return (content if part is None else content[part])[agent]["scenes"]
 
 
 def numbers(cell: str) -> list[str]:
@@ -141,6 +147,30 @@ def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
     said = re.search(r"spares (\S+) collisions an\s+episode \((\S+) to ([\d.]+)\)", PAGE)
     assert said is not None
     for written, value in zip(said.groups(), ((careless - careful).mean(), *ends(careless - careful)), strict=True):
+        expect(written, float(value), said[0])
+
+
+def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    benchmarks = DOCS.parent / "benchmarks"
+    monkeypatch.syspath_prepend(benchmarks)
+    judged = runpy.run_path(str(benchmarks / "walkers_judged.py"))["judged"]
+    record = json.loads((DOCS / "figures" / WALKERS).read_text(encoding="utf-8"))
+    asked = [("shortest", "collision-aware"), ("bump", "collision-aware"), ("shortest", "clearance")]
+    aware, bump, clearance = judged(record, "collisions", asked)
+    assert (aware.holds, bump.holds, clearance.holds) == (True, False, False)
+    said = re.search(r"has (\S+) collisions fewer than `shortest` \((\S+) to (\S+), p = (\S+) for three", PAGE)
+    other = re.search(r"with\s+seeds drawn anew, too, it is (\S+) to ([\d.]+)\.", PAGE)
+    assert said is not None and other is not None
+    rooms = aware.by_seed.mean(axis=0)
+    values = (rooms.mean(), *ends(rooms), aware.p, *aware.other_seeds)
+    for written, value in zip((*said.groups(), *other.groups()), values, strict=True):
+        expect(written, float(value), said[0])
+    (spl,) = judged(record, "spl", [("collision-aware", "shortest")])
+    assert not spl.holds
+    (again,) = judged(record, "collisions", [("collision-aware-again", "collision-aware")])
+    said = re.search(r"spares (\S+) collisions \((\S+) to ([\d.]+)\): twelve of thirteen", PAGE)
+    assert again.holds and said is not None
+    for written, value in zip(said.groups(), (again.by_seed.mean(), *ends(again.by_seed.mean(axis=0))), strict=True):
         expect(written, float(value), said[0])
 
 
