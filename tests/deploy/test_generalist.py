@@ -84,6 +84,7 @@ def test_the_file_walks_whole_walks_as_pytorch_does(one_file) -> None:
     assert found.false_arrivals.tolist() == expected.false_arrivals.tolist() and found.false_arrivals.any()
 
 
+@pytest.mark.slow
 def test_the_file_makes_the_same_map_of_pictures_that_do_not_repeat(one_file) -> None:
     rng, state, seen, actions, settings = np.random.default_rng(2), 0, [], [], MappingSettings()
     for _ in range(40):
