@@ -58,6 +58,8 @@ ROWS = [
     (TOURS, "rooms-perturbed", "generalist", "| not toured, perturbed |"),
     (TOURS, "rooms", "generalist", "| not toured, nothing perturbed |"),
     (SIXTH, "real", "generalist", "| all real plans |"),
+    (SIXTH, "rooms-perturbed", "generalist", "| no tour, everything perturbed |"),
+    (SIXTH, "rooms", "generalist", "| no tour, nothing perturbed |"),
     (SIXTH, "live: none", "generalist", "| off the grid, nothing perturbed |"),
     (SIXTH, "live: move ± 0.05 m", "generalist", "| moves ± 5 cm |"),
     (SIXTH, "live: turn ± 5°", "generalist", "| turns ± 5 degrees |"),
