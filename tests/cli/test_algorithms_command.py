@@ -23,7 +23,12 @@ def seen(scene: Path, folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ALGORITHMS)
+SLOWEST = ("a3c", "adapt")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOWEST else name for name in ALGORITHMS]
+)
 def test_every_algorithm_trains_and_is_evaluated(clearway, trained, tmp_path, name, monkeypatch):
     width = () if name == "q-learning" else ("width=16",)
     scene = trained.scene if name not in ("recurrent", "adapt") else seen(trained.scene, tmp_path)

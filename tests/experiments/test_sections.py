@@ -41,6 +41,8 @@ from clearway.viz.report import HTML, JSON, MARKDOWN, write_report
 from helpers.small_pictures import shrink_pictures
 from helpers.small_setting import FRAMES, small_setting
 
+pytestmark = pytest.mark.slow  # what they share takes long to make
+
 
 @pytest.fixture(autouse=True, scope="module")
 def _small_pictures() -> Iterator[None]:
@@ -85,7 +87,7 @@ def test_runs_are_shared_between_experiments(setting: Setting) -> None:
     assert all(is_done(setting.out, job) for job in jobs)
 
 
-@pytest.mark.parametrize("solved", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("solved", [True, False])
 def test_before_any_run_every_section_says_what_is_missing(
     tmp_path: Path, setting: Setting, sections: dict[str, Section], solved: bool
 ) -> None:
@@ -340,7 +342,6 @@ def test_the_analysis_is_solved_once(setting: Setting, monkeypatch: pytest.Monke
     assert analysis.section(setting).tables == before
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"scenes": {}}', "[" * 10**5, "found"])
 def test_a_damaged_file_of_kept_results_is_made_anew(
     setting: Setting, sections: dict, damage: str, monkeypatch: pytest.MonkeyPatch
@@ -359,7 +360,6 @@ def test_pareto_front_by_hand() -> None:
     assert pareto_front([(3, 1), (1, 3), (2, 2), (2, 3), (4, 1), (1, 4)]) == [(1, 3), (2, 2), (3, 1)]
 
 
-@pytest.mark.slow
 def test_the_report_is_complete_and_stands_alone(
     tmp_path: Path, setting: Setting, sections: dict[str, Section]
 ) -> None:
@@ -407,7 +407,6 @@ def failing(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> tuple[str, int
     return "kitchen", setting.targets[1][1]
 
 
-@pytest.mark.slow
 def test_a_failed_target_is_counted_named_and_listed_first(setting: Setting, failing: tuple[str, int]) -> None:
     section = table1.section(setting)
     table, by_target = section.tables
@@ -491,7 +490,6 @@ def test_a_report_takes_with_it_what_one_that_was_cut_off_left(
     assert [path.name for path in (tmp_path / "figures").iterdir()] == ["fig5.png"]
 
 
-@pytest.mark.slow
 def test_a_report_takes_with_it_what_an_earlier_one_left(
     tmp_path: Path, setting: Setting, sections: dict[str, Section]
 ) -> None:

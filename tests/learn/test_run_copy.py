@@ -92,7 +92,7 @@ def two_moments(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize(
-    "fails_at", [1, 2, 4, 5, 7, 8, 9, 10, 12]
+    "fails_at", [1, 7, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 4, 5, 8, 9, 10, 12))]
 )  # before, within and between what is put and removed
 def test_whatever_is_cut_off_leaves_a_whole_copy(
     s3: S3,

@@ -127,7 +127,8 @@ def test_make_and_make_vec_know_it(plan_file: str) -> None:
     envs.close()
 
 
-@pytest.mark.parametrize("context", ["fork", pytest.param("forkserver", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("context", ["fork", "forkserver"])
 def test_in_processes_it_lives_the_same_episodes(plan_file: str, context: str) -> None:
     """From a process that has loaded PyTorch and MuJoCo, as this one has."""
     import torch  # noqa: F401

@@ -67,7 +67,8 @@ def trained(request: PretrainRequest, peers: Peers) -> tuple[list[dict[str, floa
     return figures, {name: tensor.clone() for name, tensor in (trainer.eyes.state_dict() | trainer.tensors()).items()}
 
 
-@pytest.mark.parametrize("kept", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kept", [False, True])
 def test_workers_together_learn_what_one_learns_alone(tmp_path: Path, doubles: PretrainRequest, kept: bool) -> None:
     """Three groups of pictures by one worker, by two of unequal parts, and by three."""
     request = doubles

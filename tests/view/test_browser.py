@@ -12,6 +12,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from helpers.browser import opened_browser
 
+pytestmark = pytest.mark.slow  # what they share takes long to make
+
 PATIENCE_MS = 60_000  # others may be using the machine
 PHONE = {"width": 390, "height": 844}
 
@@ -79,7 +81,6 @@ def pixels(page: Page) -> str:
     return page.locator("#map").evaluate("canvas => canvas.toDataURL()")
 
 
-@pytest.mark.slow
 def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -> None:
     page = opened("scene=corridor&seed=2")
     before = pixels(page)
@@ -126,7 +127,6 @@ def test_a_whole_episode_by_mouse(opened: Callable[..., Page], tmp_path: Path) -
     expect(page.locator("#status")).to_contain_text("Film saved")
 
 
-@pytest.mark.slow
 def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=8&seed=52")
     page.locator("#speed").fill("5")
@@ -146,7 +146,6 @@ def test_two_agents_play_to_the_end_and_the_link_replays_them(opened: Callable[.
     assert {name: number(again, name, "steps") for name in steps} == steps
 
 
-@pytest.mark.slow
 def test_by_keyboard_alone(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=16&selection=argmax")
     page.keyboard.press("n")
@@ -186,7 +185,6 @@ def test_by_keyboard_alone(opened: Callable[..., Page]) -> None:
     assert page.evaluate("document.activeElement.id") == "play"
 
 
-@pytest.mark.slow
 def test_a_scene_without_pictures_and_with_twelve_headings(opened: Callable[..., Page]) -> None:
     page = opened("scene=grid")
     assert (
@@ -230,7 +228,6 @@ RENAMED = (
 )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("viewport", [{"width": 1280, "height": 800}, PHONE], ids=["screen", "phone"])
 def test_long_names_take_one_line_and_the_views_stand_level(opened: Callable[..., Page], viewport: dict) -> None:
     at = "scene=corridor&start=4&target=8"
@@ -272,7 +269,6 @@ def test_an_agent_has_one_colour_whatever_the_order(opened: Callable[..., Page])
         assert page.evaluate(script, walkers) == [*colours, purple]
 
 
-@pytest.mark.slow
 def test_the_star_is_seen_round_those_who_stand_on_it(opened: Callable[..., Page]) -> None:
     green = """(canvas) => {
         const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
@@ -325,7 +321,6 @@ def test_depth_is_a_switch_away_where_the_scene_has_it(opened: Callable[..., Pag
     expect(picture).to_have_attribute("src", re.compile("scenes/1/views/"))
 
 
-@pytest.mark.slow
 def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Callable[..., Page]) -> None:
     page = opened("scene=bare&start=59&target=30")
     page.locator("#scene").select_option("corridor")
@@ -383,7 +378,6 @@ def test_a_film_that_fails_is_said_and_can_be_tried_again(opened: Callable[..., 
     expect(button).to_be_enabled()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: str) -> None:
     page = opened("scene=grid&drive=1", viewport=PHONE, color_scheme=scheme, has_touch=True, is_mobile=True)
@@ -400,7 +394,6 @@ def test_it_fits_a_phone_in_light_and_dark(opened: Callable[..., Page], scheme: 
     shown(page, "1 / 1")
 
 
-@pytest.mark.slow
 def test_a_damaged_link_is_said_and_another_episode_begins(opened: Callable[..., Page]) -> None:
     page = opened("scene=attic")
     expect(page.locator("#status")).to_contain_text("scene attic: not shown here")
