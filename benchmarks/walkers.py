@@ -12,27 +12,31 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from by_scene import print_table, write_record
 
 import clearway
-import clearway.agents.recurrent
 from clearway.evaluation.goals import GoalEvaluation
 from clearway.learn.provenance import hardware, package_versions
+from clearway.learn.recurrent import TrainedRecurrent
 
 
-@contextmanager
-def trying_again() -> Iterator[None]:
-    """Agents keep their probabilities, whatever was blocked."""
-    kept = clearway.agents.recurrent.without_blocked
-    clearway.agents.recurrent.without_blocked = lambda state, mark, probabilities: probabilities
-    try:
-        yield
-    finally:
-        clearway.agents.recurrent.without_blocked = kept
+def kind_and_seed(name: str) -> tuple[str, str]:
+    """Of a run, by its folder's name."""
+    kind, _, seed = name.rpartition("-")
+    return kind, seed
+
+
+def learnt(run: Path) -> dict[str, Any]:
+    """What the run was trained by, for how long, and as what its record has it."""
+    record = json.loads((run / "run.json").read_text())
+    *_, last = (run / "metrics.jsonl").read_text().splitlines()
+    end = json.loads(last)
+    told = {name: record[name] for name in ("learner", "reward", "seed")}
+    return {**told, "scenes": len(record["scenes"]), "frames": end["frames"], "seconds": round(end["seconds"])}
 
 
 def main() -> None:
@@ -46,22 +50,26 @@ def main() -> None:
     parser.add_argument("--trying-again", metavar="KIND", help="whose agents walk once more")
     parser.add_argument("--json", type=Path, help="where the record is written, after each agent")
     args = parser.parse_args()
-    kinds = {run.name.rpartition("-")[0] for run in args.runs}
+    kinds = {kind_and_seed(run.name)[0] for run in args.runs}
     if args.trying_again and args.trying_again not in kinds:
         parser.error(f"--trying-again {args.trying_again}: the runs are of {', '.join(sorted(kinds))}")
     files = sorted(args.scenes.glob("*.h5"))[args.first :]
     asked = {"goals": args.goals, "seed": args.seed}
-    learners = {run.name: json.loads((run / "run.json").read_text())["learner"] for run in args.runs}
-    record = {"asked": asked, "versions": package_versions(), "hardware": hardware(), "learners": learners}
+    runs = {run.name: learnt(run) for run in args.runs}
+    for name, about in runs.items():
+        if kind_and_seed(name)[1] != str(about["seed"]):
+            parser.error(f"{name}: was trained with seed {about['seed']}. Call the folder KIND-{about['seed']}")
+    record = {"asked": asked, "versions": package_versions(), "hardware": hardware(), "runs": runs}
     found: dict[str, GoalEvaluation] = {}
     for run in args.runs:
         agent = clearway.load_agent(run)
+        assert isinstance(agent, TrainedRecurrent), run
         own, *beside = clearway.evaluate_goals(agent, files, **asked)
         found |= {run.name: own} | {other.agent: other for other in beside}
-        kind, _, seed = run.name.rpartition("-")
+        kind, seed = kind_and_seed(run.name)
         if kind == args.trying_again:
-            with trying_again():
-                found[f"{kind}-again-{seed}"] = clearway.evaluate_goals(agent, files, **asked)[0]
+            again = replace(agent, tries_again=True)
+            found[f"{kind}-again-{seed}"] = clearway.evaluate_goals(again, files, **asked)[0]
         if args.json:
             write_record(args.json, record, found)
     print_table(found)

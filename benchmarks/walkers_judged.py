@@ -1,4 +1,4 @@
-"""Claims about kinds of walkers, judged from a record of `walkers`: each call one question, corrected for its claims.
+"""Claims about kinds of walkers, judged from a record of `walkers`: one call judges the claims of one question.
 
     python benchmarks/walkers_judged.py record.json --fewer aware shortest --fewer aware bump
     python benchmarks/walkers_judged.py record.json --higher aware shortest
@@ -42,12 +42,34 @@ class Judged:
     other_seeds: tuple[float, float]
 
 
-def of_kind(record: Mapping[str, Any], kind: str, figure: str) -> np.ndarray:
-    """(seeds, scenes) a figure of the agents of a kind, seeds in order. Raises SystemExit: the record has none."""
-    runs = sorted(name for name in record if name.rpartition("-")[0] == kind)
-    if not runs:
+def of_kind(record: Mapping[str, Any], kind: str, figure: str) -> dict[str, dict[str, float]]:
+    """A figure of the agents of a kind, by seed and scene. Raises SystemExit: the record has none."""
+    found = {}
+    for name, evaluation in record.items():
+        named, _, seed = name.rpartition("-")
+        if named == kind:
+            found[seed] = {scene["scene"]: scene[figure] for scene in evaluation["scenes"]}
+    if not found:
         raise SystemExit(f"{kind}: no run of this kind in the record. It has {', '.join(record)}")
-    return np.array([[scene[figure] for scene in record[run]["scenes"]] for run in runs])
+    return found
+
+
+def paired(record: Mapping[str, Any], figure: str, above: str, below: str) -> tuple[np.ndarray, np.ndarray]:
+    """A figure of two kinds, each (seeds, scenes), the same of both in order.
+
+    Raises:
+        SystemExit: they have other seeds or scenes.
+    """
+    one, other = of_kind(record, above, figure), of_kind(record, below, figure)
+    if one.keys() != other.keys():
+        told = f"seeds {', '.join(sorted(one))} and {', '.join(sorted(other))}"
+        raise SystemExit(f"{above} and {below}: {told}. Compare the same seeds of each")
+    scenes = list(next(iter(one.values())))
+    if any(run.keys() != set(scenes) for run in (*one.values(), *other.values())):
+        raise SystemExit(f"{above} and {below}: they walked in other scenes. Compare walks in the same")
+    seeds = sorted(one)
+    first, second = (np.array([[kind[seed][scene] for scene in scenes] for seed in seeds]) for kind in (one, other))
+    return first, second
 
 
 def p_of_mean(values: np.ndarray) -> float:
@@ -71,10 +93,7 @@ def with_other_seeds(above: np.ndarray, below: np.ndarray) -> tuple[float, float
 
 def judged(record: Mapping[str, Any], figure: str, claims: Sequence[tuple[str, str]]) -> list[Judged]:
     """What is held of claims that a figure of the first kind is above that of the second."""
-    pairs = [(of_kind(record, above, figure), of_kind(record, below, figure)) for above, below in claims]
-    for (above, below), names in zip(pairs, claims, strict=True):
-        if above.shape != below.shape:
-            raise SystemExit(f"{' and '.join(names)}: {len(above)} and {len(below)} seeds. Compare as many of each")
+    pairs = [paired(record, figure, above, below) for above, below in claims]
     corrected = holm([p_of_mean((above - below).mean(axis=0)) for above, below in pairs])
     return [
         Judged(

@@ -132,23 +132,104 @@ def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_sai
         expect(written, float(value), said[0])
 
 
+def mean(record: str, part: str | None, agents: tuple[str, ...], name: str) -> float:
+    """Over agents and scenes."""
+    return float(np.mean([[scene[name] for scene in scenes_of(record, part, agent)] for agent in agents]))
+
+
+THE = ("generalist",)
+THREE = ("success", "spl", "collisions")
+ALONE = (
+    "live: move ± 0.05 m",
+    "live: turn ± 5°",
+    "live: camera height ± 0.05 m",
+    "live: camera pitch ± 3°",
+    "live: light ± 30%",
+    "live: pixel noise 10",
+    "live: furniture moved ≤ 0.3 m",
+)
+UNPERTURBED, OBSTACLE, ALL = "live: none", "live: new obstacle", "live: all, strength 1"
+
+
 @pytest.mark.parametrize(
-    ("begins", "record", "parts"),
+    ("begins", "figures"),
     [
-        ("| rooms, no tour:", FIFTH, ["rooms"]),
-        ("| the same by the eyes", FIFTH, ["rooms-eyes-1", "rooms-eyes-2"]),
-        ("| flats, no tour:", FIFTH, ["flats"]),
-        ("| real plans, moves of 0.25 m, no tour:", SIXTH, ["real"]),
+        ("| rooms, no tour:", [(FIFTH, "rooms", THE, name) for name in THREE]),
+        (
+            "| the same by the eyes",
+            [(FIFTH, f"rooms-eyes-{seed}", THE, name) for seed in (1, 2) for name in THREE],
+        ),
+        (
+            "| agents that learn to walk",
+            [(WALKERS, None, tuple(f"collision-aware-{seed}" for seed in range(3)), name) for name in THREE],
+        ),
+        (
+            "| rooms after a tour:",
+            [(TOURS, "rooms-perturbed-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
+        ),
+        ("| known rooms,", [(TOURS, "held-out-perturbed-tour", THE, name) for name in ("success_4x", "spl")]),
+        ("| flats, no tour:", [(FIFTH, "flats", THE, name) for name in ("success", "spl")]),
+        ("| flats after a tour,", [(THIRD, "flats-tour", THE, name) for name in ("success", "spl")]),
+        ("| off the grid, a new obstacle:", [(SIXTH, OBSTACLE, THE, "success")]),
+        ("| real plans, moves of", [(SIXTH, "real", THE, name) for name in THREE]),
+        (
+            "| twelve of 48 real plans",
+            [(THIRD, "real-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
+        ),
     ],
 )
-def test_the_summary_says_what_the_tables_say(begins: str, record: str, parts: list[str]) -> None:
+def test_the_summary_says_what_the_records_say(
+    begins: str, figures: list[tuple[str, str | None, tuple[str, ...], str]]
+) -> None:
     (line,) = [line for line in PAGE.splitlines() if line.startswith(begins)]
-    written = numbers(re.sub(r"\(.*?\)", "", line.split("|")[3]))
-    names = ("success", "spl", "collisions")[: len(written) // len(parts)]
-    asked = [(part, name) for part in parts for name in names]
-    for (part, name), figure in zip(asked, written, strict=True):
-        value = np.mean([scene[name] for scene in scenes_of(record, part, "generalist")])
-        expect(figure, float(value) * (100 if name in SHARES else 1), f"{name} of {part} in {begins}")
+    reached = re.sub(r"\(.*?\)", "", line.split("|")[4])
+    for (record, part, agents, name), written in zip(figures, numbers(reached), strict=True):
+        expect(written, mean(record, part, agents, name) * (100 if name in SHARES else 1), f"{name} in {begins}")
+
+
+def test_the_summary_says_how_it_goes_off_the_grid() -> None:
+    alone, together = (
+        min(mean(SIXTH, part, THE, "success") for part in parts) / mean(SIXTH, UNPERTURBED, THE, "success")
+        for parts in (ALONE, (ALL,))
+    )
+    (line,) = [line for line in PAGE.splitlines() if line.startswith("| off the grid, of its unperturbed")]
+    for written, value in zip(numbers(line.split("|")[4]), (alone, together), strict=True):
+        expect(written, 100 * value, line)
+    said = re.search(r"within four times the shortest path it is (\d+) % of what it is with nothing", PAGE, re.I)
+    assert said is not None
+    parts = [mean(SIXTH, part, THE, "success_4x") for part in ("rooms-perturbed", "rooms")]
+    expect(said[1], 100 * parts[0] / parts[1], said[0])
+    building = (DOCS / "building.md").read_text(encoding="utf-8")
+    said = re.search(r"in (\d+) to (\d+) % of\s+episodes, by what is perturbed", building)
+    assert said is not None
+    false = [mean(SIXTH, part, THE, "false_arrivals") for part in (UNPERTURBED, *ALONE, OBSTACLE, ALL)]
+    for written, value in zip(said.groups(), (min(false), max(false)), strict=True):
+        expect(written, 100 * value, said[0])
+
+
+def test_walkers_and_the_generalist_are_compared_in_the_same_rooms() -> None:
+    said = re.search(
+        r"has (\S+) collisions and SPL (\S+) % \[in the first fifty of these rooms\].*?"
+        r"has (\S+) and (\S+) % \(means of three seeds\): (\S+) more \((\S+) to ([\d.]+)\)",
+        PAGE,
+        re.S,
+    )
+    assert said is not None
+    found = {}
+    for name in ("collisions", "spl"):
+        own = {scene["scene"]: scene[name] for scene in scenes_of(SIXTH, "rooms", "generalist")}
+        others = [
+            {scene["scene"]: scene[name] for scene in scenes_of(WALKERS, None, f"collision-aware-{seed}")}
+            for seed in range(3)
+        ]
+        found[name] = (
+            np.array(list(own.values())),
+            np.mean([[other[scene] for scene in own] for other in others], axis=0),
+        )
+    (fewer, more), (spl, their_spl) = found["collisions"], found["spl"]
+    values = (fewer.mean(), 100 * spl.mean(), more.mean(), 100 * their_spl.mean(), (more - fewer).mean())
+    for written, value in zip(said.groups(), (*values, *ends(more - fewer)), strict=True):
+        expect(written, float(value), said[0])
 
 
 def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
@@ -170,15 +251,23 @@ def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch
     asked = [("shortest", "collision-aware"), ("bump", "collision-aware"), ("shortest", "clearance")]
     aware, bump, clearance = judged(record, "collisions", asked)
     assert (aware.holds, bump.holds, clearance.holds) == (True, False, False)
+    by_seed = re.search(r"by seed it is (\S+), (\S+) and (\S+): almost all", PAGE)
+    assert by_seed is not None
+    for written, value in zip(by_seed.groups(), aware.by_seed.mean(axis=1), strict=True):
+        expect(written, float(value), by_seed[0])
     said = re.search(r"has (\S+) collisions fewer than `shortest` \((\S+) to (\S+), p = (\S+) for three", PAGE)
-    other = re.search(r"with\s+seeds drawn anew, too, it is (\S+) to ([\d.]+)\.", PAGE)
+    other = re.search(r"With\s+seeds drawn anew, too, it is (\S+) to ([\d.]+)\.", PAGE)
     assert said is not None and other is not None
     rooms = aware.by_seed.mean(axis=0)
     values = (rooms.mean(), *ends(rooms), aware.p, *aware.other_seeds)
     for written, value in zip((*said.groups(), *other.groups()), values, strict=True):
         expect(written, float(value), said[0])
     (spl,) = judged(record, "spl", [("collision-aware", "shortest")])
-    assert not spl.holds
+    said = re.search(r"SPL differs by (\S+) points \((\S+) to ([\d.]+)\)", PAGE)
+    assert said is not None and not spl.holds
+    rooms = 100 * spl.by_seed.mean(axis=0)
+    for written, value in zip(said.groups(), (rooms.mean(), *ends(rooms)), strict=True):
+        expect(written, float(value), said[0])
     (again,) = judged(record, "collisions", [("collision-aware-again", "collision-aware")])
     said = re.search(r"spares (\S+) collisions \((\S+) to ([\d.]+)\): twelve of thirteen", PAGE)
     assert again.holds and said is not None

@@ -24,7 +24,8 @@ def record(**kinds: list[float]) -> dict[str, Any]:
     rng, found = np.random.default_rng(0), {"asked": {"goals": 20}}
     for kind, means in kinds.items():
         for seed, mean in enumerate(means):
-            scenes = [{"collisions": float(mean + noise)} for noise in rng.normal(0, 0.2, ROOMS)]
+            noise = rng.normal(0, 0.2, ROOMS)
+            scenes = [{"scene": f"room {room}", "collisions": float(mean + noise[room])} for room in range(ROOMS)]
             found[f"{kind}-{seed}"] = {"scenes": scenes}
     return found
 
@@ -57,9 +58,25 @@ def test_p_of_a_mean_is_twice_the_share_beyond_zero(judge: dict[str, Any]) -> No
     assert judge["p_of_mean"](values) == judge["p_of_mean"](-values)
 
 
+def test_scenes_are_compared_by_name(judge: dict[str, Any]) -> None:
+    found = record(one=[0.0], other=[0.2])
+    before = judge["judged"](found, "collisions", [("other", "one")])[0].by_seed
+    found["one-0"]["scenes"].reverse()
+    after = judge["judged"](found, "collisions", [("other", "one")])[0].by_seed
+    assert np.array_equal(np.sort(before), np.sort(after))
+
+
 def test_what_cannot_be_compared_is_told(judge: dict[str, Any]) -> None:
     found = record(one=[0.0, 0.1], other=[0.2])
-    with pytest.raises(SystemExit, match="one and other: 2 and 1 seeds"):
+    with pytest.raises(SystemExit, match=r"one and other: seeds 0, 1 and 0\. Compare the same seeds"):
+        judge["judged"](found, "collisions", [("one", "other")])
+    found = record(one=[0.0, 0.1], other=[0.2, 0.3])
+    found["other-2"] = found.pop("other-0")
+    with pytest.raises(SystemExit, match="one and other: seeds 0, 1 and 1, 2"):
+        judge["judged"](found, "collisions", [("one", "other")])
+    found = record(one=[0.0], other=[0.2])
+    found["other-0"]["scenes"][3]["scene"] = "elsewhere"
+    with pytest.raises(SystemExit, match="they walked in other scenes"):
         judge["judged"](found, "collisions", [("one", "other")])
     with pytest.raises(SystemExit, match="gone: no run of this kind"):
         judge["judged"](found, "collisions", [("gone", "other")])

@@ -51,6 +51,12 @@ def test_who_gives_everything_to_what_is_blocked_keeps_it() -> None:
     assert without_blocked(after((7, FORWARD)), one(7), certain).tolist() == certain.tolist()
 
 
+def test_where_nothing_was_blocked_probabilities_stay_to_the_bit() -> None:
+    made = np.random.default_rng(0).dirichlet(np.ones(4), size=200)
+    state = nothing_blocked(200)
+    assert np.array_equal(without_blocked(state, np.arange(200) % 3, made), made)
+
+
 def test_the_oldest_picture_makes_room() -> None:
     state = after(*((mark, FORWARD) for mark in range(1, PICTURES + 2)))
     assert without_blocked(state, one(1), EVEN).tolist() == EVEN.tolist()
@@ -64,9 +70,9 @@ def test_nothing_given_is_changed() -> None:
     assert not any(values.any() for values in state.values())
 
 
-def walked(world: World, steps: int) -> list[tuple[int, int]]:
-    """Blocked moves (pose, action) of an episode of the recurrent agent."""
-    agent, pose, bumps = recurrent(world), 0, []
+def walked(world: World, steps: int, **kind: bool) -> list[tuple[int, int]]:
+    """Blocked moves (pose, action) of an episode of a recurrent agent."""
+    agent, pose, bumps = recurrent(world, **kind), 0, []
     features, graph = world.features, world.next_state
     assert features is not None
     state = agent.reset({FEATURES: features[4:5].numpy()}, np.array([3]))
@@ -80,11 +86,15 @@ def walked(world: World, steps: int) -> list[tuple[int, int]]:
     return bumps
 
 
-def test_the_recurrent_agent_bumps_into_nothing_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_recurrent_agent_bumps_into_nothing_twice() -> None:
     bumps = walked(WORLD, 300)
     assert bumps and len(set(bumps)) == len(bumps)
-    monkeypatch.setattr("clearway.agents.recurrent.without_blocked", lambda state, mark, probabilities: probabilities)
-    assert len(bumps := walked(WORLD, 300)) > len(set(bumps))
+
+
+@pytest.mark.parametrize("kind", [{"tries_again": True}, {"remembers": False}])
+def test_one_that_may_try_again_or_forgets_does(kind: dict[str, bool]) -> None:
+    bumps = walked(WORLD, 300, **kind)
+    assert len(bumps) > len(set(bumps))
 
 
 def test_argmax_tells_the_agent_what_it_took() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clearway.agents import exploring, tour_map
-from clearway.agents.agent import FEATURES
+from clearway.agents.agent import FEATURES, LAST_ACTION
 from clearway.agents.exploring import Explorer
 from clearway.agents.mapping import MappingAgent
 from clearway.agents.tour_map import map_of
@@ -53,6 +53,13 @@ def test_with_good_eyes_it_finds_every_target_with_hardly_a_collision(scene, wor
     assert metrics.success(table).mean() == 1
     assert metrics.spl(table).mean() > 0.55 and table.collisions.mean() < 0.5
     assert table.false_arrivals is not None and (table.false_arrivals > 0).mean() < 0.1
+
+
+def test_what_it_did_last_may_be_put_right(scene):
+    agent = MappingAgent(PerfectSight(scene), settings=SETTINGS)
+    seen, target = ({FEATURES: scene.features[first : first + 20]} for first in (0, 20))
+    decisions, state = agent.act(seen, agent.reset(target, np.arange(20)))
+    assert np.array_equal(state[LAST_ACTION], decisions.action) and len(set(decisions.action.tolist())) > 1
 
 
 def test_who_holds_itself_for_shut_in_forgets_that_and_finds_its_target(scene, world):

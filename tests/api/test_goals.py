@@ -1,6 +1,10 @@
 from __future__ import annotations
 
+import json
+import runpy
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +50,27 @@ def test_a_recurrent_agent_walks_in_rooms_that_it_has_never_entered(run):
     assert again[0].to_json() == told.to_json()
 
 
+def test_the_benchmark_of_walkers_keeps_how_they_were_trained_and_who_may_try_again(run, tmp_path, monkeypatch):
+    benchmarks = Path(__file__).parents[2] / "benchmarks"
+    (tmp_path / "rooms").mkdir()
+    write_scene(grid_scene(3), tmp_path / "rooms" / "grid.h5")
+    shutil.copytree(run / "run", tmp_path / "aware-0")
+    words = ["rooms", "aware-0", "--goals", "5", "--trying-again", "aware", "--json", "record.json"]
+    monkeypatch.syspath_prepend(benchmarks)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["walkers", *words])
+    runpy.run_path(str(benchmarks / "walkers.py"), run_name="__main__")
+    record = json.loads((tmp_path / "record.json").read_text())
+    trained = record["runs"]["aware-0"]
+    assert (trained["seed"], trained["reward"]["name"], trained["frames"]) == (0, "collision-aware", SMALL["frames"])
+    walks = [record[name]["average"] for name in ("aware-0", "aware-again-0")]
+    assert walks[0]["episodes"] == 5 and walks[0]["collisions"] < walks[1]["collisions"]
+    (tmp_path / "aware-0").rename(tmp_path / "aware-1")
+    monkeypatch.setattr("sys.argv", ["walkers", "rooms", "aware-1"])
+    with pytest.raises(SystemExit):
+        runpy.run_path(str(benchmarks / "walkers.py"), run_name="__main__")
+
+
 def test_an_agent_of_one_s_own_and_its_maker(run):
     for agent in (RandomWalk(), lambda world: RandomWalk()):
         own, random, _ = evaluate_goals(agent, [corridor_scene(5)], goals=4, step_limit=40)
@@ -80,21 +105,21 @@ def taken(monkeypatch):
 
 
 @pytest.mark.slow
-def test_perturbed_takes_are_seen_by_the_agent_s_own_eyes(run, taken, monkeypatch):
+def test_perturbed_takes_are_seen_by_the_agent_s_own_eyes(run, taken):
     # takes never come again to the bit, so that nothing is held for blocked: here neither among the scenes' own
-    monkeypatch.setattr("clearway.agents.recurrent.without_blocked", lambda state, mark, probabilities: probabilities)
+    agent = replace(clearway.load_agent(run / "run"), tries_again=True)
     scenes, settings = [grid_scene(3), corridor_scene(5)], {"goals": 7, "step_limit": 60, "seed": 2}
-    plain = evaluate_goals(run / "run", scenes, **settings)
+    plain = evaluate_goals(agent, scenes, **settings)
     assert not taken and plain[0].perturbed is None
     # takes that are the scenes' own pictures lead the same way
     moved = Perturbations(distance_noise=0.1)
-    same = evaluate_goals(run / "run", scenes, perturb=moved, **settings)
+    same = evaluate_goals(agent, scenes, perturb=moved, **settings)
     assert same[0].scenes == plain[0].scenes
     assert same[0].perturbed == {"label": "move ± 0.1 m", "perturbations": moved.to_json(), "takes": 4}
-    dark = evaluate_goals(run / "run", scenes, perturb="none light=0.9", takes=2, **settings)
+    dark = evaluate_goals(agent, scenes, perturb="none light=0.9", takes=2, **settings)
     assert dark[0].scenes != plain[0].scenes and dark[1].scenes == plain[1].scenes
     assert taken == [(moved, 4, 2), (Perturbations(light=0.9), 2, 2)]
-    again = evaluate_goals(run / "run", scenes, perturb="none", **settings)
+    again = evaluate_goals(agent, scenes, perturb="none", **settings)
     assert again[0].to_json() == plain[0].to_json() and len(taken) == 2
 
 

@@ -50,8 +50,9 @@ def ship(generalist: Generalist, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Generalist, "shipped", classmethod(lambda cls: generalist))
 
 
-def recurrent(world: World) -> Agent:
+def recurrent(world: World, *, remembers: bool = True, tries_again: bool = False) -> Agent:
     """One that has learnt nothing, by eyes whose features are as many as the world's."""
     pairs = SeenPairs(small_eyes(0, EyesShape((4, 4, 4), 4, 4, 8, height_px=16, width_px=32)))
     assert world.features is not None and world.features.shape[1] == 4 + 2 * 4
-    return RecurrentAgent(RecurrentActorCritic(RecurrentShape(pairs.count, 8)), pairs)
+    network = RecurrentActorCritic(RecurrentShape(pairs.count, 8, remembers))
+    return RecurrentAgent(network, pairs, tries_again=tries_again)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from starlette.testclient import WebSocketDenialResponse
 from starlette.websockets import WebSocketDisconnect
 
 import clearway
+from clearway.agents.agent import LAST_ACTION
 from clearway.errors import DeployError
+from clearway.scenes.actions import Action
 from clearway.serve.app import make_app
 from clearway.serve.limits import Limits
 from clearway.serve.protection import protected
@@ -109,6 +112,25 @@ def test_sessions_do_not_mix(client) -> None:
             passed = [10 * number + 1] * 4 + [10 * number + step for step in range(2, level + 1)]
             assert found["value"] == 1000 * number + sum(passed[-4:])
             assert found["action"] == "move backward"
+
+
+class Remembering(Sums):
+    """Its value is the number of the action that it is told it took last."""
+
+    def reset(self, target, seed):
+        return {**super().reset(target, seed), LAST_ACTION: np.full(len(seed), -1)}
+
+    def act(self, observation, state):
+        decisions, after = super().act(observation, state)
+        told = state[LAST_ACTION].astype(np.float32)
+        return replace(decisions, value=told), {**after, LAST_ACTION: np.zeros_like(decisions.action)}
+
+
+def test_an_agent_is_told_what_argmax_took(called) -> None:
+    client = called(Service(Remembering(), Limits(), TOKENS))
+    session = opened(client, selection="argmax")
+    client.put(f"{session}/target", content=grey(0), headers=PNG)
+    assert [stepped(client, session, 1).json()["value"] for _ in range(2)] == [-1, Action.MOVE_BACKWARD]
 
 
 @pytest.mark.parametrize(

@@ -30,8 +30,9 @@ POSE = "pose"
 FEATURES = "features"
 """(B, F) float32: what the scenes' encoder made of a picture."""
 
-LAST_ACTION = "last action"
-"""(B,) int64, in the state of an agent that remembers it: who chooses another one than the agent puts it right."""
+LAST_ACTION = "action"
+"""(B,) int64, in the state of an agent that remembers what it did last: who chooses another action than the agent puts
+it right."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ class Agent(Protocol):
 
     What is seen is arrays by the sensor's name: "rgb" (B, height, width, 3) uint8, "depth" (B, height, width) float32
     metres, "features" (B, F) float32, and "pose" (B,) int64, which no robot knows. What is remembered, the state, is
-    arrays (B, ...) by names of the agent's own; it keeps nothing else between calls.
+    arrays (B, ...) by names of the agent's own, but for `LAST_ACTION`; it keeps nothing else between calls.
     """
 
     @property

@@ -37,8 +37,12 @@ def add_blocked(state: State, mark: np.ndarray, action: np.ndarray, blocked: np.
 
 
 def without_blocked(state: State, mark: np.ndarray, probabilities: np.ndarray) -> np.ndarray:
-    """Probabilities (B, A) with none for what was blocked where the same was seen, marks (B,)."""
+    """Probabilities (B, A) with none for what was blocked where the same was seen, marks (B,).
+
+    Rows in which nothing was stay as they are, and so do those that have nothing else.
+    """
     here = state[_MARK] == mark[:, None]
-    left = np.where((state[_BLOCKED] & here[:, :, None]).any(axis=1), 0.0, probabilities)
+    shut = (state[_BLOCKED] & here[:, :, None]).any(axis=1)
+    left = np.where(shut, 0.0, probabilities)
     total = left.sum(axis=1, keepdims=True)
-    return np.divide(left, total, out=probabilities.copy(), where=total > 0)
+    return np.divide(left, total, out=probabilities.copy(), where=(total > 0) & shut.any(axis=1, keepdims=True))

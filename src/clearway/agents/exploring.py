@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.agent import LAST_ACTION, Decisions, Observation, State
 from clearway.agents.encoded import Encoded
 from clearway.agents.tour_map import LONGEST_WALK, found_anew, walk_of
 from clearway.mapping.beliefs import LatticePose
@@ -46,7 +46,7 @@ class Explorer:
         self._settings, self._pictures = settings or MappingSettings(), pictures
         self._sight = sight
         self._follower = Follower(sight, self._settings, pictures=pictures)
-        self._features = Encoded(encoder)
+        self._features = Encoded(encoder, at_once=1)
         self.sees: tuple[str, ...] = (self._features.sees,)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
@@ -81,7 +81,7 @@ class Explorer:
         news, room, shut = _unlike(been), after["room"], after["shut"]
         action, done = search_steps(poses, news, been, room, shut, self._settings, in_view=0.0, toured=True)
         walked = _walked_on({**state, "poses_walked": held}, seen, action, poses)
-        return Decisions(action), {**after, **walked, "been": been, "action": action, "done": done}
+        return Decisions(action), {**after, **walked, "been": been, LAST_ACTION: action, "done": done}
 
 
 def _walked_on(

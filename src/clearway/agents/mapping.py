@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.agents.agent import Decisions, Observation, State
+from clearway.agents.agent import LAST_ACTION, Decisions, Observation, State
 from clearway.agents.encoded import Encoded
 from clearway.mapping.beliefs import IMPOSSIBLE, add_sighting
 from clearway.mapping.following import Follower, been_now
@@ -41,7 +41,7 @@ class MappingAgent:
     ) -> None:
         self._sight, self._settings, self._has_toured = sight, settings or MappingSettings(), known is not None
         self._follower = Follower(sight, self._settings, known, last_look=not self._has_toured)
-        self._features = Encoded(encoder)
+        self._features = Encoded(encoder, at_once=1)
         self.sees: tuple[str, ...] = (self._features.sees,)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
@@ -79,7 +79,7 @@ class MappingAgent:
         )
         self._begin_anew(lost, been, after)
         decisions = Decisions(action, arrived=there > self._settings.arrived)
-        return decisions, {**after, "target": state["target"], "goal": goal, "been": been, "action": action}
+        return decisions, {**after, "target": state["target"], "goal": goal, "been": been, LAST_ACTION: action}
 
     def _begin_anew(self, lost: np.ndarray, been: np.ndarray, after: State) -> None:
         """Forget where episodes (B,) bool that have nowhere left to go have been, and what blocked them.

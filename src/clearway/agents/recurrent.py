@@ -22,17 +22,27 @@ from clearway.perception.encoder import Encoder
 class RecurrentAgent:
     """Draws its actions by a recurrent network, and says by it whether it has arrived.
 
-    What was blocked is not tried again where the very same picture is seen, see `blocked`; unless the network forgets.
+    What was blocked is not tried again where the very same picture is seen, see `blocked`. Where the network forgets at
+    every step, this is forgotten, too.
 
     Args:
         network: the parameters.
         pairs: compares what is seen with the target.
         encoder: makes the features of what is seen; None: features themselves are seen.
+        tries_again: it may try again what was blocked.
     """
 
-    def __init__(self, network: RecurrentActorCritic, pairs: SeenPairs, encoder: Encoder | None = None) -> None:
+    def __init__(
+        self,
+        network: RecurrentActorCritic,
+        pairs: SeenPairs,
+        encoder: Encoder | None = None,
+        *,
+        tries_again: bool = False,
+    ) -> None:
         self._network, self._pairs = network.eval(), pairs.eval()
-        self._features = Encoded(encoder)
+        self._remembers_blocked = network.shape.remembers and not tries_again
+        self._features = Encoded(encoder, at_once=1)
         self.sees: tuple[str, ...] = (self._features.sees,)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
@@ -60,7 +70,7 @@ class RecurrentAgent:
         said = self._network(self._pairs(now, target), last, torch.from_numpy(state["hidden"]))
         mark = marks_of(seen)
         same = state["begun"] & (mark == marks_of(state["seen"]))
-        blocked = add_blocked(state, mark, state[LAST_ACTION], same & self._network.shape.remembers)
+        blocked = add_blocked(state, mark, state[LAST_ACTION], same & self._remembers_blocked)
         probabilities = torch.softmax(said.scores, dim=1, dtype=torch.float64).numpy()
         allowed = without_blocked(blocked, mark, probabilities)
         decisions, chance = drawn(allowed, state[CHANCE], said.value.numpy())

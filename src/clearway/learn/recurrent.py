@@ -121,23 +121,25 @@ class TrainedRecurrent:
         network: the parameters.
         pairs: compares what is seen with the target.
         frames: it has learnt from.
+        tries_again: it may try again what was blocked where it sees the very same picture, see `RecurrentAgent`.
     """
 
     record: RunRecord
     network: RecurrentActorCritic
     pairs: SeenPairs
     frames: int
+    tries_again: bool = False
 
     def __repr__(self) -> str:
         return described(self)
 
     def on_poses(self, world: World) -> RecurrentAgent:
         """Its agent on the grid: it goes by features, in any world of the same eyes."""
-        return RecurrentAgent(self.network, self.pairs)
+        return RecurrentAgent(self.network, self.pairs, tries_again=self.tries_again)
 
     def behind_camera(self) -> RecurrentAgent:
         """Its agent that sees pictures, in any room."""
-        return RecurrentAgent(self.network, self.pairs, self.encoder)
+        return RecurrentAgent(self.network, self.pairs, self.encoder, tries_again=self.tries_again)
 
     @property
     def encoder(self) -> EyesEncoder:
