@@ -18,7 +18,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
+from multiprocessing import active_children, resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 
 ORPHANED = 1  # exit code; nobody is left to see it
@@ -103,13 +103,20 @@ def collector_rests() -> Iterator[None]:
 
 @contextmanager
 def all_children_end() -> Iterator[None]:
-    """Meanwhile, processes that other packages start by `multiprocessing`'s spawn are of `ChildProcess`."""
-    before = SpawnContext.Process
+    """Meanwhile, processes that other packages start by `multiprocessing`'s spawn are of `ChildProcess`.
+
+    Those that still run at the end are killed: a package that was interrupted while it started them has lost them.
+    """
+    kind, before = SpawnContext.Process, set(active_children())
     SpawnContext.Process = ChildProcess
     try:
         yield
     finally:
-        SpawnContext.Process = before
+        SpawnContext.Process = kind
+        for child in set(active_children()) - before:
+            if isinstance(child, ChildProcess):
+                child.kill()
+                child.join()
 
 
 def command_of(module: str) -> list[str]:

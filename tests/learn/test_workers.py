@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from clearway.children import ChildProcess
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
 from clearway.learn.crew import INTERFACE, launched
@@ -24,6 +25,7 @@ from clearway.learn.workers import train_by_workers
 from clearway.scenes.thor_v1 import write_scene
 from helpers import killed_workers
 from helpers.crew_processes import PATIENCE_S, wait_until, workers_of
+from helpers.ends_slowly import ENDS, EndsSlowly
 from helpers.made import corridor_scene
 from helpers.one_fails import WORDS, OneFails
 from helpers.one_is_late import LOST, OneIsLate
@@ -176,6 +178,33 @@ def test_an_error_of_one_worker_is_heard_by_those_who_wait_for_it(tmp_path: Path
     began = time.monotonic()
     assert launched(OneFails(tmp_path, os.getpid(), 1, "cpu", {}), 2) == [WORDS, WORDS]
     assert time.monotonic() - began < PATIENCE_S
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", ENDS)
+def test_workers_leave_at_once_whatever_their_processes_would_do_at_the_end(tmp_path: Path, end: str) -> None:
+    began = time.monotonic()
+    assert launched(EndsSlowly(tmp_path, os.getpid(), 1, "cpu", {}, end), 2) == [None, None]
+    assert time.monotonic() - began < PATIENCE_S
+
+
+@pytest.mark.slow
+def test_who_is_told_to_end_while_workers_are_started_leaves_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[ChildProcess] = []
+    start = ChildProcess.start
+
+    def one_is_started(child: ChildProcess) -> None:
+        if started:
+            signal.raise_signal(signal.SIGTERM)
+        start(child)
+        started.append(child)
+
+    monkeypatch.setattr(ChildProcess, "start", one_is_started)
+    with pytest.raises(KeyboardInterrupt):
+        launched(OneFails(tmp_path, os.getpid(), 1, "cpu", {}), 2)
+    assert [child.exitcode for child in started] == [-signal.SIGKILL]
 
 
 @pytest.mark.slow

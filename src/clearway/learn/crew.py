@@ -6,6 +6,7 @@ since another try would meet them again.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import signal
@@ -20,7 +21,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import torch
 
@@ -235,10 +236,18 @@ def work(task: Task) -> str | None:
         store = dist.TCPStore(environment["MASTER_ADDR"], int(environment["MASTER_PORT"]), is_master=False)
         outcome = done_by(task, place, store)
     except LostPeer:
-        sys.exit(LOST)  # without a word: the agent starts all again
+        _leave(LOST)  # without a word: the agent starts all again
     if outcome == INTERRUPTED:
-        sys.exit(ENDED)  # the agent, which told it to end, takes no answer, and one that has one to give would wait
+        _leave(ENDED)  # the agent, which told it to end, takes no answer, and one that has one to give would wait
+    atexit.register(_leave, 0)
     return outcome
+
+
+def _leave(code: int) -> NoReturn:
+    """End this process, in which all is saved and closed: to take PyTorch apart takes seconds, and can hang."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def done_by(task: Task, place: Place, server: dist.Store) -> str | None:
