@@ -11,32 +11,16 @@ same picture.
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from by_scene import print_table, write_record
+from run_names import kind_and_seed, learnt
 
 import clearway
 from clearway.evaluation.goals import GoalEvaluation
 from clearway.learn.provenance import hardware, package_versions
 from clearway.learn.recurrent import TrainedRecurrent
-
-
-def kind_and_seed(name: str) -> tuple[str, str]:
-    """Of a run, by its folder's name."""
-    kind, _, seed = name.rpartition("-")
-    return kind, seed
-
-
-def learnt(run: Path) -> dict[str, Any]:
-    """What the run was trained by, for how long, and as what its record has it."""
-    record = json.loads((run / "run.json").read_text())
-    *_, last = (run / "metrics.jsonl").read_text().splitlines()
-    end = json.loads(last)
-    told = {name: record[name] for name in ("learner", "reward", "seed")}
-    return {**told, "scenes": len(record["scenes"]), "frames": end["frames"], "seconds": round(end["seconds"])}
 
 
 def main() -> None:
@@ -55,10 +39,7 @@ def main() -> None:
         parser.error(f"--trying-again {args.trying_again}: the runs are of {', '.join(sorted(kinds))}")
     files = sorted(args.scenes.glob("*.h5"))[args.first :]
     asked = {"goals": args.goals, "seed": args.seed}
-    runs = {run.name: learnt(run) for run in args.runs}
-    for name, about in runs.items():
-        if kind_and_seed(name)[1] != str(about["seed"]):
-            parser.error(f"{name}: was trained with seed {about['seed']}. Call the folder KIND-{about['seed']}")
+    runs = learnt(args.runs)
     record = {"asked": asked, "versions": package_versions(), "hardware": hardware(), "runs": runs}
     found: dict[str, GoalEvaluation] = {}
     for run in args.runs:

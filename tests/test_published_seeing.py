@@ -1,0 +1,280 @@
+"""What the pages say of agents that see is what their records come to."""
+
+import json
+import re
+import runpy
+
+import numpy as np
+import pytest
+
+from clearway.evaluation.bootstrap import RESAMPLES, intervals
+from helpers.published import DOCS, expect, numbers
+
+PAGE = "".join((DOCS / page).read_text(encoding="utf-8") for page in ("seeing.md", "evidence.md"))
+COLUMNS = ("success", "success_4x", "spl", "collisions")
+ARRIVALS = ("false_arrivals", "missed_arrivals")
+SHARES = ("success", "success_4x", "spl")
+THIRD, FOURTH, FIFTH, SIXTH = (f"generalist-test-{number}.json" for number in ("third", "fourth", "fifth", "sixth"))
+TOURS, WALKERS = "generalist-tours.json", "walkers-test.json"
+KINDS = ("collision-aware", "shortest", "bump", "clearance")
+ROWS = [
+    (FIFTH, "rooms", "generalist", "| rooms | 100 % | 93.8"),
+    (FIFTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing | 100 % | 93.2"),
+    (FIFTH, "rooms", "random", "| rooms, random walk |"),
+    (FIFTH, "rooms-eyes-1", "generalist", "| rooms, eyes of seed 1 | 100 % (99.8-100) | 94.0"),
+    (FIFTH, "rooms-eyes-2", "generalist", "| rooms, eyes of seed 2 | 100 % | 93.7"),
+    (FIFTH, "flats", "generalist", "| flats | 91.5"),
+    (FIFTH, "flats", "random", "| flats, random walk | 28"),
+    (FIFTH, "flats-eyes-1", "generalist", "| flats, eyes of seed 1 | 92"),
+    (FIFTH, "flats-eyes-2", "generalist", "| flats, eyes of seed 2 | 91"),
+    (FIFTH, "before-rooms-eyes-1", "generalist", "| rooms, eyes of seed 1 | 100 % (99.8-100) | 93.0"),
+    (FIFTH, "before-rooms-eyes-2", "generalist", "| rooms, eyes of seed 2 | 100 % | 92.7"),
+    (FIFTH, "before-flats-eyes-1", "generalist", "| flats, eyes of seed 1 | 86"),
+    (FIFTH, "before-flats-eyes-2", "generalist", "| flats, eyes of seed 2 | 84"),
+    (THIRD, "rooms-tour", "generalist", "| rooms, after a tour of 500 steps |"),
+    (THIRD, "rooms", "generalist", "| no tour | 100 % | 93.3"),
+    (THIRD, "rooms", "collisions cost nothing", "| no tour, collisions cost nothing | 100 % | 92.5"),
+    (THIRD, "rooms", "random", "| random walk | 72.5"),
+    (THIRD, "rooms-perturbed", "generalist", "| no tour | 99.5"),
+    (THIRD, "flats", "generalist", "| flats, no tour | 86.2"),
+    (THIRD, "flats-tour", "generalist", "| flats, after a tour of 500 steps | 97.7"),
+    (THIRD, "real", "generalist", "| real plans, no tour |"),
+    (FOURTH, "rooms", "generalist", "| rooms, no tour | 100 % (99.8-100) | 92.8"),
+    (FOURTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing | 100 % (99.8-100) |"),
+    (FOURTH, "rooms-perturbed-tour", "generalist", "| rooms, everything perturbed, after a tour that sees it too |"),
+    (FOURTH, "flats", "generalist", "| flats, no tour | 85.0"),
+    (FOURTH, "validation-rooms", "generalist", "| validation rooms, no tour |"),
+    (FOURTH, "validation-rooms-perturbed", "generalist", "| validation rooms, everything perturbed, no tour |"),
+    (FOURTH, "validation-rooms-perturbed-tour", "generalist", "| validation rooms, everything perturbed, after"),
+    (FOURTH, "validation-flats", "generalist", "| validation flats, no tour |"),
+    (TOURS, "rooms-perturbed-tour", "generalist", "| toured for 500 steps, perturbed |"),
+    (TOURS, "rooms-perturbed-tour", "nearest picture of the tour", "| who goes by that tour's nearest picture |"),
+    (TOURS, "held-out-perturbed-tour", "generalist", "| known room, targets held out |"),
+    (TOURS, "rooms-perturbed", "generalist", "| not toured, perturbed |"),
+    (TOURS, "rooms", "generalist", "| not toured, nothing perturbed |"),
+    (SIXTH, "real", "generalist", "| all real plans |"),
+    (SIXTH, "rooms-perturbed", "generalist", "| no tour, everything perturbed |"),
+    (SIXTH, "rooms", "generalist", "| no tour, nothing perturbed |"),
+    (SIXTH, "live: none", "generalist", "| off the grid, nothing perturbed |"),
+    (SIXTH, "live: move ± 0.05 m", "generalist", "| moves ± 5 cm |"),
+    (SIXTH, "live: turn ± 5°", "generalist", "| turns ± 5 degrees |"),
+    (SIXTH, "live: camera height ± 0.05 m", "generalist", "| camera's height"),
+    (SIXTH, "live: camera pitch ± 3°", "generalist", "| camera's pitch"),
+    (SIXTH, "live: light ± 30%", "generalist", "| light ± 30 % |"),
+    (SIXTH, "live: pixel noise 10", "generalist", "| noise of pixels |"),
+    (SIXTH, "live: furniture moved ≤ 0.3 m", "generalist", "| furniture moved, 30 cm at most |"),
+    (SIXTH, "live: new obstacle", "generalist", "| a new obstacle |"),
+    (SIXTH, "live: all, strength 1", "generalist", "| all at once |"),
+    (SIXTH, "real", "random", "| all real plans, random walk |"),
+    *((WALKERS, None, f"{kind}-{seed}", f"| {kind}, seed {seed} |") for kind in KINDS for seed in range(3)),
+    *((WALKERS, None, f"collision-aware-again-{n}", f"| collision-aware, seed {n}, may try") for n in range(3)),
+    (WALKERS, None, "random", "| walk at random in these rooms |"),
+    (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
+]
+
+
+def scenes_of(record: str, part: str | None, agent: str) -> list[dict[str, float]]:
+    """Figures by scene; of a record without parts, None."""
+    content = json.loads((DOCS / "figures" / record).read_text(encoding="utf-8"))
+    return (content if part is None else content[part])[agent]["scenes"]
+
+
+def ends(values: np.ndarray) -> tuple[float, float]:
+    """Of the mean over scenes, which are drawn anew."""
+    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    low, high = intervals(values[rows].mean(axis=1))
+    return float(low), float(high)
+
+
+@pytest.mark.parametrize(("record", "part", "agent", "row"), ROWS)
+def test_a_row_of_the_page_is_what_the_record_comes_to(record: str, part: str, agent: str, row: str) -> None:
+    lines = [line for line in PAGE.splitlines() if line.startswith(row)]
+    assert lines, f"a row begins with {row}"
+    scenes = scenes_of(record, part, agent)
+    for line in lines:
+        cells = line.strip("|").split("|")[1:]
+        for name, cell in zip(COLUMNS, cells, strict=False):
+            values = np.array([scene[name] for scene in scenes]) * (100 if name in SHARES else 1)
+            mean, *interval = numbers(cell)
+            expect(mean, float(values.mean()), f"{name} in {row}")
+            for written, value in zip(interval, ends(values), strict=bool(interval)):
+                expect(written, value, f"interval of {name} in {row}")
+        for name, written in zip(ARRIVALS, numbers("".join(cells[len(COLUMNS) :])), strict=False):
+            told = np.array([scene[name] for scene in scenes], float)  # NaN where no episode ended at a target
+            expect(written, 100 * float(np.nanmean(told)), f"{name} in {row}")
+
+
+def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_said() -> None:
+    spl = [
+        np.array([scene["spl"] for scene in scenes_of(TOURS, "rooms-perturbed-tour", agent)])
+        for agent in ("generalist", "nearest picture of the tour")
+    ]
+    said = re.search(r"by (\S+) points of SPL \((\S+) to ([\d.]+)\)", PAGE)
+    assert said is not None
+    apart = 100 * (spl[0] - spl[1])
+    for written, value in zip(said.groups(), (apart.mean(), *ends(apart)), strict=True):
+        expect(written, float(value), said[0])
+
+
+def mean(record: str, part: str | None, agents: tuple[str, ...], name: str) -> float:
+    """Over agents and scenes."""
+    return float(np.mean([[scene[name] for scene in scenes_of(record, part, agent)] for agent in agents]))
+
+
+THE = ("generalist",)
+THREE = ("success", "spl", "collisions")
+ALONE = (
+    "live: move ± 0.05 m",
+    "live: turn ± 5°",
+    "live: camera height ± 0.05 m",
+    "live: camera pitch ± 3°",
+    "live: light ± 30%",
+    "live: pixel noise 10",
+    "live: furniture moved ≤ 0.3 m",
+)
+UNPERTURBED, OBSTACLE, ALL = "live: none", "live: new obstacle", "live: all, strength 1"
+
+
+@pytest.mark.parametrize(
+    ("begins", "figures"),
+    [
+        ("| rooms, no tour:", [(FIFTH, "rooms", THE, name) for name in THREE]),
+        (
+            "| the same by the eyes",
+            [(FIFTH, f"rooms-eyes-{seed}", THE, name) for seed in (1, 2) for name in THREE],
+        ),
+        (
+            "| agents that learn to walk",
+            [(WALKERS, None, tuple(f"collision-aware-{seed}" for seed in range(3)), name) for name in THREE],
+        ),
+        (
+            "| rooms after a tour:",
+            [(TOURS, "rooms-perturbed-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
+        ),
+        ("| known rooms,", [(TOURS, "held-out-perturbed-tour", THE, name) for name in ("success_4x", "spl")]),
+        ("| flats, no tour:", [(FIFTH, "flats", THE, name) for name in ("success", "spl")]),
+        ("| flats after a tour,", [(THIRD, "flats-tour", THE, name) for name in ("success", "spl")]),
+        ("| off the grid, a new obstacle:", [(SIXTH, OBSTACLE, THE, "success")]),
+        ("| real plans, moves of", [(SIXTH, "real", THE, name) for name in THREE]),
+        (
+            "| twelve of 48 real plans",
+            [(THIRD, "real-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
+        ),
+    ],
+)
+def test_the_summary_says_what_the_records_say(
+    begins: str, figures: list[tuple[str, str | None, tuple[str, ...], str]]
+) -> None:
+    (line,) = [line for line in PAGE.splitlines() if line.startswith(begins)]
+    reached = re.sub(r"\(.*?\)", "", line.split("|")[4])
+    for (record, part, agents, name), written in zip(figures, numbers(reached), strict=True):
+        expect(written, mean(record, part, agents, name) * (100 if name in SHARES else 1), f"{name} in {begins}")
+
+
+def test_the_summary_says_how_it_goes_off_the_grid() -> None:
+    alone, together = (
+        min(mean(SIXTH, part, THE, "success") for part in parts) / mean(SIXTH, UNPERTURBED, THE, "success")
+        for parts in (ALONE, (ALL,))
+    )
+    (line,) = [line for line in PAGE.splitlines() if line.startswith("| off the grid, of its unperturbed")]
+    for written, value in zip(numbers(line.split("|")[4]), (alone, together), strict=True):
+        expect(written, 100 * value, line)
+    said = re.search(r"within four times the shortest path it is (\d+) % of what it is with nothing", PAGE, re.I)
+    assert said is not None
+    parts = [mean(SIXTH, part, THE, "success_4x") for part in ("rooms-perturbed", "rooms")]
+    expect(said[1], 100 * parts[0] / parts[1], said[0])
+    building = (DOCS / "building.md").read_text(encoding="utf-8")
+    said = re.search(r"in (\d+) to (\d+) % of\s+episodes, by what is perturbed", building)
+    assert said is not None
+    false = [mean(SIXTH, part, THE, "false_arrivals") for part in (UNPERTURBED, *ALONE, OBSTACLE, ALL)]
+    for written, value in zip(said.groups(), (min(false), max(false)), strict=True):
+        expect(written, 100 * value, said[0])
+
+
+def test_walkers_and_the_generalist_are_compared_in_the_same_rooms() -> None:
+    said = re.search(
+        r"has (\S+) collisions and SPL (\S+) % \[in the first fifty of these rooms\].*?"
+        r"has (\S+) and (\S+) % \(means of three seeds\): (\S+) more \((\S+) to ([\d.]+)\)",
+        PAGE,
+        re.S,
+    )
+    assert said is not None
+    found = {}
+    for name in ("collisions", "spl"):
+        own = {scene["scene"]: scene[name] for scene in scenes_of(SIXTH, "rooms", "generalist")}
+        others = [
+            {scene["scene"]: scene[name] for scene in scenes_of(WALKERS, None, f"collision-aware-{seed}")}
+            for seed in range(3)
+        ]
+        found[name] = (
+            np.array(list(own.values())),
+            np.mean([[other[scene] for scene in own] for other in others], axis=0),
+        )
+    (fewer, more), (spl, their_spl) = found["collisions"], found["spl"]
+    values = (fewer.mean(), 100 * spl.mean(), more.mean(), 100 * their_spl.mean(), (more - fewer).mean())
+    for written, value in zip(said.groups(), (*values, *ends(more - fewer)), strict=True):
+        expect(written, float(value), said[0])
+
+
+def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
+    careless, careful = (
+        np.array([scene["collisions"] for scene in scenes_of(FIFTH, "rooms", agent)])
+        for agent in ("collisions cost nothing", "generalist")
+    )
+    said = re.search(r"spares (\S+) collisions an\s+episode \((\S+) to ([\d.]+)\)", PAGE)
+    assert said is not None
+    for written, value in zip(said.groups(), ((careless - careful).mean(), *ends(careless - careful)), strict=True):
+        expect(written, float(value), said[0])
+
+
+def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    benchmarks = DOCS.parent / "benchmarks"
+    monkeypatch.syspath_prepend(benchmarks)
+    judged = runpy.run_path(str(benchmarks / "walkers_judged.py"))["judged"]
+    record = json.loads((DOCS / "figures" / WALKERS).read_text(encoding="utf-8"))
+    asked = [("shortest", "collision-aware"), ("bump", "collision-aware"), ("shortest", "clearance")]
+    aware, bump, clearance = judged(record, "collisions", asked)
+    assert (aware.holds, bump.holds, clearance.holds) == (True, False, False)
+    by_seed = re.search(r"by seed it is (\S+), (\S+) and (\S+): almost all", PAGE)
+    assert by_seed is not None
+    for written, value in zip(by_seed.groups(), aware.by_seed.mean(axis=1), strict=True):
+        expect(written, float(value), by_seed[0])
+    said = re.search(r"has (\S+) collisions fewer than `shortest` \((\S+) to (\S+), p = (\S+) for three", PAGE)
+    other = re.search(r"With\s+seeds drawn anew, too, it is (\S+) to ([\d.]+)\.", PAGE)
+    assert said is not None and other is not None
+    rooms = aware.by_seed.mean(axis=0)
+    values = (rooms.mean(), *ends(rooms), aware.p, *aware.other_seeds)
+    for written, value in zip((*said.groups(), *other.groups()), values, strict=True):
+        expect(written, float(value), said[0])
+    (spl,) = judged(record, "spl", [("collision-aware", "shortest")])
+    said = re.search(r"SPL differs by (\S+) points \((\S+) to ([\d.]+)\)", PAGE)
+    assert said is not None and not spl.holds
+    rooms = 100 * spl.by_seed.mean(axis=0)
+    for written, value in zip(said.groups(), (rooms.mean(), *ends(rooms)), strict=True):
+        expect(written, float(value), said[0])
+    (again,) = judged(record, "collisions", [("collision-aware-again", "collision-aware")])
+    said = re.search(r"spares (\S+) collisions \((\S+) to ([\d.]+)\): twelve of thirteen", PAGE)
+    assert again.holds and said is not None
+    for written, value in zip(said.groups(), (again.by_seed.mean(), *ends(again.by_seed.mean(axis=0))), strict=True):
+        expect(written, float(value), said[0])
+
+
+def test_agents_of_perturbed_pictures_walk_as_their_record_says() -> None:
+    found = json.loads((DOCS / "figures" / "reactive.json").read_text(encoding="utf-8"))
+    page = (DOCS / "learning.md").read_text(encoding="utf-8")
+    part = page.partition("\n## Perturbed pictures\n")[2].partition("\n## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in part.splitlines() if "%" in line]
+    asked = [(kind, seen) for kind in ("own", "perturbed") for seen in ("none", "geometry", "all")]
+    for (kind, seen), row in zip(asked, rows, strict=True):
+        assert row[-4].strip("`| ") == seen.replace("none", "own")
+        for name, cell in zip(("success_4x", "spl", "collisions"), row[-3:], strict=True):
+            scale = 1 if name == "collisions" else 100
+            values = [scale * found["figures"][f"{kind}-{seed}"][seen][name] for seed in range(3)]
+            written = numbers(cell)
+            for number, value in zip(written, (np.mean(values), min(values), max(values)), strict=len(written) > 1):
+                expect(number, float(value), f"{name} of {kind}, {seen}")
+    runs = found["runs"]
+    took = [[runs[f"{kind}-{seed}"]["seconds"] for seed in range(3)] for kind in ("own", "perturbed")]
+    told = [f"{min(seconds)} to {max(seconds)} s" for seconds in took]
+    assert all(one in part for one in told)
+    assert {run["frames"] for run in runs.values()} == {300_000}
