@@ -109,7 +109,7 @@ def reproduce(
     jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
-    if tell is not None and workers:
+    if tell is not None:
         tell(told_time(jobs, left, workers, request.threads))
     with board(request.out, jobs, show_progress) as show:
         run_jobs(request.out, left, workers=workers, threads=request.threads, show=show, ray=request.ray)
