@@ -278,3 +278,28 @@ def test_agents_of_perturbed_pictures_walk_as_their_record_says() -> None:
     told = [f"{min(seconds)} to {max(seconds)} s" for seconds in took]
     assert all(one in part for one in told)
     assert {run["frames"] for run in runs.values()} == {300_000}
+
+
+def test_adapting_takes_as_many_frames_as_its_record_says() -> None:
+    record = json.loads((DOCS / "figures" / "adapting.json").read_text(encoding="utf-8"))["frames, seconds"]
+    lines = (DOCS / "learning.md").read_text(encoding="utf-8").splitlines()
+    arms = ("adapted", "adapted without walks", "from nothing")
+    frames = {
+        arm: {count: [row[arm][0] for row in record if row["targets"] == count] for count in (5, 20)} for arm in arms
+    }
+    for count in (5, 20):
+        cells = [", ".join(f"{taken:,}" for taken in frames[arm][count]) for arm in arms]
+        assert f"| {count} | " + " | ".join(cells) + " |" in lines
+    ends = {
+        arm: {count: f"{min(all_):,} to {max(all_):,}" for count, all_ in found.items()}
+        for arm, found in frames.items()
+    }
+    for arm in ("adapted", "from nothing"):
+        assert all(one in PAGE for one in ends[arm].values())
+    took = [
+        "{:.0f} to {:.0f}".format(*(end(row[arm][1] for row in record) for end in (min, max)))
+        for arm in ("adapted", "from nothing")
+    ]
+    assert any(f"in {took[0]} s, from nothing in {took[1]}," in line for line in lines)
+    more = np.divide(frames["adapted without walks"][20], frames["adapted"][20])
+    assert any(f"twenty in {more.min():.1f} to {more.max():.1f} times the frames" in line for line in lines)
