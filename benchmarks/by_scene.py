@@ -48,7 +48,8 @@ def print_table(found: Mapping[str, GoalEvaluation]) -> None:
     for name, evaluation in found.items():
         print("| " + " | ".join((name, *(shown(figure, column(evaluation, figure)) for figure in SHOWN))) + " |")
     first = next(iter(found.values()))
-    print(f"\n{first.average.episodes} episodes in {len(first.scenes)} scenes; tour: {first.tour}")
+    tour = f"; tour: {first.tour}" if first.tour else ""
+    print(f"\n{first.average.episodes} episodes in {len(first.scenes)} scenes{tour}")
 
 
 def print_difference(one: GoalEvaluation, other: GoalEvaluation, name: str, what: str) -> None:

@@ -13,7 +13,8 @@ def family(pid: int) -> list[int]:
     found = [pid]
     for each in found:
         for task in Path(f"/proc/{each}/task").glob("*/children"):
-            found += [int(child) for child in task.read_text().split()]
+            with suppress(FileNotFoundError, ProcessLookupError):  # its thread has ended
+                found += [int(child) for child in task.read_text().split()]
     return found
 
 

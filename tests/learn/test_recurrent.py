@@ -2,21 +2,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
+import clearway
 from clearway.agents.agent import FEATURES
 from clearway.agents.by_pose import RandomWalk
 from clearway.errors import RunError
 from clearway.evaluation.episodes import run_episodes
 from clearway.learn.load import load_agent
-from clearway.learn.recurrent import Recurrent
+from clearway.learn.recurrent import Recurrent, TrainedRecurrent
 from clearway.learn.recurrent_trainer import RecurrentTrainer
 from clearway.learn.train import RunRequest, train
 from clearway.model.recurrent import LAST_COUNT, RecurrentActorCritic, RecurrentShape, SeenPairs, last_step, likeness
 from clearway.reward import COLLISION_AWARE
+from clearway.scenes.aspect import AspectWarning
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
 from helpers.made import corridor_scene, grid_scene
@@ -172,9 +175,20 @@ def test_it_learns_to_say_that_it_has_arrived(tmp_path: Path):
 def test_scenes_of_another_encoder_are_refused():
     world = make_world([corridor_scene(5)], {"corridor": [8]})
     with pytest.raises(
-        RunError, match=r"the scenes are encoded by made-up\. Encode them with --encoder FOLDER of eyes"
+        RunError, match=r"the scenes are encoded by made-up\. Encode them with --encoder clearway, or a folder"
     ):
         LEARNER.trainer(world, COLLISION_AWARE, 0)
+
+
+def test_pictures_of_another_aspect_are_warned_of_in_training_and_after_it(tmp_path: Path):
+    wide = grid_scene(1, width=4, depth=3, picture_size=(9, 16), name="wide")
+    (seen,) = seen_by_eyes(tmp_path / "eyes", wide)
+    record: Any = None  # it is not asked
+    network, pairs = RecurrentActorCritic(RecurrentShape(4, 8)), SeenPairs(small_eyes())
+    with pytest.warns(AspectWarning, match=r"scene wide: .* Crop them to 12 x 9"):
+        TrainedRecurrent(record, network, pairs, 0).seen([wide])
+    with pytest.warns(AspectWarning, match="scene wide"), pytest.raises(RunError, match="not a folder"):
+        clearway.train(seen, algorithm=LEARNER, out=Path(__file__))
 
 
 @pytest.mark.parametrize("name", ["taught", "teacher_share"])

@@ -1,4 +1,4 @@
-"""The small recipe of docs/learning.md from nothing: rooms, shipped eyes, training, rooms never entered."""
+"""The recipe of docs/seeing.md for agents that learn to walk, small: rooms, eyes, training, rooms never entered."""
 
 from __future__ import annotations
 

@@ -120,6 +120,15 @@ def test_damaged_eyes_are_one_line(folder: Path, harm):
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.parametrize("harm", [altered, gone])
+def test_damaged_eyes_are_told_also_where_their_features_are_in_the_cache(folder: Path, harm):
+    scene = corridor_scene(3)
+    encode_scenes([scene], str(folder))
+    expected = harm(folder)
+    with pytest.raises(EncoderError, match=expected):
+        encode_scenes([scene], str(folder))
+
+
 def test_other_eyes_in_the_folder_are_told(folder: Path):
     record = find_record(str(folder), [])
     eyes.write_eyes(folder, random_eyes(1), {})

@@ -163,7 +163,7 @@ def test_what_does_not_belong_together_is_refused(tmp_path) -> None:
     for wrong, said in (
         (3, "views=3"),
         ([3], "views=3"),
-        (tmp_path / "none", "no such file"),
+        (tmp_path / "none", "no such file. Check the path, or make it with clearway scenes views"),
         ([], "none given"),
     ):
         with pytest.raises(ClearwayError, match=said):

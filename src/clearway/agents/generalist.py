@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +21,7 @@ from clearway.perception import eyes
 from clearway.perception.encode import encoded
 from clearway.perception.encoder import Encoder
 from clearway.perception.eyes import EyesEncoder
-from clearway.scenes.aspect import AspectWarning, other_aspect
+from clearway.scenes.aspect import warn_of_aspect
 from clearway.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -90,19 +89,8 @@ class Generalist:
         return replace(self, settings=replace(self.settings, step_m=step_m))
 
     def warn_of_aspect(self, scenes: Sequence[Scene]) -> None:
-        """Warn (AspectWarning) where pictures have another aspect than those that the eyes were taught on.
-
-        Once for all scenes of one kind of picture.
-        """
-        found: dict[str, list[str]] = {}
-        for scene in scenes:
-            if scene.observations is not None:
-                _, height, width, _ = scene.observations.shape
-                if problem := other_aspect((height, width), self.picture_px):
-                    found.setdefault(problem, []).append(scene.name)
-        for problem, (first, *others) in found.items():
-            where = f"scene {first}" + (f" and {len(others)} more" if others else "")
-            warnings.warn(f"{where}: {problem}", AspectWarning, stacklevel=3)
+        """Warn (AspectWarning) where pictures have another aspect than those that the eyes were taught on."""
+        warn_of_aspect(scenes, self.picture_px, stacklevel=3)
 
     def on_poses(self, world: World) -> MappingAgent:
         """The agent on the grid: it goes by features of its eyes, in any world."""

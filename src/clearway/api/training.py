@@ -172,6 +172,7 @@ def train(
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
+    learner.warn_of(loaded)
     seen = _takes(loaded, perturbations_asked(perturb), takes, number, learner, show_progress)
     request = RunRequest(
         scenes=loaded,

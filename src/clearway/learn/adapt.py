@@ -19,8 +19,11 @@ from clearway.learn.learner import AT_LEAST_ONE
 from clearway.learn.ppo import PPO
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from clearway.learn.adapting import AdaptingTrainer
     from clearway.reward import Reward
+    from clearway.scenes.scene import Scene
     from clearway.world.world import World
 
 AT_LEAST_ONE |= {"tour_steps", "walks", "walk_steps", "lessons", "mind_walks", "mind_steps"}
@@ -77,3 +80,9 @@ class Adapt(PPO):
                 f"pictures: clearway scenes encode FILE --encoder {eyes.name} --out FILE"
             )
         return AdaptingTrainer(world, self, reward, seed, generalist)
+
+    def warn_of(self, scenes: Sequence[Scene]) -> None:
+        """Warn (AspectWarning) of pictures of another aspect than those that the generalist's eyes were taught on."""
+        from clearway.agents.generalist import Generalist
+
+        Generalist.shipped().warn_of_aspect(scenes)

@@ -7,7 +7,7 @@ the same name mean the same in all of them. The names are in `algorithms`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from clearway.learn.running import Learning
     from clearway.learn.share import Share
     from clearway.reward import Reward
+    from clearway.scenes.scene import Scene
     from clearway.world.world import World
 
 AT_LEAST_ONE = {"frames", "envs", "rollout_steps", "step_limit", "epochs", "minibatches", "width"}
@@ -103,6 +104,9 @@ class Learner:
         if not self.sees_takes:
             problem = f"perturb: {self.algorithm} learns from the scenes' own pictures alone"
             raise RunError(f"{problem}. Leave it out, or train by ppo, a2c or recurrent")
+
+    def warn_of(self, scenes: Sequence[Scene]) -> None:
+        """Warn of scenes by whose pictures it would be led astray; by default of none."""
 
     def paid(self, reward: Reward) -> Reward:
         """The reward as training pays it: `clip_rewards` alone says whether it is clipped, where there is that setting.

@@ -28,6 +28,7 @@ from clearway.perception import eyes
 from clearway.perception.encode import encoded
 from clearway.perception.eyes import EyesEncoder
 from clearway.reward import Reward
+from clearway.scenes.aspect import warn_of_aspect
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.world.world import World
 
@@ -101,8 +102,14 @@ class Recurrent(Learner):
         if world.encoder is None or world.encoder.settings.get("kind") != eyes.KIND:
             seen = "have no features" if world.encoder is None else f"are encoded by {world.encoder.name}"
             problem = f"algorithm {self.algorithm} compares pictures by eyes, and the scenes {seen}"
-            raise RunError(f"{problem}. Encode them with --encoder FOLDER of eyes that clearway pretrain made")
+            raise RunError(f"{problem}. Encode them with --encoder clearway, or a folder that clearway pretrain made")
         return RecurrentTrainer(world, self, reward, seed, eyes.from_record(world.encoder).eyes)
+
+    def warn_of(self, scenes: Sequence[Scene]) -> None:
+        """Warn (AspectWarning) where pictures have another aspect than those that the scenes' eyes were taught on."""
+        for scene in scenes:
+            if scene.encoder is not None and scene.encoder.settings.get("kind") == eyes.KIND:
+                warn_of_aspect([scene], eyes.card_of(scene.encoder).shape.picture_px)
 
     def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedRecurrent:
         """The agent of a run from the tensors of its checkpoint; see `Learner.agent`."""
@@ -147,5 +154,13 @@ class TrainedRecurrent:
         return EyesEncoder(EncoderRecord(eyes.NAME, "of the run", {}), self.pairs.eyes)
 
     def seen(self, scenes: Sequence[Scene]) -> list[Scene]:
-        """Any scenes with pictures as its own eyes see them. Raises EncoderError where one has no pictures."""
+        """Any scenes with pictures as its own eyes see them.
+
+        Raises:
+            EncoderError: a scene has no pictures.
+
+        Warns:
+            AspectWarning: a scene's pictures have another aspect than those that the eyes were taught on.
+        """
+        warn_of_aspect(scenes, self.pairs.eyes.shape.picture_px)
         return [encoded(scene, self.encoder) for scene in scenes]

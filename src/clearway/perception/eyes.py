@@ -99,6 +99,7 @@ def find_record(name: str = NAME) -> EncoderRecord:
         problem = f"encoder {NAME}: the eyes that come with clearway are missing from {SHIPPED}"
         raise EncoderError(f"{problem}. Install clearway again")
     card = read_card(_folder(name))
+    _weights(_folder(name), card)  # features in the cache would hide that they are others, or gone
     settings = {"kind": KIND, "eyes": name, "shape": card.shape.to_json(), "sha256": card.sha256}
     return EncoderRecord(NAME if name == NAME else Path(name).name, card.sha256[:IDENTITY_LETTERS], settings)
 
@@ -172,18 +173,29 @@ def read_eyes(folder: Path) -> Eyes:
 
     from clearway.perception.eyes_network import Eyes
 
-    card, path = read_card(folder), folder / WEIGHTS_FILE
+    card = read_card(folder)
+    content = _weights(folder, card)
     try:
-        content = read_bytes(path, MAX_WEIGHTS_BYTES)
-        if hashlib.sha256(content).hexdigest() != card.sha256:
-            raise EncoderError(f"{path}: altered, its SHA-256 is not what {CARD_FILE} says. Get the eyes again")
         eyes = Eyes(card.shape)
         state = {name: tensor.float() for name, tensor in load(content).items()}
         counts = {name: tensor for name, tensor in eyes.state_dict().items() if name.endswith("num_batches_tracked")}
         eyes.load_state_dict({**counts, **state})
-    except (OSError, SafetensorError, RuntimeError) as fault:
-        raise EncoderError(f"{path}: cannot be read ({reason_of(fault)}). Get the eyes again") from fault
+    except (SafetensorError, RuntimeError) as fault:
+        problem = f"{folder / WEIGHTS_FILE}: cannot be read ({reason_of(fault)})"
+        raise EncoderError(f"{problem}. Get the eyes again") from fault
     return eyes.eval().requires_grad_(False)
+
+
+def _weights(folder: Path, card: EyesCard) -> bytes:
+    """The file of parameters. Raises EncoderError where it cannot be read, or is not the one that the card names."""
+    path = folder / WEIGHTS_FILE
+    try:
+        content = read_bytes(path, MAX_WEIGHTS_BYTES)
+    except OSError as fault:
+        raise EncoderError(f"{path}: cannot be read ({reason_of(fault)}). Get the eyes again") from fault
+    if hashlib.sha256(content).hexdigest() != card.sha256:
+        raise EncoderError(f"{path}: altered, its SHA-256 is not what {CARD_FILE} says. Get the eyes again")
+    return content
 
 
 def _folder(name: str) -> Path:

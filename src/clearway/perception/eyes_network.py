@@ -52,6 +52,11 @@ class EyesShape:
         return TokenGrid(rows, columns, aspect=self.width_px / self.height_px)
 
     @property
+    def picture_px(self) -> tuple[int, int]:
+        """Height and width of its pictures."""
+        return self.height_px, self.width_px
+
+    @property
     def feature_count(self) -> int:
         """F, of the encoder: the description, then the tokens."""
         return self.description_width + self.grid.count * self.token_width

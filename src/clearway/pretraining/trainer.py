@@ -66,7 +66,7 @@ class PretrainRequest:
             raise ArgumentError(f"views={self.views.takes} takes of each pose: expected 2. Take them with --takes 2")
         if not self.batches_an_epoch:
             problem = f"views={len(self.views)} pictures: fewer than one batch of {self.settings.batch}"
-            raise ArgumentError(f"{problem}. Take more views, or give a smaller batch")
+            raise ArgumentError(f"{problem}. Take more: clearway scenes views with more scenes, or more --poses")
 
     @property
     def batches_an_epoch(self) -> int:

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from clearway.scenes.scene import Scene
+
 SLACK = 0.02  # share by which aspects may differ
 
 
@@ -24,3 +31,19 @@ def other_aspect(given_px: tuple[int, int], trained_px: tuple[int, int]) -> str 
         f"{trained:.2f} ({trained_width} x {trained_height}), so that distances and angles would be told wrong. "
         f"Crop them to {crop[0]} x {crop[1]}"
     )
+
+
+def warn_of_aspect(scenes: Sequence[Scene], trained_px: tuple[int, int], stacklevel: int = 2) -> None:
+    """Warn (AspectWarning) of scenes whose pictures have another aspect than the trained one (height, width).
+
+    Once for all scenes of one kind of picture.
+    """
+    found: dict[str, list[str]] = {}
+    for scene in scenes:
+        if scene.observations is not None:
+            _, height, width, _ = scene.observations.shape
+            if problem := other_aspect((height, width), trained_px):
+                found.setdefault(problem, []).append(scene.name)
+    for problem, (first, *others) in found.items():
+        where = f"scene {first}" + (f" and {len(others)} more" if others else "")
+        warnings.warn(f"{where}: {problem}", AspectWarning, stacklevel=stacklevel + 1)

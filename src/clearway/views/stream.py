@@ -234,7 +234,7 @@ def views_in(paths: Sequence[Path]) -> Views:
         ClearwayError: there is no such file, a folder holds none, a file is no sound shard, or they do not belong
             together.
     """
-    shards = list(map(read_shard, in_turn(scene_files(paths))))
+    shards = list(map(read_shard, in_turn(scene_files(paths, "clearway scenes views"))))
     first, seen = shards[0], set()
     for shard in shards:
         if other := differing(shard.settings, first.settings):
