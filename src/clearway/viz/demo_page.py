@@ -12,6 +12,7 @@ from clearway.evaluation.summary import Evaluation
 from clearway.evaluation.tables import REFERENCES, table_text
 from clearway.experiments.demo import DemoResult
 from clearway.experiments.demo_generalist import FirstWalk
+from clearway.learn.presets import DEFAULT
 from clearway.learn.provenance import facts_text, hardware, package_versions
 from clearway.viz.contact_sheet import draw_contact_sheet
 from clearway.viz.curves import draw_curves
@@ -153,7 +154,8 @@ def _contact_sheets(result: DemoResult) -> list[Picture]:
 def _curves(result: DemoResult) -> list[Picture]:
     file = f"{PICTURES}/curves.png"
     draw_curves({name: result.runs[name].metrics() for name in BY_REWARD}, result.out / file, looks=LINES)
-    return [Picture(file, "Training episodes: sampled actions, random starts, cut after 200 steps.", "Learning curves")]
+    told = f"Training episodes: sampled actions, random starts, cut after {DEFAULT.step_limit} steps."
+    return [Picture(file, told, "Learning curves")]
 
 
 def _views(result: DemoResult) -> list[Picture]:
