@@ -1,11 +1,15 @@
 """Evaluation of a run: what stands beside its agent, and what is said of it."""
 
+import re
 from pathlib import Path
 
+import pytest
 import torch
 
+from clearway.agents.by_pose import RandomWalk
+from clearway.errors import RunError
 from clearway.evaluation.optimum import world_yardsticks
-from clearway.evaluation.runs import _optima, evaluate_run
+from clearway.evaluation.runs import _optima, evaluate_run, evaluate_runs
 from clearway.evaluation.tables import markdown_table
 from clearway.learn.load import load_agent
 from clearway.learn.run_record import record_of
@@ -34,6 +38,17 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
     assert markdown_table([sampled, *others]).count(f"{told}[-1, 1], zones of cells.") == 1
     assert f"optimum ({NAME})" in [other.agent for other in others]  # not the unclipped one
     assert [other.agent for other in others if other.trained] == [NAME] * 2  # the other ways to choose
+
+
+def test_runs_of_other_zones_and_names_given_twice_are_refused(tmp_path: Path) -> None:
+    requests = [small_request(learner=small_learner(frames=160), zone_level=level) for level in ("pose", "cell")]
+    one, other = (load_agent(train(request, tmp_path / request.zone_level).path) for request in requests)
+    scenes = requests[0].scenes
+    with pytest.raises(RunError, match="the runs differ in the level of their zones"):
+        evaluate_runs({"one": one, "other": other}, scenes)
+    for name in ("one", "optimum (collision-aware, unclipped)", "random", "shortest path"):
+        with pytest.raises(RunError, match=rf"beside: '{re.escape(name)}' is the name of another agent"):
+            evaluate_runs({"one": one}, scenes, beside={name: lambda world: RandomWalk()})
 
 
 def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:

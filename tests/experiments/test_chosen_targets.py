@@ -1,15 +1,18 @@
 """Hard, unseen and held-out targets."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clearway.agents.by_pose import RandomWalk, shortest_paths
+from clearway.errors import SceneError
 from clearway.evaluation.episodes import run_episodes
 from clearway.experiments import fig5, fig6, hard_tables
 from clearway.experiments.hard_targets import hard_targets, hardness
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import Scene
 from clearway.world.world import make_world
 from clearway.zones import Zone
@@ -80,6 +83,27 @@ def test_where_no_pose_lies_so_far_away_the_report_says_so(tmp_path: Path) -> No
     (table, _) = fig5.section(small_setting(tmp_path)).tables
     (note,) = [note for note in table.notes if note.startswith("bathroom has no pose")]
     assert note.startswith("bathroom has no pose 8 steps from every trained target; its farthest, ")
+
+
+def test_a_scene_with_fewer_targets_than_asked_for_is_told_and_one_without_any_refused(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    small = grid_scene(0, width=3, depth=2, obstacle_share=0, name="small")
+    few = replace(setting, scenes=(setting.scenes[0], small))
+    assert fig6._fewer(setting) == [] and len(fig6.training_targets(few, 45)[1]) == 19
+    assert fig6._fewer(few) == [
+        "small has 19 targets beside the held-out ones; where more are asked for, these stand in."
+    ]
+    tiny = grid_scene(0, width=1, depth=1, obstacle_share=0, name="tiny")
+    with pytest.raises(SceneError, match="tiny: has no targets beside the 5 that figure 6 holds out"):
+        fig6.training_targets(replace(setting, scenes=(tiny,)), 5)
+
+
+def test_a_scene_with_a_way_out_that_leads_nowhere_back_has_no_hard_targets() -> None:
+    scene = grid_scene(1, width=4, depth=4, obstacle_share=0)
+    graph = scene.graph.copy()
+    graph[:4, [Action.MOVE_FORWARD, Action.MOVE_BACKWARD]] = BLOCKED  # nothing leads out of the first cell
+    with pytest.raises(SceneError, match="a random walk may never come to a target"):
+        hardness(replace(scene, graph=graph))
 
 
 def test_training_sets_grow_and_never_hold_what_is_held_out(tmp_path: Path) -> None:

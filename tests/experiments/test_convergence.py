@@ -99,7 +99,6 @@ def test_runs_that_never_settle_count_with_all_frames(
         assert (named["seeds"], named["settled"]) == (2, settled)
         assert named["frames"] == pytest.approx(sum(first if settled else whole) / 2)
     assert [claim.text.split(":")[0] for claim in claims] == ["paper", "default"]
-    assert settled or {claim.verdict for claim in claims} == {"undecided"}  # a tie decides nothing
 
 
 def test_a_run_whose_metrics_were_removed_does_not_count(done: Setting, monkeypatch: pytest.MonkeyPatch) -> None:

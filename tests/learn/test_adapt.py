@@ -133,6 +133,8 @@ def test_scenes_that_its_eyes_have_not_seen_are_refused_with_the_remedy(scenes: 
         LEARNER.trainer(make_world(long, TARGETS), COLLISION_AWARE, 0)
     with pytest.raises(RunError, match="adapt learns from the scenes' own pictures alone"):
         LEARNER.check_sees_takes()
+    with pytest.raises(RunError, match="adapt is trained by one worker"):
+        LEARNER.check_workers(torch.tensor([20, 20]))
     others = make_world(seen_by_eyes(tmp_path / "other", *scenes, seed=1), TARGETS)
     with pytest.raises(RunError, match="have those of another encoder"):
         LEARNER.trainer(others, COLLISION_AWARE, 0)

@@ -197,6 +197,12 @@ def test_shares_of_more_than_all_are_refused(name: str):
         replace(LEARNER, **{name: 1.5})
 
 
+@pytest.mark.parametrize("name", ["taught_lr_start", "taught_lr_end", "lr_end"])
+def test_rates_that_would_not_fall_geometrically_are_refused(name: str):
+    with pytest.raises(RunError, match=f"{name} is 0.0, expected above 0"):
+        replace(LEARNER, **{name: 0.0})
+
+
 def test_the_last_step_is_told_by_action_and_likeness():
     told = last_step(torch.tensor([2, 0]), torch.tensor([0.5, 1.0]))
     assert told.tolist() == [[0, 0, 1, 0, 1, 0.5], [1, 0, 0, 0, 1, 1]] and told.shape[1] == LAST_COUNT

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from clearway.mapping.routes import shifted
 from clearway.mapping.settings import MappingSettings
 from clearway.perception.around import PLACES_M
 from clearway.scenes.actions import BLOCKED, Action
-from helpers.made import grid_scene
+from helpers.made import corridor_scene, grid_scene
 from helpers.perfect_sight import PerfectSight, seen_perfectly
 
 SETTINGS = MappingSettings(side_m=15.0)
@@ -38,6 +40,21 @@ def test_it_knows_where_it_is_and_which_moves_were_blocked(seed):
     _, after = follower.follow(scene.features[here], state)
     assert blocked and {tuple(edge) for edge in np.argwhere(after["shut"][0]).tolist()} == blocked
     assert (after["room"][0] == SURE).sum() == len(visited(after["room"][0]))
+
+
+@pytest.mark.parametrize("action", [Action.MOVE_FORWARD, Action.MOVE_BACKWARD])
+def test_who_is_led_to_the_edge_of_its_lattice_changes_nothing_on_the_other_side(action):
+    scene, settings = seen_perfectly(corridor_scene(9)), replace(SETTINGS, side_m=3.0)
+    follower, here = Follower(PerfectSight(scene), settings), np.array([16])  # the middle, along the corridor
+    state = {**follower.begin(1)}
+    edge = settings.side // 2
+    for _ in range(edge + 3):
+        _, after = follower.follow(scene.features[here], state)
+        state = {**state, **after, "action": np.array([int(action)])}
+        following = scene.graph[here, action]
+        here = np.where(following == BLOCKED, here, following)
+    other_side = 0 if action == Action.MOVE_FORWARD else -1
+    assert edge < 4 and state["room"][0][other_side, edge] >= settings.usual_room
 
 
 class Hopeful(PerfectSight):

@@ -55,8 +55,8 @@ class EpisodeTable:
         zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
         looped: (N,) bool, found before the limit to be in a circle of actions without choice, so never to arrive.
         trajectories: the walks, one an episode; None unless asked for.
-        false_arrivals: (N,) int64, steps at which the agent held wrongly that it was at the target; None where it says
-            nothing of it.
+        false_arrivals: (N,) int64, steps at which the agent held wrongly that it was at the target, but those in
+            rounds of a circle that were not walked; None where it says nothing of it.
         told_arrival: (N,) bool, it held so where it was; None likewise.
     """
 
@@ -99,7 +99,7 @@ def run_episodes(
     Args:
         world: the tables; the walk happens on their device.
         agent: who walks. A walk in a circle of actions that it is certain of is completed by arithmetic instead of
-            walked to the limit; the counts are the same.
+            walked to the limit; the counts are the same, but `false_arrivals`.
         scenes: the world's, in its order, for an agent that sees pictures.
         takes: what it sees on the way instead, one a step, drawn by the episode's seed.
         selection: how actions are chosen by the agent's probabilities.

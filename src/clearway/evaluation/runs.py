@@ -12,7 +12,7 @@ from clearway.agents.named import AgentMaker
 from clearway.errors import RunError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_agents, world_yardsticks
-from clearway.evaluation.protocol import evaluate_agents
+from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH, evaluate_agents
 from clearway.evaluation.summary import Evaluation, Trained
 from clearway.learn.load import TrainedAgent, run_world
 from clearway.reward import Reward
@@ -44,7 +44,7 @@ def evaluate_runs(
     more, which only wait for each other beside a training.
 
     Raises:
-        RunError: the runs have other targets, or an agent can walk to its own alone.
+        RunError: the runs have other targets or zones, an agent can walk to its own alone, or a name is given twice.
         AgentError: one of `beside` cannot walk here.
     """
     records = [agent.record for agent in agents.values()]
@@ -52,13 +52,19 @@ def evaluate_runs(
     for record in records:
         if record.targets != first.targets:
             raise RunError("the runs differ in their targets. Evaluate them one by one")
+        if record.zone_level != first.zone_level:
+            raise RunError("the runs differ in the level of their zones. Evaluate them one by one")
     world = run_world(first, scenes, targets)
     with torch_threads(1):
+        optima = _optima(world, [record.reward for record in records])
+        for name in beside:
+            if name in (*agents, *optima, RANDOM, SHORTEST_PATH):
+                raise RunError(f"beside: {name!r:.80} is the name of another agent in the table. Choose another")
         evaluations = evaluate_agents(
             world,
             {name: agent.on_poses(world) for name, agent in agents.items()},
             references={
-                **_optima(world, [record.reward for record in records]),
+                **optima,
                 **{name: make(world) for name, make in beside.items()},
             },
             scenes=scenes,

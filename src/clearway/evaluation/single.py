@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import zip_longest
 
 import numpy as np
 import torch
 
 from clearway.agents.agent import Agent, Decisions, State
-from clearway.agents.selection import ActionSelection
+from clearway.agents.selection import ActionSelection, having_taken
 from clearway.errors import RunError
 from clearway.evaluation.episodes import Trajectory, episode_starts, run_episodes
 from clearway.evaluation.goals import GOALS, drawn_goals
@@ -80,13 +81,21 @@ def episode_in(
 def memories(world: World, agent: Agent, walk: Trajectory, target: int = 0) -> Iterator[tuple[Decisions, State]]:
     """What an agent decides in each pose of an episode, and its state then; it sees poses or features.
 
-    target: index of the world's.
+    What it remembers of its last action is what was done in the episode, whatever it would draw now.
+
+    Args:
+        world: with the features that it sees.
+        agent: of the episode.
+        walk: the episode.
+        target: index of the world's.
     """
     sight = Sight(world, agent)
     state = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
-    for pose in torch.from_numpy(walk.states):
+    for pose, action in zip_longest(torch.from_numpy(walk.states), walk.actions):
         decisions, state = agent.act(sight(pose[None]), state)
         yield decisions, state
+        if action is not None:
+            state = having_taken(np.array([action], np.int64), state)
 
 
 def walked_once(world: World, agent: Agent, *, selection: ActionSelection, step_limit: int, seed: int) -> Trajectory:

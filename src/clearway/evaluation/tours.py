@@ -83,6 +83,7 @@ def walk_tour(world: World, touring: Touring, scene: Scene, seed: int, takes: Ta
         decisions, state = explorer.act(seen, state)
         happened = env.step(torch.from_numpy(decisions.action.astype(np.int64)))
         collisions += int(happened.blocked)
+    been.add(int(env.state))
     return Tour(state, start, collisions, len(been) / np.count_nonzero(scene.components == 0))
 
 

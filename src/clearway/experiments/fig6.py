@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from clearway.errors import SceneError
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.generalisation import (
     BAND,
@@ -67,7 +68,7 @@ def section(setting: Setting) -> Section:
             "been learnt: see the success on the trained ones. The paper prints its figures as a picture alone."
         ),
         tables=(
-            ReportTable("fig6", title, headings, tuple(rows), (NOTE, *told_of_own_goals(setting))),
+            ReportTable("fig6", title, headings, tuple(rows), (NOTE, *told_of_own_goals(setting), *_fewer(setting))),
             ReportTable(
                 "fig6_targets",
                 f"{title}: every target",
@@ -112,10 +113,32 @@ def _on_trained(setting: Setting, count: int) -> list[Group]:
 
 
 def training_targets(setting: Setting, count: int) -> TargetSets:
-    """So many targets of each scene."""
+    """So many targets of each scene, or all that there are.
+
+    Raises:
+        SceneError: a scene has none beside the held-out ones.
+    """
+    for scene, there in zip(setting.scenes, _there(setting), strict=True):
+        if not there:
+            problem = f"has no targets beside the {HELD_OUT} that figure 6 holds out"
+            raise SceneError(scene.name, problem, "Leave figure 6 out, or this scene")
     return tuple(
         tuple(sorted(target_order(scene, ORDER_SEED)[HELD_OUT : HELD_OUT + count])) for scene in setting.scenes
     )
+
+
+def _there(setting: Setting) -> list[int]:
+    """How many targets each scene has to be trained on."""
+    return [max(0, len(target_order(scene, ORDER_SEED)) - HELD_OUT) for scene in setting.scenes]
+
+
+def _fewer(setting: Setting) -> list[str]:
+    """What is to be told of scenes that have fewer targets than are asked for."""
+    return [
+        f"{scene.name} has {there} targets beside the held-out ones; where more are asked for, these stand in."
+        for scene, there in zip(setting.scenes, _there(setting), strict=True)
+        if there < TRAINED[-1]
+    ]
 
 
 def held_out_targets(setting: Setting) -> TargetSets:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clearway.errors import SceneError
 from clearway.evaluation.oracle import expected, make_task, optimal_policy
 from clearway.reward import SHORTEST
 from clearway.scenes.actions import ACTION_COUNT
@@ -41,14 +42,25 @@ class HardTargets:
 
 
 def hardness(scene: Scene) -> np.ndarray:
-    """Hardness of every state of the scene, (S,) float64; 0 outside the largest component."""
+    """Hardness of every state of the scene, (S,) float64; 0 outside the largest component.
+
+    Raises:
+        SceneError: a random walk may never come to some state of that component.
+    """
     zone = scene_zones(scene)
     found = np.zeros(scene.state_count)
     for state in np.flatnonzero(scene.components == 0).tolist():
         task = make_task(scene.graph, zone, state, SHORTEST)
         walk = np.full((scene.state_count, ACTION_COUNT), 1 / ACTION_COUNT)
         shortest = expected(task, optimal_policy(task))
-        found[state] = expected(task, walk).steps * shortest.collision_visits / max(shortest.steps, 1e-12)
+        steps = expected(task, walk).steps
+        if not np.isfinite(steps):
+            raise SceneError(
+                scene.name,
+                "a random walk may never come to a target, as some way out of its largest part leads nowhere back",
+                "Leave tables 2 and 3 out, or this scene",
+            )
+        found[state] = steps * shortest.collision_visits / max(shortest.steps, 1e-12)
     return found
 
 

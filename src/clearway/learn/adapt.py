@@ -15,11 +15,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from clearway.errors import RunError
-from clearway.learn.learner import AT_LEAST_ONE
+from clearway.learn.learner import AT_LEAST_ONE, Learner
 from clearway.learn.ppo import PPO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from torch import Tensor
 
     from clearway.learn.adapting import AdaptingTrainer
     from clearway.reward import Reward
@@ -80,6 +82,10 @@ class Adapt(PPO):
                 f"pictures: clearway scenes encode FILE --encoder {eyes.name} --out FILE"
             )
         return AdaptingTrainer(world, self, reward, seed, generalist)
+
+    def check_workers(self, states: Tensor) -> None:
+        """Raise RunError: the generalist's walks, and lessons in what they have shown, are for one worker."""
+        Learner.check_workers(self, states)
 
     def warn_of(self, scenes: Sequence[Scene]) -> None:
         """Warn (AspectWarning) of pictures of another aspect than those that the generalist's eyes were taught on."""

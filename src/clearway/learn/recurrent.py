@@ -82,6 +82,9 @@ class Recurrent(Learner):
         for name in ("taught", "teacher_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise RunError(f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range")
+        for name in ("taught_lr_start", "taught_lr_end", "lr_end"):
+            if not getattr(self, name) > 0:
+                raise RunError(f"{name} is {getattr(self, name)}, expected above 0: rates fall geometrically")
 
     @property
     def heads_by_scene(self) -> bool:

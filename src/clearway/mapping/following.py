@@ -199,14 +199,16 @@ class Follower:
         here, room, steps = belief["here"], belief["room"], STEPS[action]
         before = likeliest(here)
         beyond = before.moved(steps)
-        usual = float(np.clip(room[beyond.cell], -SURE_OF_MOVES, SURE_OF_MOVES))
+        inside = max(beyond.cell) < len(room) and min(beyond.cell) >= 0  # else others have led it to the lattice's edge
+        room_there = room[beyond.cell] if inside else self._settings.usual_room
+        usual = float(np.clip(room_there, -SURE_OF_MOVES, SURE_OF_MOVES))
         moved += usual
         gone = np.stack([shifted(here[h], AHEAD[h] * steps, beliefs.IMPOSSIBLE) for h in range(HEADINGS)])
         here[:] = np.logaddexp(gone - np.logaddexp(0, -moved), here - np.logaddexp(0, moved))
         if moved < 0:
             direction = before.heading if steps > 0 else before.turned(2).heading
             belief["shut"][direction, before.row, before.column] = True
-            if room[beyond.cell] < SURE:
+            if inside and room[beyond.cell] < SURE:
                 room[beyond.cell] -= BUMPED
                 if self._last_look:  # else the same look would make good again what was bumped into
                     room[beyond.cell] = min(room[beyond.cell], beliefs.NO_ROOM)

@@ -1,7 +1,7 @@
 """Poses held out of training: in every room a tenth of the locations, chosen by a hash of the room's name and the cell.
 
-No views are taken there, and trainings in generated rooms draw no target there, so that both can be tested on poses that are
-new in rooms that are known. The choice needs no list: it follows from the scene's name and its cells.
+No views are taken there, and trainings in generated rooms draw no target there, so that both can be tested on poses
+that are new in rooms that are known. The choice needs no list: it follows from the scene's name and its cells.
 """
 
 from __future__ import annotations
