@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from clearway.generation.plans import generated_plan
+from clearway.generation.request import Request
 from clearway.live.arrangement import (
     Arrangement,
     arranged,
@@ -16,6 +21,8 @@ from clearway.live.arrangement import (
 )
 from clearway.rooms.navigation import find_grid
 from clearway.rooms.pieces import loose_obstacles
+from clearway.rooms.plans.plan_room import agent_for, build_plan_room
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Provenance, Scene
 from helpers.small_live import state_at, walkable_room
 from helpers.small_rooms import SmallRoom
@@ -75,6 +82,22 @@ def bare_scene(room: SmallRoom) -> Scene:
         graph=grid.graph,
         made_by=Provenance("test"),
     )
+
+
+def test_a_piece_of_a_plan_is_moved_as_a_whole():
+    plan = generated_plan(Request("room", "test", 0, 0))
+    scene, (room, at) = floor_plan_scene(plan, feature_count=4), build_plan_room(plan, looks=False)
+    moved = replace(scene, locations_m=scene.locations_m - np.array(at.origin_m))
+    start, target = np.flatnonzero(scene.components == 0)[[0, -1]].tolist()
+    layout = furniture_moved(room, moved, start, target, 0.3, np.random.default_rng(0), agent_for(plan.cell_size_m))
+    offsets = defaultdict(list)
+    for before, after in zip(*(loose_obstacles(one.spec) for one in (room, arranged(room, layout))), strict=True):
+        offsets[before.name.partition("/")[0]].append(after.pos[:2] - before.pos[:2])
+    assert len(layout.moved_m) == len(offsets) > 2 and all(name.startswith("piece") for name in offsets)
+    assert any(np.hypot(*offset) > 0.01 for offset in layout.moved_m)
+    assert all(len(own) > 1 for own in offsets.values())
+    for own, offset_m in zip(offsets.values(), layout.moved_m, strict=True):
+        np.testing.assert_allclose(own, [offset_m] * len(own), atol=1e-9)
 
 
 def test_furniture_that_would_run_into_something_stays(ends, live):

@@ -65,6 +65,7 @@ def test_a_generated_room_is_one_to_walk_in_and_another_plan_is_not_taken_for_it
     made_by = Provenance("generated", seed=0, notes=notes_of(request))
     scene = replace(floor_plan_scene(plan, feature_count=4), made_by=made_by)
     live = live_room(scene)
+    assert live.model.nmocap == len(live.as_built().bodies_m) > 3  # a body for each piece, and the new obstacle's
     body = Body(RoomAround(live.room, live.agent))
     for state in range(0, scene.state_count, 7):
         x_m, z_m, heading_deg = live.pose_of(state)

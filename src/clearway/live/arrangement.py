@@ -15,7 +15,7 @@ from clearway.errors import SceneError
 from clearway.rooms.groups import OBSTACLE_GROUP
 from clearway.rooms.navigation import find_grid
 from clearway.rooms.obstacles import AgentShape, CollisionRoom, copy_obstacle, obstacle_geoms
-from clearway.rooms.pieces import is_loose, loose_obstacles
+from clearway.rooms.pieces import is_loose, loose_obstacles, numbered
 from clearway.scenes.scene import Scene
 
 NEW_RADIUS_M, NEW_HEIGHT_M = 0.15, 0.6
@@ -62,17 +62,17 @@ class ArrangedRoom:
 
 def as_built(room: CollisionRoom) -> Arrangement:
     """Nothing moved, nothing new."""
-    return Arrangement(((0.0, 0.0),) * len(loose_obstacles(room.spec)))
+    return Arrangement(((0.0, 0.0),) * len(set(numbered(loose_obstacles(room.spec)))))
 
 
 def arranged(room: CollisionRoom, layout: Arrangement) -> ArrangedRoom:
     """The obstacles of a room in a layout."""
     spec = mujoco.MjSpec()
-    offsets = iter(layout.moved_m)
+    pieces = iter(numbered(loose_obstacles(room.spec)))
     for geom in obstacle_geoms(room.spec):
         copy = copy_obstacle(spec, geom)
         if is_loose(geom):
-            copy.pos[:2] += next(offsets)
+            copy.pos[:2] += layout.moved_m[next(pieces)]
     if layout.new_m is not None:
         add_new_obstacle(spec.worldbody, (*layout.new_m, 0.0), group=OBSTACLE_GROUP)
     return ArrangedRoom(room.name, room.width_m, room.depth_m, room.grid_origin_m, spec)
@@ -172,15 +172,17 @@ def _runs_into(room: CollisionRoom, before: Arrangement, after: Arrangement, pie
 
 
 def _overlaps_m(room: ArrangedRoom, piece: int) -> np.ndarray:
-    """How deep a piece reaches into each other obstacle and over the edges of the floor, metres."""
+    """How deep each obstacle of a piece reaches into each of the others' and over the edges of the floor, metres."""
     model = room.spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     loose = [index for index, geom in enumerate(obstacle_geoms(room.spec)) if is_loose(geom)]
-    own = loose[piece]
-    others = [index for index in range(model.ngeom) if index != own]
-    depths_m = [-mujoco.mj_geomDistance(model, data, own, other, 0.01, None) for other in others]
-    half_m = np.abs(data.geom_xmat[own].reshape(3, 3)) @ model.geom_aabb[own, 3:]
-    low_m, high_m = data.geom_xpos[own] - half_m, data.geom_xpos[own] + half_m
-    over_m = [-low_m[0], -low_m[1], high_m[0] - room.width_m, high_m[1] - room.depth_m]
-    return np.maximum([*depths_m, *over_m], 0)
+    numbers = numbered(loose_obstacles(room.spec))
+    own = [index for index, number in zip(loose, numbers, strict=True) if number == piece]
+    others = [index for index in range(model.ngeom) if index not in own]
+    found_m = [-mujoco.mj_geomDistance(model, data, one, other, 0.01, None) for one in own for other in others]
+    for one in own:
+        half_m = np.abs(data.geom_xmat[one].reshape(3, 3)) @ model.geom_aabb[one, 3:]
+        low_m, high_m = data.geom_xpos[one] - half_m, data.geom_xpos[one] + half_m
+        found_m += [-low_m[0], -low_m[1], high_m[0] - room.width_m, high_m[1] - room.depth_m]
+    return np.maximum(found_m, 0)

@@ -4,4 +4,5 @@ CEILING_GROUP = 1  # the ceiling and what hangs from it: in the agent's pictures
 SEEN_GROUP = 2  # everything else that one sees
 OBSTACLE_GROUP = 3  # the shapes that the agent collides with, never seen
 
-SHELL_NAME = "shell"  # the names of obstacles that belong to the building begin with this; furniture has none
+SHELL_NAME = "shell"  # the names of obstacles that belong to the building begin with this
+PIECE_NAME = "piece"  # obstacles of one piece of furniture are called so, with its number and their own

@@ -1,8 +1,8 @@
 """Pieces of furniture that can be moved: which obstacles they are, and which visible parts belong to each.
 
-The rooms are built part by part, so a piece is found by its place: an obstacle that stands on the floor, with every
-part over its footprint that stands in it, on it, or on such a part. Walls, ceilings, what hangs on them, and the light
-baked into them stay.
+A piece is an obstacle that stands on the floor, or several that were put there as one (`Room.one_piece`). The rooms are
+built part by part, so what is visible of a piece is found by its place: every part over its footprint that stands in
+it, on it, or on such a part. Walls, ceilings, what hangs on them, and the light baked into them stay.
 """
 
 from __future__ import annotations
@@ -26,8 +26,15 @@ BODY_NAME = "piece"
 
 
 def loose_obstacles(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
-    """The obstacles of a room that can be moved, in the spec's order: piece 0, 1, ..."""
+    """The obstacles of a room that can be moved, in the spec's order."""
     return [geom for geom in obstacle_geoms(spec) if is_loose(geom)]
+
+
+def numbered(obstacles: Sequence[mujoco.MjsGeom]) -> list[int]:
+    """The piece that each obstacle that can be moved belongs to: 0, 1, ... in their order."""
+    names = [geom.name.partition("/")[0] or number for number, geom in enumerate(obstacles)]
+    order = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    return [order[name] for name in names]
 
 
 def is_loose(geom: mujoco.MjsGeom) -> bool:
@@ -46,14 +53,14 @@ def _half_size_m(geom: mujoco.MjsGeom) -> np.ndarray:
 def pieces_of_parts(
     obstacles: Sequence[mujoco.MjsGeom], parts: Sequence[Part], floor_m: tuple[float, float]
 ) -> np.ndarray:
-    """The piece that each part belongs to, (parts,) int; FIXED for those that stay.
+    """The piece that each part belongs to, (parts,) int, as `numbered`; FIXED for those that stay.
 
     Args:
-        obstacles: the pieces (`loose_obstacles`).
+        obstacles: those of the pieces (`loose_obstacles`).
         parts: visible ones.
         floor_m: width and depth of the floor.
     """
-    piece = np.full(len(parts), FIXED)
+    piece, numbers = np.full(len(parts), FIXED), numbered(obstacles)
     if not obstacles or not parts:
         return piece
     centres_m = np.array([part.centre_m for part in parts])
@@ -71,7 +78,7 @@ def pieces_of_parts(
     for part in np.argsort(undersides_m, kind="stable"):
         owner = nearest[part]
         if not hung[part] and undersides_m[part] <= reached_m[owner] + GAP_M:
-            piece[part] = owner
+            piece[part] = numbers[owner]
             reached_m[owner] = max(reached_m[owner], tops_m[part])
     return piece
 

@@ -6,7 +6,8 @@ Geom groups: 2 what one sees, 1 the ceiling and what hangs from it, 3 the obstac
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import mujoco
@@ -16,7 +17,7 @@ from clearway.rooms import meshes
 from clearway.rooms.daytime import NOON, Daytime
 from clearway.rooms.detail import FULL, Detail
 from clearway.rooms.frame import UPRIGHT, Frame, along, rotation
-from clearway.rooms.groups import OBSTACLE_GROUP, SEEN_GROUP
+from clearway.rooms.groups import OBSTACLE_GROUP, PIECE_NAME, SEEN_GROUP
 from clearway.rooms.materials import SCHEMES, Look, look_of
 from clearway.rooms.parts import Lamp, Part, Window
 from clearway.rooms.spec import add_material, empty_spec
@@ -73,6 +74,8 @@ class Room:
         self.windows: list[Window] = []
         self.surfaces: list[Surface] = []
         self.parts: list[Part] = []
+        self._piece_number = -1
+        self._piece: int | None = None  # obstacles of the present piece, so far
         self._looks: dict[str, Look] = {}
         self.spec = empty_spec(self.name, (self.width_m / 2, self.depth_m / 2, 1.0))
         if self.mirrored:
@@ -124,8 +127,19 @@ class Room:
         half_m = height_m / 2
         self._obstacle(mujoco.mjtGeom.mjGEOM_CYLINDER, frame, (0, 0, half_m), [radius_m, half_m, 0.0])
 
+    @contextmanager
+    def one_piece(self) -> Iterator[None]:
+        """Obstacles that are added meanwhile are those of one piece of furniture, which is moved as a whole."""
+        self._piece_number, self._piece = self._piece_number + 1, 0
+        try:
+            yield
+        finally:
+            self._piece = None
+
     def _obstacle(self, kind: int, frame: Frame, centre_m: Point, size: Sequence[float], name: str = "") -> None:
         point, quat = self._placed(frame, centre_m, UPRIGHT)
+        if self._piece is not None:
+            name, self._piece = f"{PIECE_NAME} {self._piece_number}/{self._piece}", self._piece + 1
         geom = self.spec.worldbody.add_geom(
             name=name, type=kind, pos=point, quat=quat, group=OBSTACLE_GROUP, contype=1, conaffinity=1
         )

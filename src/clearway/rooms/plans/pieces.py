@@ -123,8 +123,9 @@ def furnish(room: Room, pieces: Sequence[Piece], nearest_m: float) -> list[float
 
 def _placed(room: Room, piece: Piece, kind: Kind) -> float:
     """Put furniture on a place, all of which it blocks. Returns its height."""
-    kind.place(room, piece.at, piece.width_m, piece.depth_m)
-    room.block(piece.at, (0, 0, BLOCK_HEIGHT_M / 2), (piece.width_m, piece.depth_m, BLOCK_HEIGHT_M))
+    with room.one_piece():
+        kind.place(room, piece.at, piece.width_m, piece.depth_m)
+        room.block(piece.at, (0, 0, BLOCK_HEIGHT_M / 2), (piece.width_m, piece.depth_m, BLOCK_HEIGHT_M))
     return kind.top_m
 
 
