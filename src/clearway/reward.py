@@ -116,6 +116,11 @@ class Clearance(Term):
     clearance: float = parameter(0.02, "Cost of a step that ends at an obstacle, falling to nothing at clearance_m.")
     clearance_m: float = parameter(0.5, "Distance from which an obstacle costs nothing, metres.")
 
+    def __post_init__(self) -> None:
+        """Raise RewardError where there is no such distance."""
+        if not self.clearance_m > 0:
+            raise RewardError(f"--clearance-m is {self.clearance_m}, expected more than 0. Give a distance")
+
     def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
         """Subtracted near obstacles."""
         import numpy as np

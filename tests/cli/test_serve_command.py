@@ -24,6 +24,7 @@ from helpers.sums import Sums, plain
         (("x.onnx", "--idle-s", "15"), ("sessions expire after 15 s",)),
         (("x.onnx", "--deadline-s", "nan"), ("deadline_s is nan",)),
         (("x.onnx", "--idle-s", "inf"), ("idle_s is inf", "Give a smaller number")),
+        (("x.onnx", "--trusted-proxy", "10.0.0.0/8"), ("--trusted-proxy '10.0.0.0/8'", "not a name or a network")),
     ],
     ids=lambda value: " ".join(value),
 )

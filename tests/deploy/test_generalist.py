@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -223,6 +223,9 @@ def test_goals_are_not_for_the_file_of_one_scene(deployed) -> None:
         clearway.evaluate_goals(deployed.agent, [SCENE], goals=4)
 
 
+SETTINGS = asdict(MappingSettings())
+
+
 def resealed(one_file, path, **changes):
     """The file with another card."""
     import onnx
@@ -244,7 +247,11 @@ def resealed(one_file, path, **changes):
     [
         ({"kind": "dreamer"}, "holds an agent of the kind 'dreamer', unknown to this clearway"),
         ({"settings": {"side": 21}}, "its card is not one of a generalist of clearway .*arrived"),
-        ({"settings": "none"}, "its card is not one of a generalist"),
+        ({"settings": "none"}, "its metadata cannot be read .a part of it is no object"),
+        ({"settings": SETTINGS | {"side_m": 1e4}}, r"side_m is 10000.0, expected 1 to 60"),
+        ({"settings": SETTINGS | {"side_m": float("nan")}}, "side_m is nan"),
+        ({"settings": SETTINGS | {"step_m": 0.0}}, "step_m is 0.0"),
+        ({"settings": SETTINGS | {"compared": -3}}, "compared is -3"),
         ({"encoder": {}}, "its card is not one of a generalist"),
     ],
 )

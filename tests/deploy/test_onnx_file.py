@@ -9,6 +9,7 @@ import pytest
 from clearway.deploy.card import Card, card_from_json
 from clearway.deploy.onnx_file import MAX_BYTES, OnnxAgent, read_onnx
 from clearway.errors import DeployError
+from clearway.scenes.actions import ACTION_NAMES
 
 
 def refusal(path: Path) -> str:
@@ -62,7 +63,7 @@ def test_a_file_larger_than_onnx_allows_is_not_read(tmp_path) -> None:
     assert "larger than 2048 MiB" in refusal(path)
 
 
-CARD = Card("attic", ("a", "b"), 4, 32, True, {"name": "x"}, {"pixels": None}, (3, 4), {"seed": 0})
+CARD = Card("attic", ACTION_NAMES, 4, 32, True, {"name": "x"}, {"pixels": None}, (3, 4), {"seed": 0})
 
 
 def test_a_card_round_trip() -> None:
@@ -77,6 +78,20 @@ def test_a_card_round_trip() -> None:
         ('{"format_version": 1}', "metadata cannot be read"),
         (json.dumps({**json.loads(CARD.to_json()), "picture_size": [1]}), "metadata cannot be read"),
         (json.dumps({**json.loads(CARD.to_json()), "colour": 1}), "metadata cannot be read"),
+        ("[" * 200_000, "metadata cannot be read (it is nested too deep)"),
+        *(
+            (json.dumps({**json.loads(CARD.to_json()), **changed}), f"metadata cannot be read ({told}")
+            for changed, told in (
+                ({"history_length": "x"}, "history_length is 'x')"),
+                ({"feature_count": -1}, "feature_count is -1)"),
+                ({"actions": "ab"}, "2 actions)"),
+                ({"actions": [1, 2, 3, 4]}, "action 0 is 1)"),
+                ({"takes_pictures": "no"}, "takes_pictures is 'no')"),
+                ({"picture_size": [1_000_000, 3]}, "the pictures' height is 1000000)"),
+                ({"settings": None}, "a part of it is no object)"),
+                ({"scene": 7}, "scene is 7)"),
+            )
+        ),
         (json.dumps({**json.loads(CARD.to_json()), "format_version": 4}), "written by a newer clearway (format 4)"),
     ],
 )

@@ -181,6 +181,7 @@ def test_seeds_by_environment() -> None:
     envs = ImageGoalVectorEnv(scene, num_envs=3)
     counted = episode_starts(envs, seed=7)
     assert episode_starts(envs, seed=[7, 8, 9]) == counted
+    assert episode_starts(envs, seed=np.uint8(255)) == episode_starts(envs, seed=255)
     assert episode_starts(envs, seed=np.array([7, 8, 9])) == counted
     assert [row[::-1] for row in episode_starts(envs, seed=[9, 8, 7])] == counted
     envs.reset(seed=[7, 8, 9])

@@ -76,6 +76,20 @@ def test_a_location_photographed_from_another_first_heading_is_turned_into_place
     assert scene.graph[0, Action.MOVE_FORWARD] == 12 + 7  # picture 12 is the eighth of its location now
 
 
+def test_a_part_that_nothing_leads_to_stands_to_the_right_of_the_others(tmp_path: Path) -> None:
+    content = annotations()
+    for location, other in ((1, 2), (2, 1)):
+        for heading in (0, 6):
+            for move in ("forward", "backward"):
+                if content[picture_name(location, heading)][move] == picture_name(other, heading):
+                    content[picture_name(location, heading)][move] = ""
+    with pytest.warns(SceneWarning):
+        scene = read_avd(made_folder(tmp_path / "Home_001_1", content), height_px=18)
+    first, second = (scene.locations_m[scene.components == part] for part in (0, 1))
+    assert len(first) == 24 and len(second) == 12
+    assert second[:, 0].min() > first[:, 0].max()
+
+
 def test_the_scene_survives_its_file(tmp_path: Path) -> None:
     scene = read_avd(made_folder(tmp_path / "home"), height_px=18)
     write_scene(scene, tmp_path / "home.h5")

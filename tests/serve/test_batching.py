@@ -172,6 +172,35 @@ def test_too_many_that_wait_are_refused_at_once() -> None:
     assert [fault.code for fault in refused] == ["overloaded", "overloaded"]
 
 
+def test_who_has_given_up_takes_no_place_among_those_that_wait() -> None:
+    going_on = threading.Event()
+
+    class Waits(Sums):
+        def act(self, observation, state):
+            result = super().act(observation, state)
+            assert going_on.wait(PATIENT_S)
+            return result
+
+    async def ask() -> None:
+        batcher = Batcher(agent := Waits(), Limits(waiting=3, batch=1), ignore)
+        first = asyncio.create_task(batcher.act(OWNER, plain(1), BEGUN))
+        while not agent.batches:
+            await asyncio.sleep(0.001)
+        others = [asyncio.create_task(batcher.act(OWNER, plain(1), BEGUN)) for _ in range(3)]
+        await asyncio.sleep(0)
+        assert batcher.waiting == 3
+        for other in others:
+            other.cancel()
+        await asyncio.sleep(0)
+        assert batcher.waiting == 0
+        last = asyncio.create_task(batcher.act(OWNER, plain(1), BEGUN))
+        await asyncio.sleep(0)
+        going_on.set()
+        await asyncio.gather(first, last)
+
+    asyncio.run(ask())
+
+
 def test_a_refused_target_costs_a_session_none_of_its_draws() -> None:
     """Sent again, it begins the episode that it would have begun."""
 

@@ -197,6 +197,23 @@ def test_a_session_goes_on_uncounted_once_an_answer_is_lost_for_good(client, ser
     assert set(way.seen.values()) == {1}  # without a number, it is not sent again and walked twice
 
 
+def test_a_session_goes_on_uncounted_after_ctrl_c(client, service) -> None:
+    session = with_service(client, Client("http://testserver", TOKEN)).session(selection="argmax")
+    session.set_target(plain(1))
+
+    def answered_and_interrupted(*given, **also):
+        type(session._client).ask_json(session._client, *given, **also)
+        raise KeyboardInterrupt
+
+    session._client.ask_json = answered_and_interrupted
+    with pytest.raises(KeyboardInterrupt):
+        session.act(plain(2))
+    del session._client.ask_json
+    with pytest.raises(DeployError):
+        session.act("no picture")
+    assert session.act(plain(3)).value == 1000 + 2 + 2 + 2 + 3  # the first had been walked
+
+
 def test_a_request_that_breaks_after_the_time_for_asking_again_is_asked_once(monkeypatch) -> None:
     monkeypatch.setattr("clearway.serve.client.FIRST_PAUSE_S", 0.001)
     monkeypatch.setattr("clearway.serve.client.AGAIN_S", 0.1)

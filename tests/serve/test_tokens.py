@@ -30,10 +30,11 @@ def test_a_file_of_tokens(tmp_path) -> None:
         (f"red {RED} more\n", 0o600, "line 1: expected a name and a token"),
         (f"red {RED}\nblue short\n", 0o600, "line 2, holds no token of at least 16"),
         (f"{101 * 'r'} {RED}\n", 0o600, "line 1: a name of 101 letters, expected at most 100"),
+        (f"red {RED}\nred {RED}\nblue {RED}\n", 0o600, "line 3: the token of blue is that of red, too"),
         (f"red {RED}\n", 0o640, "chmod 600"),
         ("#" * (1 << 20) + "\n", 0o600, "larger than 1 MiB"),
     ],
-    ids=["empty", "no token", "three words", "weak", "long name", "open to others", "large"],
+    ids=["empty", "no token", "three words", "weak", "long name", "of two", "open to others", "large"],
 )
 def test_files_that_are_none(tmp_path, text, mode, part) -> None:
     path = written(tmp_path, text, mode)

@@ -315,7 +315,7 @@ def test_depth_is_a_switch_away_where_the_scene_has_it(opened: Callable[..., Pag
     expect(picture).to_have_attribute("src", "scenes/0/depth/1.jpg")
     expect(page.locator("#goal-picture")).to_have_attribute("src", "scenes/0/depth/8.jpg")
     expect(page.locator("#targets img").first).to_have_attribute("src", re.compile("scenes/0/depth/"))
-    assert page.evaluate("[...document.images].every((image) => image.decode())")
+    assert page.evaluate("Promise.all([...document.images].map((image) => image.decode())).then(() => true)")
     page.locator("#scene").select_option("grid")
     expect(page.get_by_label("Seen by")).to_be_hidden()
     expect(picture).to_have_attribute("src", re.compile("scenes/1/views/"))

@@ -111,7 +111,7 @@ def test_the_page_plays(browser: Browser, addresses: dict[str, str], how: str) -
     tie = len(set(walked)) == 1  # steps and collisions
     badges = ["winner" if own == min(walked) and not tie else "reached" for own in walked]
     expect(page.locator(".badge.good")).to_have_text(badges)
-    assert page.evaluate("[...document.images].every((image) => image.decode())")
+    assert page.evaluate("Promise.all([...document.images].map((image) => image.decode())).then(() => true)")
     page.get_by_text("Value", exact=True).first.click()
     expect(page.locator("#legend")).to_contain_text("value")
     page.get_by_role("button", name="Target pose 16,").click()

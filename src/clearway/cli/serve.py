@@ -7,6 +7,7 @@ import os
 import socket
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated
 
@@ -75,6 +76,7 @@ class Serve:
         from clearway.web.guard import new_token
         from clearway.web.local import address_of, is_loopback, listening, port_of
 
+        proxy = _proxy(self.trusted_proxy)
         limits = Limits(sessions=self.sessions, idle_s=self.idle_s, deadline_s=self.deadline_s)
         if not 1 <= self.replicas <= MOST_REPLICAS:
             problem = f"--replicas is {self.replicas}, expected 1 to {MOST_REPLICAS}"
@@ -114,7 +116,7 @@ class Serve:
                 where = "memory" if self.replicas == 1 else "in the cache folder"
                 say(f"{where}: {each / 1e3:.0f} kB a session, up to {whole:.0f} MB for {limits.sessions}")
             log = to_stderr if self.log_requests else None
-            network = Network(listener, health, self.tls_cert, self.tls_key, self.trusted_proxy, log)
+            network = Network(listener, health, self.tls_cert, self.tls_key, proxy, log)
             if self.replicas > 1:
                 threads = max((os.cpu_count() or 1) // self.replicas, 1)
                 del agent  # the replicas open it for themselves
@@ -131,3 +133,14 @@ class Serve:
         if self.health_host != LOOPBACK:
             raise ClearwayError(f"--health-host is {self.health_host}, and there is no --health-port. Give both")
         return nullcontext()
+
+
+def _proxy(given: str | None) -> str | None:
+    """An address, written as connections have it. Raises ClearwayError where it is none."""
+    if given is None:
+        return None
+    try:
+        return str(ip_address(given))
+    except ValueError as fault:
+        problem = f"--trusted-proxy {given!r:.80}: expected the IP address of one proxy, such as 10.0.0.2"
+        raise ClearwayError(f"{problem}. Give that, not a name or a network") from fault

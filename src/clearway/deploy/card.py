@@ -8,11 +8,14 @@ from dataclasses import asdict, dataclass, field
 
 from clearway.choices import GENERALIST
 from clearway.errors import DeployError
+from clearway.files import parse_json
+from clearway.scenes.actions import ACTION_COUNT
 
 FORMAT_VERSION = 3  # 2 since there is `observation`, 3 since there is `kind`
 EXPORT_AGAIN = "Export it again with clearway export"
 SIAMESE = "siamese"
 ARRIVAL = "arrival"  # among the settings of such an agent: by what it says where it has arrived
+MOST_HISTORY, MOST_FEATURES, MOST_SIDE_PX = 1_000, 1_000_000, 100_000
 ANY_ROOM = "any room"  # stands for the scene of an agent that is bound to none
 
 
@@ -71,14 +74,40 @@ def card_from_json(text: str, source: str) -> Card:
         DeployError: it is no such card, or a newer clearway wrote it.
     """
     try:
-        kept = json.loads(text)
+        kept = parse_json(text)
         version = int(kept.pop("format_version"))
         if version > FORMAT_VERSION:
             raise DeployError(f"{source}: written by a newer clearway (format {version}). Upgrade clearway")
         size = kept["picture_size"]
         sizes = {"picture_size": None if size is None else (int(size[0]), int(size[1]))}
-        return Card(**{**kept, **sizes, "actions": tuple(kept["actions"])})
+        card = Card(**{**kept, **sizes, "actions": tuple(kept["actions"])})
+        _check(card)
+        return card
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as fault:
         if isinstance(fault, DeployError):
             raise
         raise DeployError(f"{source}: its metadata cannot be read ({fault}). {EXPORT_AGAIN}") from fault
+
+
+def _check(card: Card) -> None:
+    """Raise ValueError where a value is of another type, or out of bounds; see `Card`."""
+    texts = {"scene": card.scene, "kind": card.kind, **{f"action {n}": name for n, name in enumerate(card.actions)}}
+    counts = {
+        "history_length": (card.history_length, MOST_HISTORY),
+        "feature_count": (card.feature_count, MOST_FEATURES),
+    }
+    for name, side in zip(("height", "width"), card.picture_size or (), strict=False):
+        counts[f"the pictures' {name}"] = (side, MOST_SIDE_PX)
+    parts = [card.encoder, card.normalisation, card.training, card.settings]
+    for name, value in texts.items():
+        if not isinstance(value, str):
+            raise ValueError(f"{name} is {value!r:.40}")
+    for name, (count, most) in counts.items():
+        if type(count) is not int or not 1 <= count <= most:
+            raise ValueError(f"{name} is {count!r:.40}")
+    if len(card.actions) != ACTION_COUNT:
+        raise ValueError(f"{len(card.actions)} actions")
+    if not isinstance(card.takes_pictures, bool):
+        raise ValueError(f"takes_pictures is {card.takes_pictures!r:.40}")
+    if not all(isinstance(part, Mapping) for part in (*parts, card.observation or {})):
+        raise ValueError("a part of it is no object")

@@ -27,6 +27,8 @@ from clearway.scenes.scene import EncoderRecord
 from clearway.scenes.sensors import rgb
 from clearway.version import __version__
 
+MOST = 1e6  # of a setting
+BOUNDS = {"step_m": (0.1, 2.0), "side_m": (1.0, 60.0), "compared": (1, 1000), "arrived": (0.0, 1.0)}
 TOUR_PICTURES = 500  # that a tour keeps; further ones tell of cells, and are forgotten
 
 
@@ -125,4 +127,7 @@ def _settings(given: Mapping[str, Any]) -> MappingSettings:
     for name, value in usual.items():
         if type(given[name]) is not type(value):
             raise ValueError(f"{name} is {given[name]!r:.40}")
+        low, high = BOUNDS.get(name, (-MOST, MOST))
+        if not low <= given[name] <= high:  # nor is NaN
+            raise ValueError(f"{name} is {given[name]}, expected {low:g} to {high:g}")
     return MappingSettings(**given)

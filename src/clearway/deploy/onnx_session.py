@@ -81,7 +81,10 @@ class BoundedSession:
         with self._places_needed():
             process = _Process(self._threads)
             told, _ = process.answer({}, [np.frombuffer(self._content, np.uint8)], OPENING_LIMIT_S)
-        if (reason := told.get("fault")) is not None:
+        reason = told.get("fault")
+        if reason is None and not isinstance(told.get("metadata"), dict):
+            reason = "its process told no metadata"
+        if reason is not None:
             process.end()
             raise DeployError(f"{self._source}: {_installed()} cannot run it ({reason}). Upgrade it")
         return process, told["metadata"]

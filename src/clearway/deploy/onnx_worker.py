@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 import os
 import struct
 import sys
@@ -50,9 +51,12 @@ def read_message(stream: BinaryIO, most_bytes: int) -> tuple[dict[str, Any], lis
     (length,) = LENGTH.unpack(_whole(stream, bytearray(LENGTH.size)))
     if length > MOST_LINE_BYTES:
         raise ValueError(f"a message begins with {length} bytes, at most {MOST_LINE_BYTES} were expected")
-    about = json.loads(_whole(stream, bytearray(length)))
-    shapes = [(np.dtype(kind), tuple(shape)) for kind, shape in about.pop("arrays")]
-    size = sum(kind.itemsize * math.prod(shape) for kind, shape in shapes)
+    try:
+        about = json.loads(_whole(stream, bytearray(length)))
+        shapes = [(np.dtype(kind), tuple(map(operator.index, shape))) for kind, shape in about.pop("arrays")]
+        size = sum(kind.itemsize * math.prod(shape) for kind, shape in shapes)
+    except (TypeError, KeyError, AttributeError, RecursionError) as fault:
+        raise ValueError(f"a message begins with what is none ({fault})") from fault
     if size > most_bytes or any(kind.kind not in NUMBERS for kind, _ in shapes):
         raise ValueError(f"a message has arrays of {size} bytes, numbers and at most {most_bytes} were expected")
     arrays = [np.empty(shape, kind) for kind, shape in shapes]
@@ -113,6 +117,7 @@ def _opened(content: bytes, memory_bytes: int, threads: int | None) -> tuple[Any
     options.intra_op_num_threads = threads or 0
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idle threads leave the processor
     options.add_session_config_entry("session.use_env_allocators", "1")
+    options.add_session_config_entry("session.load_model_format", "ONNX")  # no other, whatever its first bytes say
     kind = ort.OrtMemoryInfo("Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT)
     ort.create_and_register_allocator(kind, ort.OrtArenaCfg(memory_bytes, -1, -1, -1))
     open_nothing_more()

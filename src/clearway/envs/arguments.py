@@ -137,7 +137,7 @@ def seed_words(seed: int | Sequence[int | None] | np.ndarray, env_count: int) ->
     """
     if not isinstance(seed, (int, np.integer, Sequence, np.ndarray)):
         raise EnvError(f"seed: expected an integer, or one for each of the {env_count} environments, got {seed!r}")
-    seeds = [seed + env for env in range(env_count)] if isinstance(seed, (int, np.integer)) else list(seed)
+    seeds = [int(seed) + env for env in range(env_count)] if isinstance(seed, (int, np.integer)) else list(seed)
     if len(seeds) != env_count:
         raise EnvError(f"seed: expected one for each of the {env_count} environments, got {len(seeds)}")
     for one in seeds:

@@ -109,11 +109,20 @@ class SB3VecEnv(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
 
-def _made(scenes: Any, **settings: Any) -> Any:
-    """A vector environment as it is, or one of the scenes."""
-    if isinstance(scenes, VectorEnv):
-        return scenes
-    return ImageGoalVectorEnv(scenes, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
+def _made(scenes: Any, num_envs: int, **settings: Any) -> Any:
+    """A vector environment as it is, or one of the scenes.
+
+    Raises:
+        EnvError: one that is made already has another number or way of beginning episodes, or is given settings.
+    """
+    if not isinstance(scenes, VectorEnv):
+        return ImageGoalVectorEnv(scenes, num_envs=num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
+    if settings or num_envs not in (1, scenes.num_envs):
+        given = ", ".join(settings) or f"num_envs={num_envs}"
+        raise EnvError(f"{given}: these environments are made already. Leave that out, or give scenes")
+    if scenes.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
+        raise EnvError("these environments reset in a step of its own. Make them with autoreset_mode='SameStep'")
+    return scenes
 
 
 def _joined(options: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

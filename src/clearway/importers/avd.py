@@ -138,7 +138,7 @@ def _laid_out(graph: np.ndarray, heading_count: int) -> tuple[np.ndarray, np.nda
         if placed[first]:
             continue
         if placed.any():  # a part that nothing leads to stands to the right of the others
-            cells[first] = cells[placed].max(axis=0) + 3, 0
+            cells[first] = cells[placed, 0].max() + 3, 0
         placed[first] = True
         queue = deque([first])
         while queue:

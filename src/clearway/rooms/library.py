@@ -16,7 +16,7 @@ from clearway import files, rooms
 from clearway.errors import SceneError
 from clearway.rooms import build as building
 from clearway.rooms.build import PICTURE_SIZE_PX, build_floor_plan, build_scene, scene_name, shaping_versions
-from clearway.scenes import floor_plans, grid
+from clearway.scenes import floor_plans, grid, plan_scenes
 from clearway.scenes import sensors as sensing
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.scene import Scene
@@ -143,7 +143,9 @@ def sources_hash(*further: ModuleType) -> str:
         folder = Path(str(package.__file__)).parent
         own = "" if package is rooms else f"{package.__name__}/"
         sources |= {own + source.relative_to(folder).as_posix(): source for source in sorted(folder.rglob("*.py"))}
-    others = {module.__name__: Path(str(module.__file__)) for module in (building, floor_plans, grid, sensing)}
+    others = {
+        module.__name__: Path(str(module.__file__)) for module in (building, floor_plans, grid, plan_scenes, sensing)
+    }
     for name, source in {**sources, **others}.items():
         content = source.read_bytes()
         digest.update(f"{name} {len(content)}\n".encode())

@@ -64,7 +64,7 @@ class Batcher:
     @property
     def waiting(self) -> int:
         """Pictures that wait."""
-        return len(self._waiting)
+        return sum(not asked.answer.done() for asked in self._waiting)  # others have given up
 
     async def reset(self, owner: str, target: np.ndarray, seed: np.ndarray) -> State:
         """The state of an episode's begin, of one row, from the target's picture and a seed (1,); as `act`."""
@@ -81,7 +81,7 @@ class Batcher:
         return decisions, after
 
     async def _answered(self, owner: str, seen: np.ndarray, state: State | np.ndarray) -> Answer:
-        if len(self._waiting) >= self._limits.waiting:
+        if self.waiting >= self._limits.waiting:
             raise Fault("overloaded", "too many pictures wait for the agent. Try again")
         asked = Waiting(owner, seen, state, asyncio.get_running_loop().create_future())
         self._waiting.append(asked)

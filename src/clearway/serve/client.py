@@ -210,6 +210,11 @@ class ClientSession:
             if fault.code in UNSURE or fault.code.startswith("status"):
                 self._answered[what] = None
             raise
+        except DeployError:  # no picture: nothing was sent
+            raise
+        except BaseException:  # Ctrl+C: the service may have answered
+            self._answered[what] = None
+            raise
         if answered is not None:
             self._answered[what] = answered + 1
 

@@ -69,7 +69,7 @@ def read_tokens(path: Path) -> Tokens:
     Raises:
         ClearwayError: it cannot be read, others may read it, or it says something else.
     """
-    named = []
+    named: list[tuple[str, str]] = []
     for number, line in enumerate(_text(path).splitlines(), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
@@ -79,7 +79,11 @@ def read_tokens(path: Path) -> Tokens:
         if len(words[0]) > MOST_NAME_LETTERS:
             problem = f"{path}, line {number}: a name of {len(words[0])} letters, expected at most {MOST_NAME_LETTERS}"
             raise ClearwayError(f"{problem}. Choose a shorter one")
-        named.append((words[0], checked_token(words[1], f"{path}, line {number},")))
+        token = checked_token(words[1], f"{path}, line {number},")
+        if others := {name for name, own in named if own == token and name != words[0]}:
+            problem = f"{path}, line {number}: the token of {words[0]} is that of {others.pop()}, too"
+            raise ClearwayError(f"{problem}. Give each a token of their own")
+        named.append((words[0], token))
     if not named:
         raise ClearwayError(f"{path}: no tokens in it. Write a name and a token a line")
     return Tokens(named)
