@@ -145,17 +145,19 @@ COPIED_UNDER_WAY = """
 import os, signal, sys, threading, time
 from test_onnx_session import ones, squared
 opened, told = squared(), []
-asking = threading.Thread(target=lambda: told.append(opened.run(["y"], ones(2500))[0].shape))
+asking = threading.Thread(target=lambda: told.append(opened.run(["y"], ones(4000))[0].shape))
 asking.start()
-time.sleep(0.2)
-assert opened._lock.locked()
+until = time.monotonic() + 60
+while not opened._lock.locked():
+    assert time.monotonic() < until
+    time.sleep(0.001)
 if (copy := os.fork()) == 0:
     signal.alarm(20)
     sys.exit(0 if opened.run(["y"], ones(2))[0].shape == (2, 2) else 1)  # which closes what it has of its parent
 assert asking.is_alive()
 assert os.waitstatus_to_exitcode(os.waitpid(copy, 0)[1]) == 0
 asking.join()
-assert told == [(2500, 2500)]
+assert told == [(4000, 4000)]
 """
 
 

@@ -97,7 +97,7 @@ def test_what_the_user_did_wrong_is_said_as_on_one_machine(tmp_path: Path) -> No
 
 def test_more_threads_than_any_node_has_are_refused(tmp_path: Path) -> None:
     setting = small_setting(tmp_path, seeds=1)
-    ray.init(num_cpus=2, include_dashboard=False)
+    ray.init("local", num_cpus=2, include_dashboard=False)
     with pytest.raises(RunError, match=r"no node .* the 3 processors .*there are 2 and .*--threads"):
         run_jobs(setting.out, jobs_of(setting), ray="local", workers=None, threads=3, show=nothing)
 

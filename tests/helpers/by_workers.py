@@ -25,7 +25,7 @@ def by_workers(count: int, work: Callable[[Peers], Any]) -> list[Any]:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(60)
+        thread.join(200)
     if errors:
         raise errors[0]
     assert not any(thread.is_alive() for thread in threads)

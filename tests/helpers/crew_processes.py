@@ -6,7 +6,7 @@ import subprocess
 import time
 from pathlib import Path
 
-PATIENCE_S = 60.0
+PATIENCE_S = 200.0  # of a machine with much else to do, where each process takes seconds to begin
 
 
 def workers_of(parent: int) -> list[int]:

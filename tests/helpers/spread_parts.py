@@ -123,7 +123,7 @@ def wait_to_be_interrupted(folder: Path, part: int) -> None:
 
 def wait_for(path: Path) -> None:
     """Come back when there is such a file."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + 300
     while not path.exists():
         if time.monotonic() > end:
             raise TimeoutError(f"no {path}")
@@ -142,6 +142,15 @@ def parent_of(pid: int) -> int | None:
         return int(Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[1])
     except (FileNotFoundError, ProcessLookupError):
         return None
+
+
+def descends_from(pid: int | None, ancestor: int) -> bool:
+    """Whether a process was started by another, or by one that that one started, and so on."""
+    while pid is not None and pid > 1:
+        if pid == ancestor:
+            return True
+        pid = parent_of(pid)
+    return False
 
 
 def runs(pid: int, module: bytes) -> bool:

@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from clearway.pretraining.workers import pretrain_by_workers
 from helpers.killed_pretraining import SETTINGS, made
 from helpers.on_ray import MARKS, cluster_here
 from helpers.small_runs import equal_bits, small_learner, small_request
+from helpers.spread_parts import descends_from
 
 pytestmark = MARKS
 UPDATES = 60
@@ -41,8 +43,9 @@ def training_processes() -> list[int]:
     found = []
     for status in Path("/proc").glob("[0-9]*/cmdline"):
         try:
-            if b"ray::_worker" in status.read_bytes():
-                found.append(int(status.parent.name))
+            pid = int(status.parent.name)
+            if b"ray::_worker" in status.read_bytes() and descends_from(pid, os.getpid()):  # others' tests have theirs
+                found.append(pid)
         except (FileNotFoundError, ProcessLookupError):
             continue
     return found
@@ -54,11 +57,12 @@ def test_a_worker_that_is_killed_on_ray_changes_no_bit(tmp_path: Path) -> None:
     killed: list[int] = []
 
     def kill() -> None:
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 300
         while not killed and time.monotonic() < deadline:
             if len(list(there.checkpoints.glob("frames-*"))) > 1 and (found := training_processes()):
-                os.kill(found[-1], signal.SIGKILL)
-                killed.append(found[-1])
+                with suppress(ProcessLookupError):  # it has ended: another look
+                    os.kill(found[-1], signal.SIGKILL)
+                    killed.append(found[-1])
             time.sleep(0.005)
 
     killer = threading.Thread(target=kill, daemon=True)

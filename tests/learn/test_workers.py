@@ -18,7 +18,7 @@ import torch
 from clearway.children import ChildProcess
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
-from clearway.learn.crew import INTERFACE, launched
+from clearway.learn.crew import END_S, INTERFACE, launched
 from clearway.learn.presets import PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.workers import train_by_workers
@@ -75,7 +75,7 @@ def without_times(folder: RunFolder) -> list[dict[str, float]]:
 def test_workers_killed_again_and_again_learn_the_same_bits(tmp_path: Path) -> None:
     whole, killed = RunFolder(tmp_path / "whole"), RunFolder(tmp_path / "killed")
     undisturbed = started(whole.path)
-    _, errors = undisturbed.communicate(timeout=120)
+    _, errors = undisturbed.communicate(timeout=PATIENCE_S)
     assert undisturbed.returncode == 0 and not errors
 
     moments, process = random.Random(1), started(killed.path)
@@ -95,7 +95,7 @@ def test_workers_killed_again_and_again_learn_the_same_bits(tmp_path: Path) -> N
             process = started(killed.path)
         else:
             os.kill(moments.choice(workers), signal.SIGKILL)
-    _, errors = process.communicate(timeout=120)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, errors
     assert "Traceback" not in errors and "go on from the newest checkpoint" in errors
 
@@ -134,7 +134,7 @@ def test_a_worker_that_is_started_again_maps_the_same_features_and_learns_the_sa
         if len(found) == killed_workers.WORKERS:
             os.kill(workers[1], signal.SIGKILL)
             wait_until(lambda workers=workers: all(map(gone, workers)), process)
-    _, errors = process.communicate(timeout=120)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0 and "go on from the newest checkpoint" in errors, errors
     assert len(found) == 4 and found[1:] == found[:-1] and all(path.endswith("/features") for path in found[0])
     assert len(found[0]) == 1
@@ -213,7 +213,7 @@ def test_who_reads_for_long_is_waited_for_and_who_does_not_answer_is_not(
     tmp_path: Path, late: str, outcome: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(INTERFACE, raising=False)
-    seconds = {"reads_s": 0.0, "thinks_s": 0.0} | {late: 2.5 * LATE_AFTER_S}
+    seconds = {"reads_s": 0.0, "thinks_s": 0.0} | {late: 1.5 * LATE_AFTER_S}
     assert launched(OneIsLate(tmp_path, os.getpid(), 1, "cpu", {}, **seconds), 2)[1] == outcome
     assert INTERFACE not in os.environ
     elastic = [name for name in logging.root.manager.loggerDict if name.startswith("torch.distributed.elastic")]
@@ -241,7 +241,7 @@ def test_a_signal_to_all_leaves_a_run_that_one_worker_ends(tmp_path: Path, numbe
                     os.kill(pid, number)
             time.sleep(0.02)
         _, errors = process.communicate(timeout=PATIENCE_S)
-    assert time.monotonic() - told < 20
+    assert time.monotonic() - told < END_S / 2  # nobody had to be killed
     assert process.returncode == 130, errors
     assert errors.rstrip().endswith("interrupted") and "Traceback" not in errors
     assert len(workers) == 2 and all(map(gone, workers))

@@ -167,7 +167,7 @@ def test_processes_read_side_by_side(scenes: Path, monkeypatch: pytest.MonkeyPat
         for _ in range(2)
     ]
     expected = 3 * sum(int(looked_at(scene).sum()) for scene in clearway.load_scenes(scenes))
-    assert [int(process.communicate(timeout=60)[0]) for process in started] == [expected] * 2
+    assert [int(process.communicate(timeout=200)[0]) for process in started] == [expected] * 2
     assert kept_bytes() <= limit
 
 

@@ -183,7 +183,7 @@ def test_tries_are_not_multiplied(
 def test_files_of_a_folder_are_asked_about_together(tmp_path: Path) -> None:
     for number in range(4):
         (tmp_path / f"{number}.h5").write_bytes(b"there")
-    four = Barrier(4, timeout=1)
+    four = Barrier(4, timeout=60)
     handler = type("Four", (Meeting,), {"expected": four, "left": 4})
     with web_server(files_of(tmp_path, handler)) as address:
         assert [path.name for path in fetched([address], SUFFIXES)] == [f"{number}.h5" for number in range(4)]

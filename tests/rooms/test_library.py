@@ -123,7 +123,7 @@ def test_another_room_seed_version_or_source_is_another_scene(cache, monkeypatch
 def test_three_processes_that_ask_for_one_scene_build_it_once(cache, tmp_path):
     log = tmp_path / "log"
     builders = [start_builder(log, "built", seconds=1.0) for _ in range(3)]
-    answers = [builder.communicate(timeout=60)[0].strip() for builder in builders]
+    answers = [builder.communicate(timeout=200)[0].strip() for builder in builders]
     assert answers == [str(grid_scene(7).state_count)] * 3
     assert log.read_text().split().count("built") == 1
 

@@ -57,19 +57,19 @@ def test_an_answer_under_way_to_a_token_that_is_taken_back_is_not_sent(tmp_path:
     path = tmp_path / "tokens"
     path.touch(0o600)
     path.write_text(f"{OWNER} {TOKEN}\nguest {GUEST}\n")
-    with running(tokens=str(path), seconds=0.5) as service, service.client() as client:
+    with running(tokens=str(path), seconds=4.0) as service, service.client() as client:
         session = client.session()
         session.set_target(grey(1))
         address = f"ws://127.0.0.1:{service.port}/sessions/{session.session_id}/stream"
         with connect(address, additional_headers={"authorization": f"Bearer {TOKEN}"}) as stream:
             stream.send(grey(2))
-            time.sleep(0.1)
+            time.sleep(0.5)
             path.write_text(f"guest {GUEST}\n")
             service.process.send_signal(signal.SIGHUP)
             with pytest.raises(ConnectionClosed) as closed:
                 stream.recv(timeout=PATIENT_S)
             assert closed.value.rcvd is not None and closed.value.rcvd.code == 1008
-        time.sleep(0.6)
+        time.sleep(4.5)  # until its answer is there
         service.process.send_signal(signal.SIGTERM)
         err = service.process.communicate(timeout=PATIENT_S)[1]
         assert "Traceback" not in err and "a stream failed" not in err

@@ -29,7 +29,7 @@ Result = TypeVar("Result")
 PATIENT_S = 20  # for what must happen, on a busy machine
 NOISE = np.random.default_rng(0).integers(0, 256, (900, 1200, 3), np.uint8)
 HEAVY = picture_bytes(NOISE, "WEBP", quality=90, method=0)  # some 60 ms of processor time
-HASTY = Limits(decode_s=0.01, slow_decode_s=5)
+HASTY = Limits(decode_s=0.01, slow_decode_s=5, stall_s=PATIENT_S)
 
 
 def with_decoders(limits: Limits, task: Callable[[Decoders], Awaitable[Result]]) -> Result:
@@ -86,7 +86,7 @@ def test_a_picture_that_overruns_slowly_too_is_refused() -> None:
         assert decoders.replaced == 2
         assert (await decoders.decode(grey(7), OWNER, Standing())).max() == 7
 
-    with_decoders(Limits(decode_s=0.01, slow_decode_s=0.02), task)
+    with_decoders(Limits(decode_s=0.01, slow_decode_s=0.02, stall_s=PATIENT_S), task)
 
 
 def test_who_lets_pictures_overrun_in_ever_new_sessions_is_slow_in_all_but_proven_ones() -> None:
@@ -156,7 +156,7 @@ def test_a_stalled_decoder_is_noticed_ended_and_replaced() -> None:
         assert (await asked).max() == 9
         assert not decoders.stalled and not is_there(process) and process not in processes(decoders)
 
-    with_decoders(Limits(decode_s=0.1, stall_s=1.0), task)
+    with_decoders(Limits(decode_s=0.1, stall_s=3.0), task)
 
 
 def test_a_decoder_that_was_killed_meanwhile_costs_nobody_a_picture() -> None:

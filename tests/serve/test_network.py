@@ -246,11 +246,13 @@ def test_a_body_is_counted_while_it_is_held_and_no_longer(called) -> None:
 
 @pytest.mark.slow
 def test_it_ends_in_time_whatever_is_under_way_and_tells_who_waits() -> None:
-    with running(seconds=300, deadline_s=1.0, idle_s=60) as service, service.client() as client:
+    with running(seconds=300, deadline_s=5.0, idle_s=60) as service, service.client() as client:
         session = client.session()
         with pytest.raises(Exception, match="deadline_passed"):
             session.set_target(plain(1))
         begun = time.monotonic()
         service.process.send_signal(signal.SIGTERM)
         service.process.wait(timeout=PATIENT_S)
-        assert time.monotonic() - begun < 15  # 1 s for a request, 1 s and 3 s more; the rest is for a busy machine
+        assert (
+            time.monotonic() - begun < PATIENT_S
+        )  # 5 s for a request, 4 s more; the rest is for a busy machine

@@ -172,7 +172,7 @@ def run_until_metrics(folder: Path) -> tuple[subprocess.Popen, list[int]]:
         env=os.environ | {"PYTHONPATH": ":".join(sys.path)},
         start_new_session=True,
     )
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 200
     while len(workers := children_of(process.pid)) < 2 or not all(has_begun(pid) for pid in workers):
         assert process.poll() is None, process.stderr.read()
         assert time.monotonic() < deadline
@@ -200,7 +200,7 @@ def test_ctrl_c_in_a_terminal_leaves_a_run_that_can_be_resumed(tmp_path: Path) -
     process, workers = run_until_metrics(tmp_path)
     with process:
         os.killpg(process.pid, signal.SIGINT)  # a terminal signals all processes of the run
-        _, errors = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=200)
     assert process.returncode == -signal.SIGINT
     assert errors.count("Traceback") == 1, errors  # the parent's own
     assert are_gone_soon(workers)
