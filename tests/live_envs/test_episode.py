@@ -163,6 +163,16 @@ def test_a_seed_repeats_an_episode_with_its_perturbations(live):
     assert walked(4)[:3] != walked(5)[:3]
 
 
+def test_no_furniture_is_moved_to_where_a_target_between_two_cells_is(live):
+    episodes, target = Episodes(live, replace(RULES, perturbations=Perturbations(move_furniture=0.3))), (1.1, 0.75, 0.0)
+    begun = [episodes.begin(seed, target=target) for seed in range(12)]
+    assert {one.layout == episodes.as_built for one in begun} == {True, False}
+    for one in begun:
+        body = live.body(one.layout)
+        body.stand_at(np.array(target[:2]))
+        assert not body.touches
+
+
 def test_the_furniture_of_an_episode_is_moved_and_the_body_meets_it_there(live):
     moved = Perturbations(move_furniture=0.3)
     episodes = Episodes(live, replace(RULES, perturbations=moved))

@@ -253,6 +253,4 @@ def test_it_ends_in_time_whatever_is_under_way_and_tells_who_waits() -> None:
         begun = time.monotonic()
         service.process.send_signal(signal.SIGTERM)
         service.process.wait(timeout=PATIENT_S)
-        assert (
-            time.monotonic() - begun < PATIENT_S
-        )  # 5 s for a request, 4 s more; the rest is for a busy machine
+        assert time.monotonic() - begun < PATIENT_S  # 5 s for a request, 4 s more; the rest is for a busy machine

@@ -191,10 +191,18 @@ class Episodes:
         layout = self._layout(start_pose, target_pose, draws)
         body = last.walker.body if last and last.layout == layout else self._body(layout)
         walker = self._walker(body, start_pose, draws)
-        if body.touches:  # a piece was moved to where a start between two cells is
+        if body.touches or self._blocks(layout, target_pose):  # a piece was moved to where an end between two cells is
             layout = self.as_built
             walker = self._walker(self._body(layout), start_pose, draws)
         return LiveEpisode(walker, target_pose, layout, self.rules)
+
+    def _blocks(self, layout: Arrangement, pose: Pose) -> bool:
+        """Whether moved furniture stands where the body would."""
+        if layout == self.as_built:
+            return False
+        body = self._body(layout)
+        body.stand_at(np.array(pose[:2]))
+        return body.touches
 
     def _walker(self, body: Body, start: Pose, draws: Draws) -> Walker:
         rules = self.rules
