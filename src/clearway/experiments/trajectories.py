@@ -9,21 +9,25 @@ from clearway.experiments.groups import PAIR, Group
 from clearway.experiments.job import episodes_of, run_folder
 from clearway.experiments.section import ReportMap
 from clearway.experiments.setting import Setting
+from clearway.learn.checkpoint import checkpoints
 from clearway.learn.load import load_agent
 
 
 def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
     """For each learner and scene the longest episode that most of the first seed's agents of both rewards finish.
 
-    Learners of which one of the two runs is not complete are left out.
+    Learners are left out of which one of the two runs is not complete, or has no weights: records keep none.
     """
     found = []
     for learner in dict.fromkeys(group.learner for group in groups):
         own = [group for group in groups if group.learner == learner and group.runs[0].reward in PAIR]
         if any(episodes_of(setting.out, group.runs[0], group.trial) is None for group in own):
             continue
+        folders = {group.agent: run_folder(setting.out, group.runs[0]) for group in own}
+        if not all(checkpoints(folder.checkpoints) for folder in folders.values()):
+            continue
         world = setting.world()
-        agents = {group.agent: load_agent(run_folder(setting.out, group.runs[0]).path) for group in own}
+        agents = {agent: load_agent(folder.path) for agent, folder in folders.items()}
         for show in showcases(world, {name: agent.on_poses(world) for name, agent in agents.items()}):
             walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
             name = f"map_{learner.replace(', ', '_')}_{show.scene}"
