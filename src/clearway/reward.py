@@ -276,8 +276,6 @@ class Reward:
                 )
             if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < math.inf:
                 raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
-            if name.endswith("_m") and value <= 0:
-                raise RewardError(f"--{name.replace('_', '-')} is {value}, expected more than 0. Give a distance")
             kind = TERM_OF[name]
             terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
         changed = Reward(self.name, _in_order(terms), self.clip if clip is None else clip)

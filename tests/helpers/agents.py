@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.agents.agent import POSE, Agent, Decisions, Observation, State, joined, rows
+from clearway.agents.agent import LAST_ACTION, POSE, Agent, Decisions, Observation, State, joined, rows
 from clearway.agents.by_pose import PoseAgent, RandomWalk
 from clearway.scenes.actions import ACTION_COUNT, Action
 from clearway.world.world import World
@@ -219,3 +219,20 @@ class Spy(RandomWalk):
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         self.seen.append(observation)
         return super().act(observation, state)
+
+
+class Remembers:
+    """It would always move forward, and writes down what it holds to have done last."""
+
+    sees = (POSE,)
+
+    def __init__(self) -> None:
+        self.held: list[int] = []
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        return {LAST_ACTION: np.full(len(seed), -1)}
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        self.held += state[LAST_ACTION].tolist()
+        action = np.zeros(len(observation[POSE]), np.int64)
+        return Decisions(action), {LAST_ACTION: action}

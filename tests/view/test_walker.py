@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.agents.agent import LAST_ACTION, POSE, Agent, Decisions, Observation, State
+from clearway.agents.agent import POSE, Agent
 from clearway.agents.by_pose import PoseAgent, RandomWalk
 from clearway.agents.selection import ActionSelection, selecting
 from clearway.errors import AgentError
@@ -13,6 +13,7 @@ from clearway.reward import COLLISION_AWARE
 from clearway.view.episode import MOST_STEPS
 from clearway.view.walker import Walker
 from clearway.world.world import World
+from helpers.agents import Remembers
 from helpers.small_runs import corridor_world
 
 FORWARD, RIGHT, LEFT, BACKWARD = range(4)
@@ -154,29 +155,12 @@ def test_a_replayed_walk_goes_on_as_the_first_one_would_have() -> None:
     assert walk(walk([])[:5]) == walk([])
 
 
-class Remembering:
-    """Goes ahead, and keeps what it is told that it did last."""
-
-    sees = (POSE,)
-
-    def __init__(self) -> None:
-        self.told: list[int] = []
-
-    def reset(self, target: Observation, seed: np.ndarray) -> State:
-        return {LAST_ACTION: np.full(len(seed), -1)}
-
-    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
-        self.told.append(int(state[LAST_ACTION][0]))
-        action = np.full(len(observation[POSE]), FORWARD)
-        return Decisions(action), {LAST_ACTION: action}
-
-
 def test_an_agent_is_told_what_was_done_instead() -> None:
-    agent = Remembering()
+    agent = Remembers()
     walk = walker(0, agent, recorded=[RIGHT, LEFT])
     for _ in range(3):
         walk.step()
-    assert walk.actions == [RIGHT, LEFT, FORWARD] and agent.told == [-1, RIGHT, LEFT, FORWARD]
+    assert walk.actions == [RIGHT, LEFT, FORWARD] and agent.held == [-1, RIGHT, LEFT, FORWARD]
 
 
 def test_the_map_of_a_mind_asks_for_every_pose_as_a_start() -> None:

@@ -15,7 +15,7 @@ from clearway.errors import SceneError
 from clearway.rooms.groups import OBSTACLE_GROUP
 from clearway.rooms.navigation import find_grid
 from clearway.rooms.obstacles import AgentShape, CollisionRoom, copy_obstacle, obstacle_geoms
-from clearway.rooms.pieces import is_loose, loose_obstacles, numbered
+from clearway.rooms.pieces import is_loose, loose_obstacles, numbered, piece_count
 from clearway.scenes.scene import Scene
 
 NEW_RADIUS_M, NEW_HEIGHT_M = 0.15, 0.6
@@ -62,7 +62,7 @@ class ArrangedRoom:
 
 def as_built(room: CollisionRoom) -> Arrangement:
     """Nothing moved, nothing new."""
-    return Arrangement(((0.0, 0.0),) * len(set(numbered(loose_obstacles(room.spec)))))
+    return Arrangement(((0.0, 0.0),) * piece_count(room.spec))
 
 
 def arranged(room: CollisionRoom, layout: Arrangement) -> ArrangedRoom:

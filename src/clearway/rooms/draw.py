@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from clearway.rooms.groups import PIECE_NAME
 from clearway.rooms.meshes import rectangle
 from clearway.rooms.parts import Part
-from clearway.rooms.pieces import BODY_NAME, FIXED
+from clearway.rooms.pieces import FIXED
 from clearway.rooms.room import Room
 from clearway.rooms.spec import add_mesh_geom, add_texture
 from clearway.rooms.surfaces import Surface
@@ -78,7 +79,7 @@ def draw_parts(
     alike: dict[tuple, list[int]] = defaultdict(list)
     bodies = {FIXED: room.spec.worldbody}
     for piece in range(piece_count):
-        bodies[piece] = room.spec.worldbody.add_body(name=f"{BODY_NAME} {piece}", mocap=True)
+        bodies[piece] = room.spec.worldbody.add_body(name=f"{PIECE_NAME} {piece}", mocap=True)
     for number, (part, bright) in enumerate(zip(parts, brightness, strict=True)):
         step = round(bright.mean() / BRIGHTNESS_STEP) if room.is_opaque(part.material) else -number - 1
         alike[part.material, part.group, step].append(number)
@@ -92,7 +93,7 @@ def draw_parts(
             together[int(pieces[number]), *_block_of(parts[number], room.detail.block_m)].append(parts[number])
         for (piece, *block), some in sorted(together.items(), key=lambda item: item[0]):
             name = " ".join(map(str, ["furniture", serial, *block]))
-            name = name if piece == FIXED else f"{name} of {BODY_NAME} {piece}"
+            name = name if piece == FIXED else f"{name} of {PIECE_NAME} {piece}"
             add_mesh_geom(room.spec, name, _merged(some), material, group, bodies[piece]).rgba[:] = rgba
 
 

@@ -5,4 +5,4 @@ SEEN_GROUP = 2  # everything else that one sees
 OBSTACLE_GROUP = 3  # the shapes that the agent collides with, never seen
 
 SHELL_NAME = "shell"  # the names of obstacles that belong to the building begin with this
-PIECE_NAME = "piece"  # obstacles of one piece of furniture are called so, with its number and their own
+PIECE_NAME = "piece"  # what belongs to one piece of furniture is called so, with its number

@@ -18,7 +18,7 @@ from clearway.rooms.detail import Detail
 from clearway.rooms.draw import draw_parts, draw_surface
 from clearway.rooms.occupancy import VOXEL_M, Occupancy, occupancy_of
 from clearway.rooms.parts import Lamp, Part, Window
-from clearway.rooms.pieces import loose_obstacles, numbered, pieces_of_parts
+from clearway.rooms.pieces import loose_obstacles, piece_count, pieces_of_parts
 from clearway.rooms.room import Room
 from clearway.rooms.surfaces import Surface
 
@@ -85,7 +85,7 @@ def bake(room: Room, *, count_hidden: bool = True, loose: bool = False) -> None:
     brightness[[not room.is_shaded(part.material) for part in shown_parts]] = 1.0
     obstacles = loose_obstacles(room.spec) if loose else []
     pieces = pieces_of_parts(obstacles, shown_parts, (room.width_m, room.depth_m))
-    draw_parts(room, shown_parts, brightness, pieces, len(set(numbered(obstacles))))
+    draw_parts(room, shown_parts, brightness, pieces, piece_count(room.spec) if loose else 0)
     _add_lights(room)
 
 

@@ -22,7 +22,6 @@ OVERHANG_M = 0.12  # how far a part's middle may lie outside the footprint: leav
 GAP_M = 0.03  # between a part and what it stands on
 AT_WALL_M = 0.06  # a part so near to a wall, higher than the piece, hangs on the wall
 FIXED = -1
-BODY_NAME = "piece"
 
 
 def loose_obstacles(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
@@ -35,6 +34,11 @@ def numbered(obstacles: Sequence[mujoco.MjsGeom]) -> list[int]:
     names = [geom.name.partition("/")[0] or number for number, geom in enumerate(obstacles)]
     order = {name: number for number, name in enumerate(dict.fromkeys(names))}
     return [order[name] for name in names]
+
+
+def piece_count(spec: mujoco.MjSpec) -> int:
+    """How many pieces of a room can be moved."""
+    return len(set(numbered(loose_obstacles(spec))))
 
 
 def is_loose(geom: mujoco.MjsGeom) -> bool:
