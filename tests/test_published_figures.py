@@ -11,15 +11,15 @@ import pytest
 
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
-from helpers.published import DOCS, expect, numbers
+from helpers.published import DOCS, assert_written, numbers
 
 AGENTS = r"collision-aware|dearer|shuffled|shortest"
 
 
 def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
-    expect("93.3", 93.34, "near")
+    assert_written("93.3", 93.34, "near")
     with pytest.raises(AssertionError, match=r"written 93\.3, recorded 93\.36"):
-        expect("93.3", 93.36, "far")
+        assert_written("93.3", 93.36, "far")
 
 
 @pytest.mark.slow
@@ -43,11 +43,11 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
         (row,) = [row for row in rows if row["agent"] == agent.strip() and row["frames"] == count]
         if numbers(shortest):
             least, *most = (float(end.rstrip("%")) for end in row["shortest ways"].split(" to "))
-            expect(numbers(shortest)[0], least, "least")
-            expect(numbers(shortest)[-1], most[0], "most")
+            assert_written(numbers(shortest)[0], least, "least")
+            assert_written(numbers(shortest)[-1], most[0], "most")
         for cell, name in ((steps, "steps"), (collisions, "collisions")):
             mean, *interval = numbers(cell)
-            expect(mean, row[name], f"{name} after {count} frames")
+            assert_written(mean, row[name], f"{name} after {count} frames")
             recorded = numbers(str(row[f"95 % of {name}"]))
             assert not interval or [*map(float, interval)] == [*map(float, recorded)]
     verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
@@ -73,7 +73,7 @@ def check_zones_of_cells(section: Section) -> None:
             (cells[3], bumps["average"], bumps["95 %"]),
         ):
             mean, low, high = numbers(cell)[:3]
-            expect(mean, float(value), agent)
+            assert_written(mean, float(value), agent)
             assert [float(low), float(high)] == [
                 pytest.approx(float(end.replace(",", "")), rel=0.01) for end in interval.split(" to ")
             ]
@@ -112,7 +112,7 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         (line,) = [line for line in lines if line.startswith(begin)]
         _, frames, settled = line.strip("|").split("|")
         mean, *interval = numbers(frames.replace(",", ""))
-        expect(mean, rows[agent]["frames"], agent)
+        assert_written(mean, rows[agent]["frames"], agent)
         assert interval == numbers(str(rows[agent]["95 %"]).replace(",", ""))
         assert int(settled.split()[0]) == rows[agent]["settled"]
     evidence = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones, or a larger step?")[2]
@@ -148,8 +148,8 @@ def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> 
         (line,) = [line for line in page.splitlines() if line.startswith(begin)]
         steps, collisions, failed = line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
         episodes = {name: np.array(column) for name, column in content["episodes"].items()}
-        expect(steps, episodes["steps"].mean(), begin)
-        expect(collisions, episodes["collisions"].mean(), begin)
+        assert_written(steps, episodes["steps"].mean(), begin)
+        assert_written(collisions, episodes["collisions"].mean(), begin)
         assert failed == f"{len(set(episodes['target'][~episodes['reached'].astype(bool)].tolist()))} of 20"
 
 
@@ -172,7 +172,7 @@ def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
             written = line.removeprefix(begin).strip(" |").split(" | ")
             for cell, value, interval in zip(written, (steps, collisions), (between, between_collisions), strict=False):
                 mean, _, low_to_high = cell.replace(",", "").partition(" ")
-                expect(mean, value, begin)
+                assert_written(mean, value, begin)
                 assert low_to_high == f"({interval.replace(',', '').replace(' to ', '-')})", begin
             assert written[2] == failed
             compared += 1
@@ -248,7 +248,7 @@ def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> 
         )
         for text, row, name in zip(shown, (steps, collisions, settled), ("average", "average", "frames"), strict=True):
             mean, *interval = numbers(text.replace(",", "").replace("-", " "))
-            expect(mean, row[name], begin)
+            assert_written(mean, row[name], begin)
             assert interval == numbers(str(row["95 %"]).replace(",", ""))
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["undecided"] * 6
@@ -278,8 +278,8 @@ def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:
     ]
     for cell, values in zip(line.strip("|").split("|")[1:], [*columns, solved, first], strict=True):
         least, most = numbers(cell)
-        expect(least, min(values), cell)
-        expect(most, max(values), cell)
+        assert_written(least, min(values), cell)
+        assert_written(most, max(values), cell)
     for one in sets:
         for run in one["seeds"]:
             rows = run["evaluation"]["targets"]
@@ -300,8 +300,8 @@ def test_other_encoders_and_rooms_meet_the_criteria_as_their_record_says() -> No
         cells = line.strip("|").split("|")[2:]
         for cell, figure in zip(cells, ("path_ratio", "worst_path_ratio", "collisions"), strict=True):
             least, most = numbers(cell)
-            expect(least, min(run[figure] for run in runs), cell)
-            expect(most, max(run[figure] for run in runs), cell)
+            assert_written(least, min(run[figure] for run in runs), cell)
+            assert_written(most, max(run[figure] for run in runs), cell)
         for run in runs:
             rows = run["evaluation"]["targets"]
             assert run["collisions"] == pytest.approx(sum(row["collisions"] for row in rows) / len(rows))
@@ -317,9 +317,9 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
         *shown, told, told_of_both = line.replace(",", "").strip("| ").split("|")[1:]
         for cell, runs in zip(shown, values, strict=True):
             for number, value in zip(numbers(cell), (runs.mean(), runs.min(), runs.max()), strict=True):
-                expect(number, value, cell)
-        expect(told.strip(), p, line)
-        expect(told_of_both.strip(), corrected, line)
+                assert_written(number, value, cell)
+        assert_written(told.strip(), p, line)
+        assert_written(told_of_both.strip(), corrected, line)
         assert corrected < 0.05
     lines = [line.strip("| ").split(" | ") for line in part.splitlines()]
     (ratios,) = [cells[1:3] for cells in lines if cells[0].startswith("steps, x the shortest path (not asked)")]
@@ -329,7 +329,7 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
         for number, value in zip(
             numbers(ratio), [f([run["path_ratio"] for run in runs]) for f in (min, max)], strict=True
         ):
-            expect(number, value, ratio)
+            assert_written(number, value, ratio)
         assert count == f"{sum(run['met']['all'] for run in runs)} of {len(runs)}"
     worst = max(run["worst_path_ratio"] for run in records[1]["seeds"])
     assert f"ends with a target {100 * (worst - 1):.1f} % above" in part

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
-from helpers.published import DOCS, expect, numbers
+from helpers.published import DOCS, assert_written, numbers
 
 PAGE = "".join((DOCS / page).read_text(encoding="utf-8") for page in ("seeing.md", "evidence.md"))
 COLUMNS = ("success", "success_4x", "spl", "collisions")
@@ -96,12 +96,12 @@ def test_a_row_of_the_page_is_what_the_record_comes_to(record: str, part: str, a
         for name, cell in zip(COLUMNS, cells, strict=False):
             values = np.array([scene[name] for scene in scenes]) * (100 if name in SHARES else 1)
             mean, *interval = numbers(cell)
-            expect(mean, float(values.mean()), f"{name} in {row}")
+            assert_written(mean, float(values.mean()), f"{name} in {row}")
             for written, value in zip(interval, ends(values), strict=bool(interval)):
-                expect(written, value, f"interval of {name} in {row}")
+                assert_written(written, value, f"interval of {name} in {row}")
         for name, written in zip(ARRIVALS, numbers("".join(cells[len(COLUMNS) :])), strict=False):
             told = np.array([scene[name] for scene in scenes], float)  # NaN where no episode ended at a target
-            expect(written, 100 * float(np.nanmean(told)), f"{name} in {row}")
+            assert_written(written, 100 * float(np.nanmean(told)), f"{name} in {row}")
 
 
 def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_said() -> None:
@@ -113,7 +113,7 @@ def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_sai
     assert said is not None
     apart = 100 * (spl[0] - spl[1])
     for written, value in zip(said.groups(), (apart.mean(), *ends(apart)), strict=True):
-        expect(written, float(value), said[0])
+        assert_written(written, float(value), said[0])
 
 
 def mean(record: str, part: str | None, agents: tuple[str, ...], name: str) -> float:
@@ -169,7 +169,9 @@ def test_the_summary_says_what_the_records_say(
     (line,) = [line for line in PAGE.splitlines() if line.startswith(begins)]
     reached = re.sub(r"\(.*?\)", "", line.split("|")[4])
     for (record, part, agents, name), written in zip(figures, numbers(reached), strict=True):
-        expect(written, mean(record, part, agents, name) * (100 if name in SHARES else 1), f"{name} in {begins}")
+        assert_written(
+            written, mean(record, part, agents, name) * (100 if name in SHARES else 1), f"{name} in {begins}"
+        )
 
 
 def test_the_summary_says_how_it_goes_off_the_grid() -> None:
@@ -179,22 +181,22 @@ def test_the_summary_says_how_it_goes_off_the_grid() -> None:
     )
     (line,) = [line for line in PAGE.splitlines() if line.startswith("| off the grid, success in 500 steps, of")]
     for written, value in zip(numbers(line.split("|")[4]), (alone, together), strict=True):
-        expect(written, 100 * value, line)
+        assert_written(written, 100 * value, line)
     said = re.search(r"within four times the shortest path it is (\d+) % of what it is with nothing", PAGE, re.I)
     assert said is not None
     parts = [mean(SIXTH, part, THE, "success_4x") for part in ("rooms-perturbed", "rooms")]
-    expect(said[1], 100 * parts[0] / parts[1], said[0])
+    assert_written(said[1], 100 * parts[0] / parts[1], said[0])
     said = re.search(r"all at once leaves (\d+) %, turns (\d+) %, moves (\d+) %", PAGE)
     assert said is not None
     for written, part in zip(said.groups(), (ALL, TURNS, MOVES), strict=True):
         share = mean(SIXTH, part, THE, "success_4x") / mean(SIXTH, UNPERTURBED, THE, "success_4x")
-        expect(written, 100 * share, said[0])
+        assert_written(written, 100 * share, said[0])
     building = (DOCS / "building.md").read_text(encoding="utf-8")
     said = re.search(r"in (\d+) to (\d+) % of\s+episodes, by what is perturbed", building)
     assert said is not None
     false = [mean(SIXTH, part, THE, "false_arrivals") for part in (UNPERTURBED, *ALONE, OBSTACLE, ALL)]
     for written, value in zip(said.groups(), (min(false), max(false)), strict=True):
-        expect(written, 100 * value, said[0])
+        assert_written(written, 100 * value, said[0])
 
 
 def test_walkers_and_the_generalist_are_compared_in_the_same_rooms() -> None:
@@ -219,7 +221,7 @@ def test_walkers_and_the_generalist_are_compared_in_the_same_rooms() -> None:
     (fewer, more), (spl, their_spl) = found["collisions"], found["spl"]
     values = (fewer.mean(), 100 * spl.mean(), more.mean(), 100 * their_spl.mean(), (more - fewer).mean())
     for written, value in zip(said.groups(), (*values, *ends(more - fewer)), strict=True):
-        expect(written, float(value), said[0])
+        assert_written(written, float(value), said[0])
 
 
 def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
@@ -230,7 +232,7 @@ def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
     said = re.search(r"spares (\S+) collisions an\s+episode \((\S+) to ([\d.]+)\)", PAGE)
     assert said is not None
     for written, value in zip(said.groups(), ((careless - careful).mean(), *ends(careless - careful)), strict=True):
-        expect(written, float(value), said[0])
+        assert_written(written, float(value), said[0])
 
 
 def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -244,25 +246,25 @@ def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch
     by_seed = re.search(r"by seed it is (\S+), (\S+) and (\S+): almost all", PAGE)
     assert by_seed is not None
     for written, value in zip(by_seed.groups(), aware.by_seed.mean(axis=1), strict=True):
-        expect(written, float(value), by_seed[0])
+        assert_written(written, float(value), by_seed[0])
     said = re.search(r"has (\S+) collisions fewer than `shortest` \((\S+) to (\S+), p = (\S+) for three", PAGE)
     other = re.search(r"With\s+seeds drawn anew, too, it is (\S+) to ([\d.]+)\.", PAGE)
     assert said is not None and other is not None
     rooms = aware.by_seed.mean(axis=0)
     values = (rooms.mean(), *ends(rooms), aware.p, *aware.other_seeds)
     for written, value in zip((*said.groups(), *other.groups()), values, strict=True):
-        expect(written, float(value), said[0])
+        assert_written(written, float(value), said[0])
     (spl,) = judged(record, "spl", [("collision-aware", "shortest")])
     said = re.search(r"SPL differs by (\S+) points \((\S+) to ([\d.]+)\)", PAGE)
     assert said is not None and not spl.holds
     rooms = 100 * spl.by_seed.mean(axis=0)
     for written, value in zip(said.groups(), (rooms.mean(), *ends(rooms)), strict=True):
-        expect(written, float(value), said[0])
+        assert_written(written, float(value), said[0])
     (again,) = judged(record, "collisions", [("collision-aware-again", "collision-aware")])
     said = re.search(r"spares (\S+) collisions \((\S+) to ([\d.]+)\): twelve of thirteen", PAGE)
     assert again.holds and said is not None
     for written, value in zip(said.groups(), (again.by_seed.mean(), *ends(again.by_seed.mean(axis=0))), strict=True):
-        expect(written, float(value), said[0])
+        assert_written(written, float(value), said[0])
 
 
 def test_agents_of_perturbed_pictures_walk_as_their_record_says() -> None:
@@ -278,7 +280,7 @@ def test_agents_of_perturbed_pictures_walk_as_their_record_says() -> None:
             values = [scale * found["figures"][f"{kind}-{seed}"][seen][name] for seed in range(3)]
             written = numbers(cell)
             for number, value in zip(written, (np.mean(values), min(values), max(values)), strict=len(written) > 1):
-                expect(number, float(value), f"{name} of {kind}, {seen}")
+                assert_written(number, float(value), f"{name} of {kind}, {seen}")
     runs = found["runs"]
     took = [[runs[f"{kind}-{seed}"]["seconds"] for seed in range(3)] for kind in ("own", "perturbed")]
     told = [f"{min(seconds)} to {max(seconds)} s" for seconds in took]

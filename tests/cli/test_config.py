@@ -96,14 +96,14 @@ def test_single_settings_of_the_command_line_come_after_those_of_the_file(config
 )
 def test_a_fault_is_one_line_with_file_and_key(clearway, config, text, told):
     path = config(text)
-    clearway("train", "x.h5", "--config", path).refusal(f"{path}: ", told)
+    assert clearway("train", "x.h5", "--config", path).refusal(f"{path}: ", told)
 
 
 def test_faults_of_the_option_itself(clearway, config, tmp_path):
-    clearway("train", "x.h5", "--config").refusal("--config: expected a file")
-    clearway("train", "--config", tmp_path / "none.yaml").refusal("none.yaml: not readable")
-    clearway("train", "--config", config("seed: 1"), "--config=b").refusal("--config: given twice")
-    clearway("train", "x.h5", "--confg", "a").refusal("Did you mean --config?")
+    assert clearway("train", "x.h5", "--config").refusal("--config: expected a file")
+    assert clearway("train", "--config", tmp_path / "none.yaml").refusal("none.yaml: not readable")
+    assert clearway("train", "--config", config("seed: 1"), "--config=b").refusal("--config: given twice")
+    assert clearway("train", "x.h5", "--confg", "a").refusal("Did you mean --config?")
 
 
 def same(one: Path, other: Path) -> bool:

@@ -118,7 +118,7 @@ def test_one_port_at_two_addresses_is_not_for_health_too(clearway, monkeypatch, 
     with socket.create_server(("127.0.0.2", 0)) as free:
         port = free.getsockname()[1]
     both = ("--host", "127.0.0.2", "--port", port, "--health-port", port)
-    clearway("serve", "x.onnx", *both).refusal(f"--health-port is {port}, as --port is")
+    assert clearway("serve", "x.onnx", *both).refusal(f"--health-port is {port}, as --port is")
 
 
 def test_a_file_that_says_nothing_of_arrivals_is_told_of(clearway, monkeypatch, served):

@@ -4,7 +4,7 @@ import pytest
 
 from clearway.deploy.from_run import RunAgent
 from clearway.deploy.navigator import open_agent
-from helpers.session_records import goes_on_to_the_bit
+from helpers.session_records import assert_goes_on_to_the_bit
 
 
 @pytest.mark.parametrize("kind", ["a run", "its file", "the generalist", "the generalist's file"])
@@ -15,4 +15,4 @@ def test_a_state_goes_on_to_the_bit_after_a_round_trip(kind, deployed, one_file)
         "the generalist": lambda: one_file.torch,
         "the generalist's file": lambda: open_agent(one_file.path),
     }
-    goes_on_to_the_bit(agents[kind]())
+    assert_goes_on_to_the_bit(agents[kind]())

@@ -11,7 +11,7 @@ def numbers(cell: str) -> list[str]:
     return re.findall(r"\d+(?:\.\d+)?", cell)
 
 
-def expect(written: str, value: float, what: str) -> None:
+def assert_written(written: str, value: float, what: str) -> None:
     """A figure is written to its last digit."""
     digits = len(written.partition(".")[2])
     assert abs(float(written) - value) <= 0.5001 * 10**-digits, f"{what}: written {written}, recorded {value}"

@@ -25,7 +25,7 @@ def walked(agent: DeployedAgent) -> tuple[Progress, np.ndarray]:
     return Progress(1, STEPS, state, b"seen", answer), pictures[-1]
 
 
-def goes_on_to_the_bit(agent: DeployedAgent) -> None:
+def assert_goes_on_to_the_bit(agent: DeployedAgent) -> None:
     """Assert that an agent remembers, and decides, the same after its state was bytes."""
     progress, seen = walked(agent)
     session, shapes = new_session("robot", "sampled", None, 0.0), shapes_of(begun_state(agent))

@@ -202,15 +202,15 @@ def test_a_generated_flat_and_a_model_are_rooms_as_others(places: dict[str, str]
         np.testing.assert_array_equal(reward, same)
     apart.close()
     together.close()
-    _check_that_sb3_learns(places[place])
+    _assert_sb3_learns(places[place])
 
 
 @pytest.mark.slow
 def test_sb3_learns_from_it(live) -> None:
-    _check_that_sb3_learns(live)
+    _assert_sb3_learns(live)
 
 
-def _check_that_sb3_learns(room) -> None:
+def _assert_sb3_learns(room) -> None:
     pytest.importorskip("stable_baselines3")
     from stable_baselines3 import PPO
 

@@ -19,7 +19,7 @@ from clearway.serve.sessions import begun_state, new_session
 from clearway.serve.shared_sessions import SharedSessions
 from helpers.agents import equal
 from helpers.serving import OWNER, TOKENS, grey
-from helpers.session_records import KEY, goes_on_to_the_bit, walked
+from helpers.session_records import KEY, walked
 from helpers.sums import Sums
 
 SHAPES = shapes_of(begun_state(Sums()))
@@ -60,7 +60,7 @@ async def cancelled_once(begun: threading.Event, task: asyncio.Task) -> None:
 
 
 def test_a_state_goes_on_to_the_bit_after_a_round_trip() -> None:
-    goes_on_to_the_bit(Sums())
+    assert_goes_on_to_the_bit(Sums())
 
 
 def test_what_was_altered_is_refused() -> None:
