@@ -152,7 +152,7 @@ UNPERTURBED, OBSTACLE, ALL = "live: none", "live: new obstacle", "live: all, str
             "| rooms after a tour:",
             [(TOURS, "rooms-perturbed-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
         ),
-        ("| known rooms,", [(TOURS, "held-out-perturbed-tour", THE, name) for name in ("success_4x", "spl")]),
+        ("| known rooms after", [(TOURS, "held-out-perturbed-tour", THE, name) for name in ("success_4x", "spl")]),
         ("| flats, no tour:", [(FIFTH, "flats", THE, name) for name in ("success", "spl")]),
         ("| flats after a tour,", [(THIRD, "flats-tour", THE, name) for name in ("success", "spl")]),
         ("| off the grid, a new obstacle:", [(SIXTH, OBSTACLE, THE, "success")]),

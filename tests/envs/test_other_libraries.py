@@ -73,7 +73,7 @@ def test_sb3_gets_what_the_vector_environment_gives(sb3) -> None:
 
 def test_sb3_s_spaces_are_a_single_environment_s(sb3) -> None:
     made = ImageGoalVectorEnv(corridor_scene(4), num_envs=2, max_episode_steps=1)
-    with pytest.raises(EnvError, match=r"reset in a step of its own\. Make them with autoreset_mode='SameStep'"):
+    with pytest.raises(EnvError, match=r"a step of their own\. Make them with autoreset_mode='SameStep'"):
         sb3.SB3VecEnv(made)
     made = ImageGoalVectorEnv(corridor_scene(4), num_envs=2, autoreset_mode="SameStep")
     for settings, told in (({"num_envs": 7}, "num_envs=7"), ({"reward": "nonsense"}, "reward")):

@@ -22,7 +22,7 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
         == f"{len(jobs)} runs, {len(jobs)} to be trained, 2 at a time: 1 h 00 min of training here at least"
     )
     on_cluster = told_time(jobs, jobs, None, 1)
-    assert on_cluster.endswith("to be trained, one after the other: 2 h 00 min of training here at least")
+    assert on_cluster.endswith("to be trained, one after the other: 2 h 00 min of training here")
     assert told_time(jobs, [], 2, 1) == f"{len(jobs)} runs, 0 to be trained: all is there"
     slow = [replace(jobs[0], run=replace(jobs[0].run, learner=PAPER_A3C)), *jobs]
     assert told_time(slow, slow, 1, 1).endswith("of training here at least, and 1 of A3C, whose time is not known")

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from clearway.errors import SceneError
-from clearway.importers.avd import read_avd
-from clearway.scenes.actions import Action
+from clearway.importers.avd import _laid_out, read_avd
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.scenes.validate import SceneWarning, pose_quirks
 from clearway.zones import Zone, scene_zones
@@ -87,6 +87,17 @@ def test_a_part_that_nothing_leads_to_stands_to_the_right_of_the_others(tmp_path
     first, second = (scene.locations_m[scene.components == part] for part in (0, 1))
     assert len(first) == 24 and len(second) == 12
     assert second[:, 0].min() > first[:, 0].max()
+
+
+def test_a_part_that_grows_to_the_left_meets_no_other() -> None:
+    graph = np.full((4 * 4, 4), BLOCKED)  # one location, then three in a row whose rightmost comes first
+    for right in (1, 2):
+        graph[4 * right + 1, Action.MOVE_BACKWARD], graph[4 * (right + 1) + 1, Action.MOVE_FORWARD] = (
+            4 * (right + 1) + 1,
+            4 * right + 1,
+        )
+    cells, _ = _laid_out(graph, 4)
+    assert cells[:, 0].round(6).tolist() == [0, 5, 4, 3] and np.allclose(cells[:, 1], 0)
 
 
 def test_the_scene_survives_its_file(tmp_path: Path) -> None:

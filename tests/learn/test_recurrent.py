@@ -182,13 +182,14 @@ def test_scenes_of_another_encoder_are_refused():
 
 def test_pictures_of_another_aspect_are_warned_of_in_training_and_after_it(tmp_path: Path):
     wide = grid_scene(1, width=4, depth=3, picture_size=(9, 16), name="wide")
-    (seen,) = seen_by_eyes(tmp_path / "eyes", wide)
+    seen, other = seen_by_eyes(tmp_path / "eyes", wide, replace(wide, name="other"))
     record: Any = None  # it is not asked
     network, pairs = RecurrentActorCritic(RecurrentShape(4, 8)), SeenPairs(small_eyes())
     with pytest.warns(AspectWarning, match=r"scene wide: .* Crop them to 12 x 9"):
         TrainedRecurrent(record, network, pairs, 0).seen([wide])
-    with pytest.warns(AspectWarning, match="scene wide"), pytest.raises(RunError, match="not a folder"):
-        clearway.train(seen, algorithm=LEARNER, out=Path(__file__))
+    with pytest.warns(AspectWarning) as told, pytest.raises(RunError, match="not a folder"):
+        clearway.train([seen, other], algorithm=LEARNER, out=Path(__file__))
+    assert [str(one.message).partition(":")[0] for one in told] == ["scene wide and 1 more"]
 
 
 @pytest.mark.parametrize("name", ["taught", "teacher_share"])

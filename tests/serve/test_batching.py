@@ -192,7 +192,7 @@ def test_who_has_given_up_takes_no_place_among_those_that_wait() -> None:
         for other in others:
             other.cancel()
         await asyncio.sleep(0)
-        assert batcher.waiting == 0
+        assert batcher.waiting == len(batcher._waiting) == 0
         last = asyncio.create_task(batcher.act(OWNER, plain(1), BEGUN))
         await asyncio.sleep(0)
         going_on.set()

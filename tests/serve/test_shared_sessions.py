@@ -19,7 +19,7 @@ from clearway.serve.sessions import begun_state, new_session
 from clearway.serve.shared_sessions import SharedSessions
 from helpers.agents import equal
 from helpers.serving import OWNER, TOKENS, grey
-from helpers.session_records import KEY, walked
+from helpers.session_records import KEY, assert_goes_on_to_the_bit, walked
 from helpers.sums import Sums
 
 SHAPES = shapes_of(begun_state(Sums()))

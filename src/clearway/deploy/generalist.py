@@ -11,7 +11,7 @@ import numpy as np
 
 from clearway.agents.agent import Agent, Decisions, Observation, State
 from clearway.agents.exploring import Explorer
-from clearway.agents.generalist import Generalist
+from clearway.agents.generalist import STEPS_M, Generalist
 from clearway.agents.tour_map import map_of
 from clearway.choices import GENERALIST
 from clearway.deploy.card import ANY_ROOM, EXPORT_AGAIN, Card
@@ -28,7 +28,7 @@ from clearway.scenes.sensors import rgb
 from clearway.version import __version__
 
 MOST = 1e6  # of a setting
-BOUNDS = {"step_m": (0.1, 2.0), "side_m": (1.0, 60.0), "compared": (1, 1000), "arrived": (0.0, 1.0)}
+BOUNDS = {"step_m": STEPS_M, "side_m": (1.0, 60.0), "compared": (1, 1000), "arrived": (0.0, 1.0)}
 TOUR_PICTURES = 500  # that a tour keeps; further ones tell of cells, and are forgotten
 
 

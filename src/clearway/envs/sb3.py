@@ -121,7 +121,9 @@ def _made(scenes: Any, num_envs: int, **settings: Any) -> Any:
         given = ", ".join(settings) or f"num_envs={num_envs}"
         raise EnvError(f"{given}: these environments are made already. Leave that out, or give scenes")
     if scenes.metadata.get("autoreset_mode") is not AutoresetMode.SAME_STEP:
-        raise EnvError("these environments reset in a step of its own. Make them with autoreset_mode='SameStep'")
+        raise EnvError(
+            "these environments begin episodes in a step of their own. Make them with autoreset_mode='SameStep'"
+        )
     return scenes
 
 

@@ -21,7 +21,8 @@ def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int | None, thr
     """How many runs are to be trained, and for how long at least, in a line.
 
     Runs side by side are held for as fast as one alone; so many share memory and caches, and take longer.
-    Where nobody knows how many there will be (`workers` None, on a Ray cluster), they are told one after the other.
+    Where nobody knows how many there will be (`workers` None, on a Ray cluster), it is the time of all of them, one
+    after the other.
     """
     counted = f"{len(jobs)} runs, {len(left)} to be trained"
     if not left:
@@ -36,10 +37,10 @@ def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int | None, thr
         seconds += run.learner.frames / speeds[kind]
         longest = max(longest, run.learner.frames / speeds[kind])
     beside = min(workers or 1, len(left))
-    how = f"{beside} at a time" if workers else "one after the other"
+    how, least = (f"{beside} at a time", " at least") if workers else ("one after the other", "")
     unknown = len(left) - len(known)
     more = f", and {unknown} of A3C, whose time is not known" if unknown else ""
-    return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here at least{more}"
+    return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}{more}"
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:

@@ -80,7 +80,7 @@ def _judged(
     target_scene: np.ndarray,
     *,
     more: bool = False,
-    allowed: float | None = None,
+    allowed: float = 0.0,
 ) -> Claim:
     if not len(first) or not len(second):
         return Claim(text, "undecided", "No complete runs.")
@@ -98,14 +98,13 @@ def _judged(
     )
     if min(len(first), len(second)) < LEAST_RUNS:
         return Claim(text, "undecided", f"{evidence} Fewer than {LEAST_RUNS} seeds decide nothing.", numbers)
-    p = permutation_p(first, second, target_scene, allowed or 0.0)
+    p = permutation_p(first, second, target_scene, allowed)
     return Claim(text, _side(-found if more else found, allowed), evidence, numbers, p=p)
 
 
-def _side(found: Estimate, allowed: float | None) -> Verdict:
-    """Of a difference that is to lie below 0; or at `allowed` at most."""
+def _side(found: Estimate, allowed: float) -> Verdict:
     assert found.interval is not None  # there are several runs
     low, high = found.interval
-    if allowed is None:
+    if allowed == 0:
         return "holds" if high < 0 else "does not hold" if low > 0 else "undecided"
     return "holds" if high <= allowed else "does not hold" if low > allowed else "undecided"

@@ -137,8 +137,7 @@ def _laid_out(graph: np.ndarray, heading_count: int) -> tuple[np.ndarray, np.nda
     for first in range(count):
         if placed[first]:
             continue
-        if placed.any():  # a part that nothing leads to stands to the right of the others
-            cells[first] = cells[placed, 0].max() + 3, 0
+        before = placed.copy()
         placed[first] = True
         queue = deque([first])
         while queue:
@@ -154,6 +153,8 @@ def _laid_out(graph: np.ndarray, heading_count: int) -> tuple[np.ndarray, np.nda
                         shifts[there] = (heading - end % heading_count) % heading_count
                         cells[there] = cells[here] + sign * np.array([np.sin(turn), np.cos(turn)])
                         queue.append(there)
+        if before.any():  # a part that nothing leads to stands to the right of the others
+            cells[placed & ~before, 0] += cells[before, 0].max() + 3 - cells[placed & ~before, 0].min()
     return cells, shifts
 
 

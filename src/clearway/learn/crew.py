@@ -239,7 +239,7 @@ def work(task: Task) -> str | None:
         _leave(LOST)  # without a word: the agent starts all again
     if outcome == INTERRUPTED:
         _leave(ENDED)  # the agent, which told it to end, takes no answer, and one that has one to give would wait
-    atexit.register(_leave, 0)
+    atexit.register(_leave, 0)  # whatever comes after: the agent, which takes the outcome, asks for nothing else
     return outcome
 
 

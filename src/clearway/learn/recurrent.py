@@ -11,6 +11,7 @@ the frames are PPO's (Schulman et al., 2017) with the same memory.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
@@ -84,7 +85,9 @@ class Recurrent(Learner):
                 raise RunError(f"{name} is {getattr(self, name)}, expected 0 to 1. Give a value in that range")
         for name in ("taught_lr_start", "taught_lr_end", "lr_end"):
             if not getattr(self, name) > 0:
-                raise RunError(f"{name} is {getattr(self, name)}, expected above 0: rates fall geometrically")
+                raise RunError(
+                    f"{name} is {getattr(self, name)}, expected above 0, as rates fall geometrically. Give a small rate"
+                )
 
     @property
     def heads_by_scene(self) -> bool:
@@ -110,9 +113,12 @@ class Recurrent(Learner):
 
     def warn_of(self, scenes: Sequence[Scene]) -> None:
         """Warn (AspectWarning) where pictures have another aspect than those that the scenes' eyes were taught on."""
+        by_eyes: dict[tuple[int, int], list[Scene]] = defaultdict(list)
         for scene in scenes:
             if scene.encoder is not None and scene.encoder.settings.get("kind") == eyes.KIND:
-                warn_of_aspect([scene], eyes.card_of(scene.encoder).shape.picture_px)
+                by_eyes[eyes.card_of(scene.encoder).shape.picture_px].append(scene)
+        for picture_px, own in by_eyes.items():
+            warn_of_aspect(own, picture_px)
 
     def agent(self, record: RunRecord, tensors: Mapping[str, Tensor], frames: int) -> TrainedRecurrent:
         """The agent of a run from the tensors of its checkpoint; see `Learner.agent`."""

@@ -129,7 +129,7 @@ class Room:
 
     @contextmanager
     def one_piece(self) -> Iterator[None]:
-        """Obstacles that are added meanwhile are those of one piece of furniture, which is moved as a whole."""
+        """Obstacles that are added meanwhile belong to one piece of furniture; those on the floor are moved as one."""
         self._piece_number, self._piece = self._piece_number + 1, 0
         try:
             yield

@@ -64,7 +64,7 @@ class Batcher:
     @property
     def waiting(self) -> int:
         """Pictures that wait."""
-        return sum(not asked.answer.done() for asked in self._waiting)  # others have given up
+        return len(self._waiting)
 
     async def reset(self, owner: str, target: np.ndarray, seed: np.ndarray) -> State:
         """The state of an episode's begin, of one row, from the target's picture and a seed (1,); as `act`."""
@@ -87,7 +87,11 @@ class Batcher:
         self._waiting.append(asked)
         if self._worker is None or self._worker.done():
             self._worker = asyncio.create_task(self._work())
-        return await asked.answer
+        try:
+            return await asked.answer
+        except asyncio.CancelledError:  # its picture takes no place any more
+            self._waiting = deque(each for each in self._waiting if each is not asked)
+            raise
 
     async def _work(self) -> None:
         """Compute batches until nothing waits."""
