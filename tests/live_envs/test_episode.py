@@ -28,8 +28,12 @@ RULES = Rules(
 )
 
 
+def begun(episodes: Episodes, seed: int, *, last: LiveEpisode | None = None, **ends) -> LiveEpisode:
+    return episodes.begin(episodes.planned(seed, **ends), last)
+
+
 def episode(live, start, target, **changes) -> LiveEpisode:
-    return Episodes(live, replace(RULES, **changes)).begin(0, start=start, target=target)
+    return begun(Episodes(live, replace(RULES, **changes)), 0, start=start, target=target)
 
 
 @pytest.mark.slow
@@ -43,7 +47,7 @@ def test_in_every_pose_of_the_grid_every_action_earns_what_it_earns_on_the_grid(
         for action in Action:
             grid.reset(options={"start": start})
             _, reward, reached, _, info = grid.step(action)
-            body = episodes.begin(0, start=start, target=target, last=body)
+            body = begun(episodes, 0, start=start, target=target, last=body)
             step = body.step(int(action))
             assert (step.reward, step.ended, step.contact) == (reward, reached, info["collision"]), (start, action)
             assert body.zone == info["zone"]
@@ -133,20 +137,20 @@ def test_continuous_actions_move_the_body(live):
 @pytest.mark.slow
 def test_ends_are_drawn_from_all_poses_and_are_apart(live):
     episodes = Episodes(live, RULES)
-    drawn = [episodes.begin(seed) for seed in range(600)]
+    drawn = [begun(episodes, seed) for seed in range(600)]
     starts, targets = (set(ends) for ends in zip(*((e.walker.pose, e.target) for e in drawn), strict=True))
     every = {live.pose_of(state) for state in range(live.scene.state_count)}
     assert starts == targets == every
     wide = replace(RULES, success_m=0.6, success_deg=180.0)
     for seed in range(100):
-        one = Episodes(live, wide).begin(seed)
+        one = begun(Episodes(live, wide), seed)
         assert one.distance_m > 0.6
 
 
 def test_targets_can_be_named(live):
     some = [state_at(live.scene, 0.25, 0.25, 0), state_at(live.scene, 1.75, 0.25, 90)]
     episodes = Episodes(live, RULES, np.array(some))
-    assert {episodes.begin(seed).target for seed in range(30)} == {live.pose_of(state) for state in some}
+    assert {begun(episodes, seed).target for seed in range(30)} == {live.pose_of(state) for state in some}
     with pytest.raises(EnvError, match=r"targets: 1000 is not among the 72 states"):
         Episodes(live, RULES, np.array([0, 1000]))
 
@@ -155,7 +159,7 @@ def test_a_seed_repeats_an_episode_with_its_perturbations(live):
     strong = Perturbations(distance_noise=0.05, angle_noise=5.0, move_furniture=0.3, new_obstacle=True, light=0.5)
 
     def walked(seed: int) -> list:
-        one = Episodes(live, replace(RULES, perturbations=strong)).begin(seed)
+        one = begun(Episodes(live, replace(RULES, perturbations=strong)), seed)
         actions = np.random.default_rng(0).integers(4, size=12).tolist()
         return [one.layout, one.target, one.draws.brightness, *((one.step(a), one.walker.pose) for a in actions)]
 
@@ -165,9 +169,9 @@ def test_a_seed_repeats_an_episode_with_its_perturbations(live):
 
 def test_no_furniture_is_moved_to_where_a_target_between_two_cells_is(live):
     episodes, target = Episodes(live, replace(RULES, perturbations=Perturbations(move_furniture=0.3))), (1.1, 0.75, 0.0)
-    begun = [episodes.begin(seed, target=target) for seed in range(12)]
-    assert {one.layout == episodes.as_built for one in begun} == {True, False}
-    for one in begun:
+    walks = [begun(episodes, seed, target=target) for seed in range(12)]
+    assert {one.layout == episodes.as_built for one in walks} == {True, False}
+    for one in walks:
         body = live.body(one.layout)
         body.stand_at(np.array(target[:2]))
         assert not body.touches
@@ -177,14 +181,14 @@ def test_the_furniture_of_an_episode_is_moved_and_the_body_meets_it_there(live):
     moved = Perturbations(move_furniture=0.3)
     episodes = Episodes(live, replace(RULES, perturbations=moved))
     assert episodes.moving and not Episodes(live, RULES).moving
-    others = [episodes.begin(seed) for seed in range(5)]
+    others = [begun(episodes, seed) for seed in range(5)]
     assert any(one.layout != as_built(live.room) for one in others)
-    kept = Episodes(live, RULES).begin(0)
+    kept = begun(Episodes(live, RULES), 0)
     assert kept.layout == as_built(live.room)
-    again = Episodes(live, RULES).begin(1, last=kept)
+    again = begun(Episodes(live, RULES), 1, last=kept)
     assert again.walker.body is kept.walker.body
     different = next(one for one in others if one.layout != kept.layout)
-    assert episodes.begin(9, last=different).walker.body is not different.walker.body
+    assert begun(episodes, 9, last=different).walker.body is not different.walker.body
 
 
 @pytest.mark.parametrize(
@@ -197,10 +201,10 @@ def test_the_furniture_of_an_episode_is_moved_and_the_body_meets_it_there(live):
 )
 def test_ends_that_are_none(live, ends, problem):
     with pytest.raises(EnvError, match=problem):
-        Episodes(live, RULES).begin(0, **ends)
+        Episodes(live, RULES).planned(0, **ends)
 
 
 def test_a_room_without_two_ends_apart_is_refused(live):
     everywhere = replace(RULES, success_m=10.0, success_deg=180.0)
     with pytest.raises(EnvError, match="every start in walkable is within success_m and success_deg"):
-        Episodes(live, everywhere).begin(0)
+        Episodes(live, everywhere).planned(0)

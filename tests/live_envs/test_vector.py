@@ -105,6 +105,22 @@ def test_ends_for_all_or_for_each(live) -> None:
     envs.close()
 
 
+def test_a_reset_that_is_refused_leaves_everything_as_it_was(live) -> None:
+    envs, other = (LiveImageGoalVectorEnv(live, num_envs=2, workers=1, **SMALL) for _ in range(2))
+    for one in (envs, other):
+        one.reset(seed=0)
+    for seed in (7, None):
+        with pytest.raises(EnvError, match="state 1000 is not in the largest part"):
+            envs.reset(seed=seed, options={"target": [5, 1000]})
+    for _ in range(3):
+        (seen, *rest), (wanted, *expected) = (one.step(np.array([1, 3])) for one in (envs, other))
+        np.testing.assert_equal((seen, rest), (wanted, expected))
+    (seen, info), (wanted, expected) = (one.reset(options={"start": 5}) for one in (envs, other))
+    np.testing.assert_equal((seen, info), (wanted, expected))
+    for one in (envs, other):
+        one.close()
+
+
 @pytest.mark.slow
 def test_gymnasiums_own_check_makes_it_anew_and_finds_nothing(plan_file: str) -> None:
     env = gymnasium.make(LIVE_ENV_ID, room=plan_file, render_mode="rgb_array", **SMALL)

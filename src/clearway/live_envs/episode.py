@@ -127,6 +127,20 @@ class LiveEpisode:
         self.clearance_m = max(0.0, self.walker.body.gap_m(CLEARANCE_REACH_M))
 
 
+@dataclass(frozen=True)
+class EpisodePlan:
+    """An episode that has not begun.
+
+    Attributes:
+        draws: its chances.
+        start, target: poses in the room.
+    """
+
+    draws: Draws
+    start: Pose
+    target: Pose
+
+
 class Episodes:
     """New episodes in a room.
 
@@ -165,19 +179,16 @@ class Episodes:
         """A body in the room as it was built, to try poses."""
         return self._body(self.as_built)
 
-    def begin(
-        self, seed: int, *, target: End | None = None, start: End | None = None, last: LiveEpisode | None = None
-    ) -> LiveEpisode:
-        """A new episode.
+    def planned(self, seed: int, *, target: End | None = None, start: End | None = None) -> EpisodePlan:
+        """An episode to begin. No body moves for it.
 
         Args:
             seed: of all its chances.
             target: None: drawn.
             start: None: drawn from the poses that are not at the target already.
-            last: an episode that is over, whose body can be taken where the room is the same.
 
         Raises:
-            EnvError: a start or target is unknown or in an obstacle, or they are the same.
+            EnvError: a start or target is unknown or in an obstacle, or all that could be drawn are at the other.
         """
         draws = Draws(seed, self.rules.perturbations)
         chances = draws.generator(ENDS).random(2)
@@ -188,6 +199,16 @@ class Episodes:
             target_pose = self._drawn("target", self._targets, start_pose, chances[0])
         if start_pose is None:
             start_pose = self._drawn("start", self._states, target_pose, chances[1])
+        return EpisodePlan(draws, start_pose, target_pose)
+
+    def begin(self, plan: EpisodePlan, last: LiveEpisode | None = None) -> LiveEpisode:
+        """A new episode.
+
+        Args:
+            plan: of it.
+            last: an episode that is over, whose body can be taken where the room is the same.
+        """
+        draws, start_pose, target_pose = plan.draws, plan.start, plan.target
         layout = self._layout(start_pose, target_pose, draws)
         body = last.walker.body if last and last.layout == layout else self._body(layout)
         walker = self._walker(body, start_pose, draws)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import Any
 
 import gymnasium
@@ -38,7 +39,7 @@ from clearway.live_envs.arguments import (
     checked_sensors,
     opened_room,
 )
-from clearway.live_envs.episode import End, Episodes, LiveEpisode, Rules
+from clearway.live_envs.episode import End, EpisodePlan, Episodes, LiveEpisode, Rules
 from clearway.live_envs.eyes import Eyes, Pictures
 from clearway.reward import Reward, reward_named
 from clearway.rooms.camera import first_person_shot
@@ -86,7 +87,8 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     ## Arguments
     Those of `LiveImageGoalEnv`; `num_envs`, `autoreset_mode`, and `workers`, renderer processes for each camera (None:
     one a core). `reset` takes `options={"target": ..., "start": ..., "reset_mask": mask}`, all optional; a target or
-    start is one for all environments or one for each.
+    start is one for all environments or one for each. Of three environments, three whole numbers are three states, and
+    a pose has a decimal point: (1.0, 2.0, 90.0). What `reset` refuses leaves everything as it was.
 
     ## Version History
     * v0: first version.
@@ -191,18 +193,24 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         index = environments_to_reset(options, self.num_envs)
         if None in self._running and len(index) < self.num_envs:
             raise ResetNeeded("the first reset has to begin all environments: call reset() without a reset_mask")
+        streams = {env: deepcopy(self._streams[env]) for env in index.tolist()}
         if seed is not None:
             words, given = seed_words(seed, self.num_envs)
-            super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
-            for env in index[given[index]].tolist():
-                self._streams[env] = np.random.default_rng(int(words[env]) % 2**64)
+            streams |= {env: np.random.default_rng(int(words[env]) % 2**64) for env in index[given[index]].tolist()}
         asked = {
             name: checked_ends(name, options[name], self.num_envs)
             for name in EPISODE_OPTIONS
             if options.get(name) is not None
         }
-        for env in index.tolist():
-            self._begin(env, **{name: ends[env] for name, ends in asked.items()})
+        plans = {
+            env: self._planned(stream, **{name: ends[env] for name, ends in asked.items()})
+            for env, stream in streams.items()
+        }
+        if seed is not None:  # nothing can be wrong from here on
+            super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        for env, plan in plans.items():
+            self._streams[env] = streams[env]
+            self._begin(env, plan)
         begun = np.zeros(self.num_envs, bool)
         begun[index] = True
         self._look(begun, begun)
@@ -278,9 +286,13 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             remedy = "call reset(), in a vector environment with options={'reset_mask': mask}"
             raise ResetNeeded(f"the episodes of environments {over} are over: {remedy}")
 
-    def _begin(self, env: int, target: End | None = None, start: End | None = None) -> None:
-        seed = int(self._streams[env].integers(2**63))
-        self._running[env] = self._episodes.begin(seed, target=target, start=start, last=self._running[env])
+    def _planned(self, stream: np.random.Generator, target: End | None = None, start: End | None = None) -> EpisodePlan:
+        return self._episodes.planned(int(stream.integers(2**63)), target=target, start=start)
+
+    def _begin(self, env: int, plan: EpisodePlan | None = None) -> None:
+        """Begin an episode as planned, else one drawn from the environment's stream."""
+        plan = plan or self._planned(self._streams[env])
+        self._running[env] = self._episodes.begin(plan, last=self._running[env])
         self._elapsed[env], self._ended[env] = 0, False
 
     def _look(self, where: np.ndarray, begun: np.ndarray) -> None:
