@@ -135,6 +135,12 @@ def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, first, out
     assert "threads 7" in facts["hardware"] and "threads 8" in facts["hardware"]
     assert facts["hardware"].count("(1 run)") == 2
     assert "(2 runs)" in facts["versions"] and "torch" in facts["versions"]
+    assert facts["first and last run begun"].count("+00:00") == 2
+    for folder, command in zip(sorted((out / "runs").iterdir()), (["/tmp/bump.py", "5"], ["-c"]), strict=True):
+        record = json.loads((folder / "run.json").read_text())
+        (folder / "run.json").write_text(json.dumps(record | {"command": command}))
+    facts = clearway("report", out, "--json").json["facts"]
+    assert set(facts["runs begun by"].split("; ")) == {"bump.py 5 (1 run)", "python -c (1 run)"}
 
 
 FOREIGN = (

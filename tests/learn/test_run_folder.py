@@ -2,6 +2,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -36,11 +37,13 @@ def test_record_round_trip(tmp_path: Path) -> None:
     assert again.scenes[1].path == str(Path("grid.h5").resolve())
     assert set(again.versions) >= {"python", "clearway", "torch", "numpy"}
     assert again.hardware["threads"] == 1
+    assert again.begun is not None
+    assert timedelta(0) <= datetime.now(UTC) - datetime.fromisoformat(again.begun) < timedelta(minutes=10)
 
 
 def test_the_same_experiment_may_run_elsewhere_but_not_with_other_settings() -> None:
     record = made_record()
-    elsewhere = replace(record, versions={}, hardware={}, command=("x",))
+    elsewhere = replace(record, versions={}, hardware={}, command=("x",), begun=None)
     scenes = tuple(replace(scene, path="/elsewhere") for scene in record.scenes)
     assert record.same_experiment(replace(elsewhere, scenes=scenes))
     others = [
@@ -96,6 +99,7 @@ OF_ANOTHER_TYPE: tuple[tuple[str, object], ...] = (
     ("hardware", "a Xeon"),
     ("hardware", [1]),
     ("command", "clearway train"),
+    ("begun", 20261127),
 )
 
 

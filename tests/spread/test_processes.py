@@ -35,6 +35,12 @@ def test_a_worker_is_set_up_once_for_all_its_parts(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("set-up-*"))) == 1
 
 
+def test_what_a_worker_makes_was_begun_by_the_command_that_started_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["/bin/clearway", "reproduce", "fig5"])
+    with workers_for(Work(no_tool, parts.command_seen, died), workers=1) as crew:
+        assert list(crew.results(["part"])) == [["/bin/clearway", "reproduce", "fig5"]]
+
+
 @needs_proc
 def test_workers_start_when_there_is_work() -> None:
     with workers_for(Work(no_tool, parts.square, died), workers=2) as crew:

@@ -23,10 +23,22 @@ def made_by(out: Path, jobs: Sequence[Job]) -> dict[str, str]:
     if not records:
         return {"versions": facts_text(package_versions()), "hardware": facts_text(hardware())}
     return {
-        "runs begun by": _counted([shlex.join(["clearway", *record.command[1:]]) for record in records]),
+        "runs begun by": _counted([_told(record.command) for record in records]),
+        **_times([record.begun for record in records if record.begun]),
         "versions": _counted([facts_text(dict(record.versions)) for record in records]),
         "hardware": _counted([facts_text(dict(record.hardware)) for record in records]),
     }
+
+
+def _told(command: Sequence[str]) -> str:
+    """A command as it is typed; "python -c" where no file was named."""
+    called = Path(command[0]).name if command else ""
+    return shlex.join([*(("python", "-c") if called in ("", "-c") else (called,)), *command[1:]])
+
+
+def _times(begun: Sequence[str]) -> dict[str, str]:
+    """When the first and the last run began, where they say so."""
+    return {"first and last run begun": f"{min(begun)}, {max(begun)}"} if begun else {}
 
 
 def _counted(answers: Sequence[str]) -> str:

@@ -1,9 +1,10 @@
-"""What shapes results beside settings and seed: versions of packages, and the machine."""
+"""What shapes results beside settings and seed: the code, versions of packages, and the machine."""
 
 from __future__ import annotations
 
 import os
 import platform
+import subprocess
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,12 +14,28 @@ from clearway.version import __version__
 
 PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
 CPU_INFO = Path("/proc/cpuinfo")
+GIT_LIMIT_S = 10.0
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of Python, clearway and the packages that shape results."""
+    """Versions of Python, clearway and the packages that shape results; of a checkout its `commit`, too."""
     found = {"python": platform.python_version(), "clearway": __version__}
+    if (commit := _commit(Path(__file__).parents[3])) is not None:
+        found["commit"] = commit
     return found | {name: _installed_version(name) for name in PACKAGES}
+
+
+@cache
+def _commit(checkout: Path) -> str | None:
+    """Of a checkout, "-dirty" behind it where files differ; None where the folder is none, or git does not tell."""
+    if not (checkout / ".git").exists():
+        return None
+    words = ["git", "-C", str(checkout), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=10"]
+    try:
+        told = subprocess.run(words, capture_output=True, text=True, timeout=GIT_LIMIT_S, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return told.stdout.strip()
 
 
 @cache

@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
 from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
@@ -53,7 +54,9 @@ class SceneRecord:
 class RunRecord:
     """Everything that determines a run, and where it was made. The reward is as training paid it.
 
+    command: what began it, as its process was called.
     takes: how the perturbed pictures were made that were seen beside the scenes' own; None: there were none.
+    begun: when, in UTC; None: not told.
     """
 
     learner: Learner
@@ -65,6 +68,7 @@ class RunRecord:
     hardware: Mapping[str, Any]
     command: tuple[str, ...]
     takes: Mapping[str, Any] | None = None
+    begun: str | None = None
 
     @property
     def targets(self) -> dict[str, tuple[int, ...]]:
@@ -86,7 +90,7 @@ class RunRecord:
         ]
 
     def same_experiment(self, other: RunRecord) -> bool:
-        """Both would give the same agent: all but versions, hardware, paths and command agree."""
+        """Both would give the same agent: all but versions, hardware, paths, command and time agree."""
 
         def essence(run: RunRecord) -> tuple:
             scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
@@ -118,6 +122,7 @@ def record_of(request: RunRequest) -> RunRecord:
         hardware=hardware(request.device) | {"feature_store": request.feature_store},
         command=tuple(map(addresses_without_secrets, sys.argv)),
         takes=request.takes_made,
+        begun=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 
@@ -136,9 +141,10 @@ def record_from(content: Mapping[str, Any], version: int) -> RunRecord:
             kind.
     """
     wanted = {"seed": int, "zone_level": ZoneLevel, "versions": dict, "hardware": dict, "command": list}
-    for name, kind in wanted.items():
-        if not fits(content[name], kind):
-            raise TypeError(f"{name} is {content[name]!r:.40}")
+    given = {name: content[name] for name in wanted} | {"begun": content.get("begun")}
+    for name, kind in (wanted | {"begun": str | None}).items():
+        if not fits(given[name], kind):
+            raise TypeError(f"{name} is {given[name]!r:.40}")
     learner, reward = clipped_once(_learner(content["learner"], version), reward_from_json(content["reward"]))
     return RunRecord(
         learner=learner,
@@ -150,6 +156,7 @@ def record_from(content: Mapping[str, Any], version: int) -> RunRecord:
         hardware=content["hardware"],
         command=tuple(content["command"]),
         takes=content.get("takes"),
+        begun=given["begun"],
     )
 
 

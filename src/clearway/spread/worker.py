@@ -26,8 +26,8 @@ _set_up: dict[str, tuple[Callable[[Any, Any], Any], Any]] = {}  # by key, one at
 
 
 def packed(set_up: Callable[[], Any], do: Callable[[Any, Any], Any]) -> bytes:
-    """A work as a message."""
-    return to_message((set_up, do))
+    """A work as a message, with the command that it is part of."""
+    return to_message((set_up, do, sys.argv))
 
 
 def done(key: str, work: Callable[[], bytes], part: bytes) -> Any:
@@ -41,7 +41,7 @@ def done(key: str, work: Callable[[], bytes], part: bytes) -> Any:
     if key not in _set_up:
         _set_up.clear()
         with collector_rests():  # much may have to be imported
-            set_up, do = from_message(work())
+            set_up, do, sys.argv = from_message(work())  # what is made here was begun by that command
             _set_up[key] = do, set_up()
     do, tool = _set_up[key]
     return do(tool, from_message(part))
