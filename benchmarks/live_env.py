@@ -51,10 +51,10 @@ def moves_per_s(envs: LiveImageGoalVectorEnv, seconds: float) -> float:
     """Steps of one episode after the other a second, without pictures."""
     episodes, rng = envs._episodes, np.random.default_rng(0)
     actions = rng.integers(4, size=10_000).tolist()
-    episode, count, begin = episodes.begin(0), 0, time.perf_counter()
+    episode, count, begin = episodes.begin(episodes.planned(0)), 0, time.perf_counter()
     while time.perf_counter() - begin < seconds:
         if episode.step(actions[count % len(actions)]).ended:
-            episode = episodes.begin(count, last=episode)
+            episode = episodes.begin(episodes.planned(count), last=episode)
         count += 1
     return count / (time.perf_counter() - begin)
 

@@ -189,7 +189,7 @@ READERS: tuple[tuple[str, Callable[[Path], object], Callable[[], bytes]], ...] =
     ),
     ("agent.onnx", read_graph, graph_bytes),
     ("metrics.jsonl", lambda path: RunFolder(path.parent).metrics(), lambda: b'{"frames": 80, "seconds": 1}\n' * 2),
-    ("room.map", lambda path: read_map(path, "eyes", 3), map_bytes),
+    ("room.map", lambda path: read_map(path, "eyes", 0.5, 3), map_bytes),
     ("seen.jpg", read_picture, lambda: picture_bytes("JPEG")),
     ("seen.png", read_picture, lambda: picture_bytes("PNG")),
     ("seen.webp", read_picture, lambda: picture_bytes("WEBP")),

@@ -69,3 +69,6 @@ GENERALIST = "generalist"
 def is_generalist(source: str | os.PathLike[str]) -> bool:
     """Whether the agent that comes with clearway is meant, not a file or folder of this name."""
     return os.fspath(source) == GENERALIST and not os.path.exists(source)
+
+
+GOALS, GOAL_STEPS = 20, 500  # of evaluations at goals drawn anew: goals of a scene, steps of an episode

@@ -83,6 +83,9 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
         evaluate_live(object(), corridor_scene(5))
     with pytest.raises(ArgumentError, match="sweep sets the perturbations itself"):
         evaluate_live("generalist", corridor_scene(5), perturb="all", sweep=(1.0,))
+    for sweep in (0.5, None, "1.0"):
+        with pytest.raises(ArgumentError, match="expected a sequence of strengths"):
+            evaluate_live("generalist", corridor_scene(5), sweep=sweep)
     for sweep in ((-1.0,), ("x",), (1.0, float("inf")), (1e6,)):
         with pytest.raises(ArgumentError, match="expected shares of the full strengths above 0"):
             evaluate_live("generalist", corridor_scene(5), sweep=sweep)

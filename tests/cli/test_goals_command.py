@@ -129,7 +129,13 @@ def test_generated_rooms_of_a_split_are_walked_in(clearway, run, asked):
     assert found["average"]["episodes"] == 20  # goals where nothing else is said
     words = ("--rooms", "train", "--kind", "flat", "--count", 3, "--goals", 2, "--step-limit", 5, "--json")
     assert clearway("evaluate", run / "run", *words).json["average"]["episodes"] == 2
-    assert asked == [("room", 10, "validation", "none"), ("flat", 3, "train", "none")]
+    words = ("--live", "--rooms", "validation", "--count", 1)
+    assert clearway("evaluate", run / "run", *words).refusal("grid", "there is no room to walk in")
+    assert asked == [
+        ("room", 10, "validation", "none"),
+        ("flat", 3, "train", "none"),
+        ("room", 1, "validation", "none"),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -145,7 +151,6 @@ def test_generated_rooms_of_a_split_are_walked_in(clearway, run, asked):
         (("--kind", "flat", "--goals", 2), ("--kind: goes with --rooms alone",)),
         (("--rooms", "validation", "--perturb", "fog"), ("--perturb 'fog': there is none of that name",)),
         (("--rooms", "validation", "--selection", "argmax"), ("--selection: not with --rooms",)),
-        (("--rooms", "validation", "--light", 0.2, "--live"), ("--live: not with --rooms",)),
         (("--count", 2), ("--count: goes with --rooms alone",)),
     ],
 )

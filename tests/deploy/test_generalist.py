@@ -294,8 +294,8 @@ KNOWN = RoomMap(
 
 
 def test_a_map_comes_back_as_it_was(tmp_path) -> None:
-    write_map(tmp_path / "map", KNOWN, "eyes")
-    found = read_map(tmp_path / "map", "eyes", 8)
+    write_map(tmp_path / "map", KNOWN, "eyes", 0.5)
+    found = read_map(tmp_path / "map", "eyes", 0.5, 8)
     for name, value in vars(KNOWN).items():
         np.testing.assert_array_equal(getattr(found, name), value)
         assert getattr(found, name).dtype == value.dtype
@@ -312,37 +312,39 @@ def test_a_map_comes_back_as_it_was(tmp_path) -> None:
     ],
 )
 def test_maps_that_cannot_be(tmp_path, changes, part) -> None:
-    write_map(tmp_path / "map", replace(KNOWN, **changes), "eyes")
+    write_map(tmp_path / "map", replace(KNOWN, **changes), "eyes", 0.5)
     with pytest.raises(DeployError, match=part):
-        read_map(tmp_path / "map", "eyes", 8)
+        read_map(tmp_path / "map", "eyes", 0.5, 8)
 
 
 def test_a_map_of_other_eyes_an_altered_one_and_what_is_none(tmp_path) -> None:
     path = tmp_path / "map"
-    write_map(path, KNOWN, "eyes")
+    write_map(path, KNOWN, "eyes", 0.5)
     with pytest.raises(DeployError, match=r"made by other eyes \('eyes'\), and the agent's are 'others'"):
-        read_map(path, "others", 8)
+        read_map(path, "others", 0.5, 8)
+    with pytest.raises(DeployError, match=r"made by moves of 0\.5 m, and the agent's are 0\.25 m\. Tour"):
+        read_map(path, "eyes", 0.25, 8)
     whole = path.read_bytes()
     for end in (1, 60, -40):
         content = bytearray(whole)
         content[end] ^= 4
         path.write_bytes(content)
         with pytest.raises(DeployError, match=r"map: .*Tour the room again"):
-            read_map(path, "eyes", 8)
+            read_map(path, "eyes", 0.5, 8)
     content = bytearray(whole)
     content[-2 * KNOWN.features.size] ^= 1  # the first byte of an array: still a number
     path.write_bytes(content)
     with pytest.raises(DeployError, match="altered, its SHA-256"):
-        read_map(path, "eyes", 8)
+        read_map(path, "eyes", 0.5, 8)
     path.write_bytes(whole.replace(HEADER.encode(), b"x" * len(HEADER)))
     with pytest.raises(DeployError, match="not the map of a room"):
-        read_map(path, "eyes", 8)
+        read_map(path, "eyes", 0.5, 8)
     for content in (b"", b"\xff" * 40, whole[:100]):
         path.write_bytes(content)
         with pytest.raises(DeployError, match="not the map of a room, or damaged"):
-            read_map(path, "eyes", 8)
+            read_map(path, "eyes", 0.5, 8)
     with pytest.raises(DeployError, match="nothing: cannot be read"):
-        read_map(tmp_path / "nothing", "eyes", 8)
+        read_map(tmp_path / "nothing", "eyes", 0.5, 8)
 
 
 def test_the_file_holds_its_own_settings(one_file) -> None:

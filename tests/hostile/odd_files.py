@@ -52,7 +52,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object], Callable[[Path], object]
     "episodes": ("trial.json", read_episodes, nothing),
     "eyes' card": (CARD_FILE, lambda path: read_eyes(path.parent), nothing),
     "eyes' weights": (WEIGHTS_FILE, lambda path: read_eyes(path.parent), write_card),
-    "a map": ("room.map", lambda path: read_map(path, "eyes", 3), nothing),
+    "a map": ("room.map", lambda path: read_map(path, "eyes", 0.5, 3), nothing),
     "an exported agent": ("agent.onnx", read_onnx, nothing),
     "settings": ("run.yaml", read_settings, nothing),
     "a MuJoCo model": ("world.xml", lambda path: compiled(path, AGENT), nothing),

@@ -397,13 +397,13 @@ def room_map() -> bytes:
     shapes = {"room": (5, 5), "shut": (4, 5, 5), "taken": (1, 3), "features": (1, 3)}
     with tempfile.TemporaryDirectory() as folder:
         write_map(
-            Path(folder) / "room.map", RoomMap(**{name: np.zeros(shape) for name, shape in shapes.items()}), "eyes"
+            Path(folder) / "room.map", RoomMap(**{name: np.zeros(shape) for name, shape in shapes.items()}), "eyes", 0.5
         )
         return (Path(folder) / "room.map").read_bytes()
 
 
 def read_room_map(path: Path) -> str:
-    return str(read_map(path, "eyes", 3))
+    return str(read_map(path, "eyes", 0.5, 3))
 
 
 FIGURES = {

@@ -13,7 +13,8 @@ from clearway.agents.by_pose import PoseAgent, RandomWalk, shortest_paths
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import run_episodes
 from clearway.live.conditions import MOST, Perturbations
-from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
+from clearway.live.draws import Draws
+from clearway.live.episodes import LiveProtocol, LiveTable, Walking, run_live_episodes
 from clearway.live.live_room import live_room
 from clearway.perception.encode import encoder_from_record
 from clearway.perception.encoder import Encoder
@@ -125,6 +126,16 @@ def test_in_a_floor_plan_a_random_walk_is_the_plans_up_to_its_first_contact():
         same = 1 + (steps[0] if len(steps) else len(trajectory.actions))
         places_m = scene.locations_m[trajectory.states[:same]]
         np.testing.assert_allclose(walk[:same, :2] + live.origin_m, places_m, atol=1e-9)
+
+
+@pytest.mark.parametrize(("cell_size_m", "reached_m"), [(0.2, 0.1), (0.25, 0.125), (0.5, 0.25), (1.0, 0.25)])
+def test_a_neighbouring_cell_is_not_the_target(live, cell_size_m, reached_m):
+    room = replace(live, scene=replace(live.scene, cell_size_m=cell_size_m))
+    target = state_at(live.scene, 1.25, 1.25, 0)
+    walking = Walking(room, state_at(live.scene, 0.25, 0.25, 0), target, Draws(0, Perturbations()))
+    for apart_m, reached in ((reached_m - 0.01, True), (reached_m + 0.01, False)):
+        walking.walker.body.stand_at(np.array([1.25, 1.25 + apart_m]))
+        assert walking.reached is reached
 
 
 def unused(shots):

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk
+from clearway.errors import SceneError
 from clearway.evaluation.goals import drawn_goals
 from clearway.live import goals
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built
 from clearway.live.episodes import LiveProtocol, run_live_episodes
 from clearway.live.goals import LiveTouring, walk_to_goals
+from clearway.live.live_room import MODEL_SOURCE
 from clearway.live.tours import walk_live_tour
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.actions import Action
+from clearway.scenes.floor_plans import GENERATED
+from clearway.scenes.scene import Provenance
 from clearway.scenes.sensors import RGB
 from clearway.world.world import make_world
 
@@ -59,6 +64,18 @@ class Ahead(RandomWalk):
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         count = len(observation[RGB])
         return Decisions(np.full(count, int(Action.MOVE_FORWARD))), {"steps": state["steps"] + 1}
+
+
+def test_what_cannot_be_moved_is_told_before_any_room_is_built(live, monkeypatch):
+    monkeypatch.setattr(goals, "live_room", lambda scene: pytest.fail("built"))
+    model = replace(live.scene, name="model", made_by=Provenance(MODEL_SOURCE))
+    rooms, asked = [live.scene, model], [NONE, Condition("all", REFERENCE)]
+    with pytest.raises(SceneError, match="model: nothing can be moved in a MuJoCo model, and move_furniture is asked"):
+        walk_to_goals("random", RandomWalk(), rooms, asked, **SETTINGS)
+    made_by = Provenance(GENERATED, seed=0, notes={"generator_version": "0"})
+    rooms = [live.scene, replace(live.scene, name="old", made_by=made_by)]
+    with pytest.raises(SceneError, match=r"old: .*generate it again"):
+        walk_to_goals("random", RandomWalk(), rooms, [NONE], **SETTINGS)
 
 
 def test_figures_are_those_of_the_episodes_to_the_goals_of_the_grid(live):

@@ -116,7 +116,7 @@ def test_tables_show_figures_with_intervals_and_say_what_success_means(report):
     text = markdown_tables(report)
     assert "| on the grid | wary | 75 (" in text and "| – | – | – | – |" in text
     assert "| none | wary | 100 (100–100) |" in text
-    assert "wary less bold" in text and "within 25 cm and 45°" in text and "Encoder: tiny" in text
+    assert "wary less bold" in text and "within 25 cm, at most half a cell, and 45°" in text and "Encoder: tiny" in text
 
 
 def test_a_terminal_of_80_columns_shows_every_figure_whole(report):

@@ -80,6 +80,8 @@ def test_driving_and_turning_is_an_arc():
     walker.drive(1.0, 1.0)  # a quarter of a circle, 0.5 m long, to the right
     radius_m = 0.5 / (np.pi / 2)
     assert walker.pose == pytest.approx((3.0 + radius_m, 3.0 + radius_m, 90.0))
+    walker = walker_at(3.0, 3.0, 0.0)
+    assert walker.drive(1.0, 1.0).travelled_m == pytest.approx(0.5, abs=0.002)  # of chords, somewhat less than the arc
 
 
 def test_a_contact_ends_an_arc_and_not_its_turn():

@@ -36,6 +36,13 @@ def episode(live, start, target, **changes) -> LiveEpisode:
     return begun(Episodes(live, replace(RULES, **changes)), 0, start=start, target=target)
 
 
+def at(walk: LiveEpisode, pose) -> LiveEpisode:
+    """An episode whose body stands and looks so."""
+    *place_m, walk.walker.heading_deg = pose
+    walk.walker.body.stand_at(np.array(place_m))
+    return walk
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["collision-aware", "shortest", "bump"])
 def test_in_every_pose_of_the_grid_every_action_earns_what_it_earns_on_the_grid(live, name):
@@ -100,14 +107,15 @@ def test_a_term_sees_the_pose_left_and_the_pose_arrived_in_and_the_action(live):
     ],
 )
 def test_the_target_is_reached_within_success_m_and_success_deg(live, start, reached):
-    walk = episode(live, start, (0.25, 1.75, 0.0), step_m=1e-6)
+    walk = at(episode(live, (0.25, 0.25, 0.0), (0.25, 1.75, 0.0), step_m=1e-6), start)
     step = walk.step(Action.MOVE_BACKWARD)
     assert (step.success, step.ended, step.reward == 10.0) == (reached, reached, reached)
 
 
 def test_what_counts_as_reached_can_be_set(live):
     for within, reached in ((0.1, False), (0.4, True)):
-        walk = episode(live, (0.25, 1.5, 40.0), (0.25, 1.75, 0.0), step_m=1e-6, success_m=within, success_deg=45.0)
+        tolerances = {"success_m": within, "success_deg": 45.0}
+        walk = at(episode(live, (0.25, 0.25, 0.0), (0.25, 1.75, 0.0), step_m=1e-6, **tolerances), (0.25, 1.5, 40.0))
         assert walk.step(Action.MOVE_FORWARD).success == reached
 
 
@@ -196,6 +204,7 @@ def test_the_furniture_of_an_episode_is_moved_and_the_body_meets_it_there(live):
     [
         ({"start": (0.75, 0.75, 0.0)}, r"options\['start'\]: the body does not fit at \(0.75, 0.75\) in walkable"),
         ({"target": (9.0, 0.75, 0.0)}, r"options\['target'\]: the body does not fit at \(9, 0.75\)"),
+        ({"start": 5, "target": 5}, r"options\['start'\]: the start is within success_m and success_deg of the target"),
         ({"target": 1000}, r"options\['target'\]: state 1000 is not in the largest part of walkable"),
     ],
 )

@@ -105,6 +105,12 @@ def test_ends_for_all_or_for_each(live) -> None:
     envs.close()
 
 
+@pytest.mark.parametrize("workers", [0, "a", 1.5])
+def test_workers_that_are_none(live, workers) -> None:
+    with pytest.raises(EnvError, match=f"workers={workers!r}: expected a whole number from 1 on"):
+        LiveImageGoalVectorEnv(live, workers=workers, **SMALL)
+
+
 def test_a_reset_that_is_refused_leaves_everything_as_it_was(live) -> None:
     envs, other = (LiveImageGoalVectorEnv(live, num_envs=2, workers=1, **SMALL) for _ in range(2))
     for one in (envs, other):

@@ -11,7 +11,7 @@ from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
-from clearway.choices import GENERALIST, is_generalist
+from clearway.choices import GENERALIST, GOAL_STEPS, GOALS, is_generalist
 from clearway.errors import ArgumentError
 from clearway.live.conditions import Perturbations
 from clearway.scenes.sensors import RGB
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from clearway.perception.encoder import Encoder
     from clearway.scenes.scene import Scene
 
-GOALS, STEP_LIMIT = 20, 500
 MOST_TOUR_STEPS = 10_000
 
 
@@ -35,7 +34,7 @@ def evaluate_goals(
     scenes: Scenes,
     *,
     goals: int = GOALS,
-    step_limit: int = STEP_LIMIT,
+    step_limit: int = GOAL_STEPS,
     seed: int = 0,
     perturb: Perturbed = "none",
     takes: int = TAKES,

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING
 
 from clearway.api.arguments import as_path, as_seed, as_whole
-from clearway.api.goals import GOALS, MOST_TOUR_STEPS, STEP_LIMIT, agent_name, check_can_tour, goal_agent
+from clearway.api.goals import MOST_TOUR_STEPS, agent_name, check_can_tour, goal_agent
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import Perturbed, perturbations_asked
+from clearway.choices import GOAL_STEPS, GOALS
 from clearway.errors import ArgumentError
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built, label_of, sweep_settings
 
@@ -28,17 +29,17 @@ def evaluate_live(
     scenes: Scenes,
     *,
     goals: int = GOALS,
-    step_limit: int = STEP_LIMIT,
+    step_limit: int = GOAL_STEPS,
     seed: int = 0,
     perturb: Perturbed = "none",
-    sweep: tuple[float, ...] = (),
+    sweep: Sequence[float] = (),
     tour: int = 0,
     show: Callable[[str], None] = lambda text: None,
 ) -> list[GoalEvaluation]:
     """Walk off the grid to goals drawn in some rooms, one episode a goal: at any place and heading, by live pictures.
 
-    Goals and starts are those of `evaluate_goals`. A goal is reached within 25 cm and 45 degrees of its pose;
-    `collisions` are moves that ended at an obstacle.
+    Goals and starts are those of `evaluate_goals`. A goal is reached within 25 cm, or half a cell if that is less, and
+    45 degrees of its pose; `collisions` are moves that ended at an obstacle.
 
     Args:
         agent: "generalist", which comes with clearway, or a `Generalist`; a run folder of the algorithm "recurrent", or
@@ -76,6 +77,8 @@ def evaluate_live(
     }
     steps = as_whole("tour", tour, 0, MOST_TOUR_STEPS)
     perturbations = perturbations_asked(perturb)
+    if isinstance(sweep, str) or not isinstance(sweep, Sequence):
+        raise ArgumentError(f"sweep={sweep!r:.80}: expected a sequence of strengths, such as (1.0,)")
     for strength in sweep:
         above_zero = isinstance(strength, Real) and 0 < strength < math.inf
         if not above_zero or REFERENCE.scaled(float(strength)).too_strong:
@@ -95,6 +98,7 @@ def evaluate_live(
             walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
     elif isinstance(agent, TrainedRecurrent):
         check_can_tour(agent, steps)
+        agent.warn_of_aspect(found)
         walker = agent.behind_camera()
     else:
         called = agent.record.learner.algorithm if isinstance(agent, TrainedAgent) else str(agent)
@@ -103,6 +107,6 @@ def evaluate_live(
     settings = [Condition(label_of(perturbations), perturbations)]
     if sweep:
         fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)
-        settings = sweep_settings(sweep, as_it_was_built(REFERENCE) if fixed else REFERENCE)
+        settings = sweep_settings(tuple(sweep), as_it_was_built(REFERENCE) if fixed else REFERENCE)
     with torch_threads(1):
         return walk_to_goals(agent_name(agent), walker, found, settings, **asked, show=show)

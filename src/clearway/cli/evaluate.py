@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import GENERALIST, HELD_OUT, PlanKind, SplitName, is_generalist
+from clearway.choices import GENERALIST, GOAL_STEPS, GOALS, HELD_OUT, PlanKind, SplitName, is_generalist
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, say, say_held_out, stdout_console
 from clearway.cli.live import EPISODES as LIVE_EPISODES
@@ -66,7 +66,7 @@ class Evaluate:
     """With --perturb: pictures of each pose, each perturbed in its own way, one of which a step shows; by default 4."""
     rooms: SplitName | None = None
     """Walk in the first generated rooms of this split, made once and kept in the user's cache folder, instead of scene
-    files; 20 goals a room unless --goals says otherwise. What is published is measured in those of test."""
+    files; 20 goals a room unless --goals says otherwise. Choose on validation; test is for what is published."""
     kind: PlanKind | None = None
     """With --rooms: room, the default, or flat."""
     count: int | None = None
@@ -85,11 +85,11 @@ class Evaluate:
         if self.rooms is None and (self.kind is not None or self.count is not None):
             option = "--kind" if self.kind is not None else "--count"
             raise ClearwayError(f"{option}: goes with --rooms alone. Add --rooms validation, or another split")
-        if self.room.live and (self.goals is not None or is_generalist(self.folder)):
-            self._at_goals_live()
-            return
         if self.goals is not None or self.rooms is not None or is_generalist(self.folder):
-            self._at_goals()
+            if self.room.live:
+                self._at_goals_live()
+            else:
+                self._at_goals()
             return
         if self.perturb or self.takes is not None:
             option = "--perturb" if self.perturb else "--takes"
@@ -122,7 +122,7 @@ class Evaluate:
 
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
-        from clearway.api.goals import GOALS, STEP_LIMIT, goal_agent
+        from clearway.api.goals import goal_agent
         from clearway.api.takes import TAKES, perturbations_asked
         from clearway.cli.goals import evaluate_at_goals
 
@@ -135,7 +135,7 @@ class Evaluate:
             agent,
             self._scenes_of_goals(),  # made last, which may take long
             goals=goals,
-            step_limit=_or(self.step_limit, STEP_LIMIT),
+            step_limit=_or(self.step_limit, GOAL_STEPS),
             seed=self.seed,
             perturb=perturbations,
             takes=_or(self.takes, TAKES),
@@ -144,7 +144,6 @@ class Evaluate:
         )
 
     def _at_goals_live(self) -> None:
-        from clearway.api.goals import GOALS, STEP_LIMIT
         from clearway.cli.goals import evaluate_at_goals_live
 
         self.room.check()
@@ -162,7 +161,7 @@ class Evaluate:
             self._scenes_of_goals(),
             self.room,
             goals=_or(self.goals, GOALS),
-            step_limit=_or(self.step_limit, STEP_LIMIT),
+            step_limit=_or(self.step_limit, GOAL_STEPS),
             seed=self.seed,
             tour=self.tour,
             json=self.json,

@@ -68,11 +68,11 @@ class GeneralistAgent:
 
     def write_map(self, path: Path, known: RoomMap) -> None:
         """See `map_files.write_map`."""
-        write_map(path, known, self._eyes)
+        write_map(path, known, self._eyes, self.generalist.settings.step_m)
 
     def read_map(self, path: Path) -> RoomMap:
         """See `map_files.read_map`."""
-        return read_map(path, self._eyes, self.card.feature_count)
+        return read_map(path, self._eyes, self.generalist.settings.step_m, self.card.feature_count)
 
     @property
     def _eyes(self) -> str:

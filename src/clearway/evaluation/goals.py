@@ -14,6 +14,7 @@ import numpy as np
 
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk, shortest_paths
+from clearway.choices import GOAL_STEPS, GOALS
 from clearway.errors import AgentError, SceneError
 from clearway.evaluation import metrics
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
@@ -22,8 +23,6 @@ from clearway.evaluation.takes import Takes
 from clearway.evaluation.tours import Touring, walk_tour
 from clearway.scenes.scene import Scene
 from clearway.world.world import World, make_world
-
-GOALS, GOAL_STEPS = 20, 500
 
 
 @dataclass(frozen=True)
@@ -62,9 +61,10 @@ class GoalEvaluation:
     Attributes:
         agent: its name.
         scenes: figures by scene name.
-        perturbed: how what it saw differed from the scenes' own pictures (`Takes.made`); None: not at all.
-        tour: of the tours of the scenes before the episodes their `steps`, and means of their `collisions` and of the
-            share of `poses` come to; None where there were none.
+        perturbed: how what it saw differed from the scenes' own pictures (`Takes.made`; None: not at all); off the grid
+            the setting's `label` and `perturbations`.
+        tour: of the tours of the scenes before the episodes their `steps`, and means of their `collisions` and, on the
+            grid, of the share of `poses` come to; None where there were none.
         average: the plain mean over scenes; episodes are the sum.
     """
 

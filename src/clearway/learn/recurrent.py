@@ -162,6 +162,10 @@ class TrainedRecurrent:
         """Its own eyes."""
         return EyesEncoder(EncoderRecord(eyes.NAME, "of the run", {}), self.pairs.eyes)
 
+    def warn_of_aspect(self, scenes: Sequence[Scene]) -> None:
+        """Warn (AspectWarning) where pictures have another aspect than those that the eyes were taught on."""
+        warn_of_aspect(scenes, self.pairs.eyes.shape.picture_px, stacklevel=3)
+
     def seen(self, scenes: Sequence[Scene]) -> list[Scene]:
         """Any scenes with pictures as its own eyes see them.
 
@@ -171,5 +175,5 @@ class TrainedRecurrent:
         Warns:
             AspectWarning: a scene's pictures have another aspect than those that the eyes were taught on.
         """
-        warn_of_aspect(scenes, self.pairs.eyes.shape.picture_px)
+        self.warn_of_aspect(scenes)
         return [encoded(scene, self.encoder) for scene in scenes]

@@ -36,9 +36,14 @@ from clearway.world.world import World
 
 LiveSelection = Literal["sampled", "argmax"]
 SUCCESS_M, SUCCESS_DEG = 0.25, 45.0
-"""A target is reached within half a cell and half a turn of its pose."""
+"""A target is reached within so much of its pose; in rooms of smaller cells within half of one (`within_m`)."""
 NEAR_M, CLOSE_M = 0.3, 0.1
 STEP_S = 1.0  # a step takes so long, move or turn
+
+
+def within_m(cell_size_m: float) -> float:
+    """How near its target's place a body has reached it, so that it does not where a neighbouring cell is."""
+    return min(SUCCESS_M, cell_size_m / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +176,7 @@ class Walking:
         self.layout = layout_of_episode(live, start, target, draws)
         body = live.body(self.layout)
         self.walker = Walker(body, live.pose_of(start), draws, step_m=scene.cell_size_m, turn_deg=scene.turn_deg)
-        self.target = live.pose_of(target)
+        self.target, self._within_m = live.pose_of(target), within_m(scene.cell_size_m)
         self.changed = self.layout != live.as_built()
         self.steps: list[Motion] = []
         self.walk = [self.walker.pose]
@@ -185,7 +190,7 @@ class Walking:
     @property
     def reached(self) -> bool:
         """The body is at the target and looks its way."""
-        return self.walker.is_at(self.target, SUCCESS_M, SUCCESS_DEG)
+        return self.walker.is_at(self.target, self._within_m, SUCCESS_DEG)
 
     def shot(self) -> Shot:
         """The next picture."""

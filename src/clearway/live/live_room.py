@@ -103,9 +103,12 @@ class LiveRoom:
     def check_can_be_rearranged(self, perturbations: Perturbations) -> None:
         """Raise SceneError where perturbations move what cannot be moved here."""
         wanted = [name for name in REARRANGING if getattr(perturbations, name)]
-        if self.room is None and wanted:
-            problem = f"nothing can be moved in a MuJoCo model, and {wanted[0]} is asked for"
-            raise SceneError(self.scene.name, problem, f"Leave out {' and '.join(REARRANGING)}")
+        if not wanted:
+            return
+        check_can_be_rearranged(self.scene, perturbations)
+        if self.room is None or not self.model.nmocap:
+            problem = f"the room was built with nothing loose in it, and {wanted[0]} is asked for"
+            raise SceneError(self.scene.name, problem, "Build it loose, or leave the room to clearway")
 
 
 def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveRoom:
@@ -125,8 +128,6 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
         from clearway.live.model_room import live_model_scene
 
         return live_model_scene(scene)
-    if made.source == floor_plans.GENERATED and (problem := other_version(made.notes)):
-        raise SceneError(scene.name, problem, "Its looks may differ: generate it again, or use that clearway")
     if made.source in floor_plans.SOURCES and made.seed is not None:
         return _live_plan(scene, plan_scenes.plan_of(scene), made.seed, small, loose)
     assert made.room is not None and made.seed is not None, "as check_is_room found"
@@ -144,6 +145,8 @@ def live_room(scene: Scene, *, small: bool = False, loose: bool = True) -> LiveR
 def check_is_room(scene: Scene) -> None:
     """Check by a scene's record, at once, that its room can be built again. Raises SceneError."""
     made = scene.made_by
+    if made.source == floor_plans.GENERATED and (problem := other_version(made.notes)):
+        raise SceneError(scene.name, problem, "Its looks may differ: generate it again, or use that clearway")
     is_plan = made.source in floor_plans.SOURCES and made.seed is not None
     is_named = made.source == "room" and made.room is not None and made.seed is not None
     if not (is_plan or is_named or made.source == MODEL_SOURCE):
@@ -152,6 +155,14 @@ def check_is_room(scene: Scene) -> None:
             f"there is no room to walk in: the scene comes from {made.source}",
             "Walk live in a scene that clearway scenes build, generate, import floor-plan or import mjcf made",
         )
+
+
+def check_can_be_rearranged(scene: Scene, perturbations: Perturbations) -> None:
+    """Check by a scene's record that its room can be rearranged, if that is asked for. Raises SceneError."""
+    wanted = [name for name in REARRANGING if getattr(perturbations, name)]
+    if wanted and scene.made_by.source == MODEL_SOURCE:
+        problem = f"nothing can be moved in a MuJoCo model, and {wanted[0]} is asked for"
+        raise SceneError(scene.name, problem, f"Leave out {' and '.join(REARRANGING)}")
 
 
 def live_room_named(name: str, seed: int = 0, *, small: bool = False, loose: bool = True) -> LiveRoom:

@@ -89,8 +89,8 @@ def notes(report: LiveReport) -> list[str]:
     return [
         f"Encoder: {report.encoder}. Actions {protocol.selection}. {protocol.episodes_per_target} episodes a target "
         f"from the starts of the grid's evaluation, at most {protocol.step_limit:,} steps, seed {protocol.seed}.",
-        f"Success: within {100 * SUCCESS_M:g} cm and {SUCCESS_DEG:g}° of the target's pose. Ranges: 95 % bootstrap "
-        "intervals over episodes; differences are paired by episode.",
+        f"Success: within {100 * SUCCESS_M:g} cm, at most half a cell, and {SUCCESS_DEG:g}° of the target's pose. "
+        "Ranges: 95 % bootstrap intervals over episodes; differences are paired by episode.",
         f"{ON_GRID.capitalize()}: the same agents, targets, starts and number of episodes on the scene's grid; success "
         "is the target's very pose, a contact a blocked move, and there is no clearance.",
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import torch
+import numpy as np
 
 from clearway.agents.agent import Agent, State
 from clearway.evaluation.tours import tour_begin
@@ -49,7 +49,7 @@ def walk_live_tour(
     """
     start, own = tour_begin(live.scene, seed)
     walker = Walking(live, start, start, Draws(own, as_it_was_built(perturbations)))
-    state = explorer.reset({}, torch.tensor([own]).numpy())
+    state = explorer.reset({}, np.array([own]))
     for _ in range(steps):
         decisions, state = explorer.act(shown(explorer, [walker], camera), state)
         walker.act(Action(int(decisions.action[0])))

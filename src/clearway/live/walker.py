@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.live.body import Body, Motion
+from clearway.live.body import NO_GAPS, Body, Motion
 from clearway.live.draws import Draws
 from clearway.scenes.actions import MOVES, Action
 from clearway.zones import Zone
@@ -64,14 +64,15 @@ class Walker:
         parts = ARC_PARTS if distance_m and turned_deg else 1
         half = np.radians(turned_deg) / parts / 2
         chord_m = distance_m / parts * float(np.sinc(half / np.pi))  # of the arc of that length
-        motion = Motion(0.0, False, np.zeros(0))
+        travelled_m, contact = 0.0, False
         for part in range(parts if distance_m else 0):
             heading_deg = self.heading_deg + (part + 0.5) * turned_deg / parts
             motion = self.body.move(chord_m, heading_deg, measured=False)
-            if motion.contact:
+            travelled_m, contact = travelled_m + motion.travelled_m, motion.contact
+            if contact:
                 break
         self._turn(turned_deg)
-        return motion
+        return Motion(travelled_m, contact, NO_GAPS)
 
     def _turn(self, angle_deg: float) -> None:
         self.heading_deg = (self.heading_deg + angle_deg) % 360

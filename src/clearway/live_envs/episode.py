@@ -188,7 +188,7 @@ class Episodes:
             start: None: drawn from the poses that are not at the target already.
 
         Raises:
-            EnvError: a start or target is unknown or in an obstacle, or all that could be drawn are at the other.
+            EnvError: a start or target is unknown or in an obstacle, or they are at each other, whether given or drawn.
         """
         draws = Draws(seed, self.rules.perturbations)
         chances = draws.generator(ENDS).random(2)
@@ -199,6 +199,9 @@ class Episodes:
             target_pose = self._drawn("target", self._targets, start_pose, chances[0])
         if start_pose is None:
             start_pose = self._drawn("start", self._states, target_pose, chances[1])
+        elif near(start_pose, target_pose, self.rules.success_m, self.rules.success_deg):
+            problem = f"the start is within success_m and success_deg of the target in {self.live.scene.name}"
+            raise EnvError(f"options['start']: {problem}. Give ends farther apart")
         return EpisodePlan(draws, start_pose, target_pose)
 
     def begin(self, plan: EpisodePlan, last: LiveEpisode | None = None) -> LiveEpisode:

@@ -14,7 +14,7 @@ import numpy as np
 from clearway.live.live_room import LiveRoom
 from clearway.rooms.camera import Shot
 from clearway.rooms.detail import are_small
-from clearway.rooms.render import core_count, photographers
+from clearway.rooms.render import MOST_WORKERS, photographers, process_count
 from clearway.scenes.sensors import Sensor
 
 Pictures = Callable[[], np.ndarray]
@@ -30,12 +30,12 @@ class Eyes:
     Args:
         live: the room.
         sensors: the cameras; all pictures have one size.
-        workers: processes for each camera; None: one a core.
+        workers: processes for each camera, 16 at most; None: one a core.
     """
 
     def __init__(self, live: LiveRoom, sensors: Sequence[Sensor], workers: int | None = None) -> None:
         self._sensors = tuple(sensors)
-        self._workers = workers or core_count()
+        self._workers = process_count(workers, MOST_WORKERS)
         opened = ExitStack()
         height_px, width_px = self._sensors[0].shape[:2]
         view = live.lens(height_px, width_px, fast=are_small(height_px, width_px))

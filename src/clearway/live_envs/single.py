@@ -15,7 +15,6 @@ from clearway.live_envs.arguments import LIVE_RENDER_MODES, PerturbationSource, 
 from clearway.live_envs.vector import (
     HEIGHT_PX,
     SUCCESS_DEG,
-    SUCCESS_M,
     WIDTH_PX,
     Info,
     LiveImageGoalVectorEnv,
@@ -117,7 +116,7 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
     | `stop`              | `False`             | a fifth action ends the episode                                      |
     | `step_m`            | `None`              | length of a move; None: the grid's                                   |
     | `turn_deg`          | `None`              | angle of a turn; None: the grid's                                    |
-    | `success_m`         | `0.25`              | so near has the agent arrived                                        |
+    | `success_m`         | `None`              | so near has the agent arrived; None: 0.25, or half a cell if less    |
     | `success_deg`       | `30.0`              | looking so nearly the target's way                                   |
     | `perturbations`     | `None`              | `live.conditions.Perturbations`, or strengths by name                |
     | `max_episode_steps` | `None`              | steps until truncation; None for no limit (`make` sets 500)          |
@@ -152,7 +151,7 @@ class LiveImageGoalEnv(gymnasium.Env[Observation, Any]):
         stop: bool = False,
         step_m: float | None = None,
         turn_deg: float | None = None,
-        success_m: float = SUCCESS_M,
+        success_m: float | None = None,
         success_deg: float = SUCCESS_DEG,
         perturbations: PerturbationSource = None,
         history_length: int | None = None,

@@ -27,6 +27,7 @@ from clearway.envs.arguments import (
 )
 from clearway.errors import EnvError
 from clearway.live.conditions import REARRANGING
+from clearway.live.episodes import within_m
 from clearway.live_envs.arguments import (
     CLEARANCE,
     LIVE_RENDER_MODES,
@@ -52,7 +53,7 @@ Info = dict[str, Any]
 Asked = tuple[list[int], list[int], dict[str, Pictures]]
 """Environments that look, those among them that begin, and what they will have seen."""
 
-SUCCESS_M, SUCCESS_DEG = 0.25, 30.0
+SUCCESS_DEG = 30.0
 HEIGHT_PX, WIDTH_PX = 96, 128
 FARTHEST_M, ONCE_ROUND_DEG = 10.0, 360.0  # of a move and of a turn
 EPISODE_OPTIONS = ("target", "start")
@@ -114,7 +115,7 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         stop: bool = False,
         step_m: float | None = None,
         turn_deg: float | None = None,
-        success_m: float = SUCCESS_M,
+        success_m: float | None = None,
         success_deg: float = SUCCESS_DEG,
         perturbations: PerturbationSource = None,
         history_length: int | None = None,
@@ -128,12 +129,16 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.autoreset_mode = chosen_autoreset(autoreset_mode)
         self._sensors = checked_sensors(sensors, height_px, width_px)
         _check_switches(continuous, stop, render_mode, self._sensors)
+        if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
+            raise EnvError(f"workers={workers!r:.40}: expected a whole number from 1 on, or None for one a core")
         if step_m is not None:
             checked_number("step_m", step_m, FARTHEST_M)
         if turn_deg is not None:
             checked_number("turn_deg", turn_deg, ONCE_ROUND_DEG)
         earned, perturbed = reward_named(reward), checked_perturbations(perturbations)
-        within = checked_number("success_m", success_m, FARTHEST_M), checked_number("success_deg", success_deg, 180.0)
+        if success_m is not None:
+            checked_number("success_m", success_m, FARTHEST_M)
+        checked_number("success_deg", success_deg, 180.0)
 
         moving = any(getattr(perturbed, name) for name in REARRANGING)
         live = opened_room(room, room_seed, small=are_small(height_px, width_px), loose=moving)
@@ -141,8 +146,8 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             earned,
             step_m=float(live.scene.cell_size_m if step_m is None else step_m),
             turn_deg=float(live.scene.turn_deg if turn_deg is None else turn_deg),
-            success_m=within[0],
-            success_deg=within[1],
+            success_m=float(within_m(live.scene.cell_size_m) if success_m is None else success_m),
+            success_deg=float(success_deg),
             stop=stop,
             perturbations=perturbed,
         )

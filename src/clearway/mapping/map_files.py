@@ -1,4 +1,4 @@
-"""Files of `RoomMap`: a safetensors file whose header says, as JSON, which eyes made it and its SHA-256.
+"""Files of `RoomMap`: a safetensors file whose header is JSON: which eyes made it, how long a move is, its SHA-256.
 
 The hash guards against damage, not against forgers; shapes and values are checked besides.
 """
@@ -18,7 +18,7 @@ from clearway.mapping.lattice import HEADINGS
 from clearway.mapping.room_map import RoomMap
 from clearway.regular_files import read_bytes
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 HEADER = "clearway.map"
 MAX_BYTES, MAX_SIDE, MAX_PICTURES = 256 * 1024**2, 1025, 10_000
 DTYPES: Mapping[str, type[np.generic]] = {
@@ -30,28 +30,29 @@ DTYPES: Mapping[str, type[np.generic]] = {
 AGAIN = "Tour the room again"
 
 
-def write_map(path: Path, known: RoomMap, eyes: str) -> None:
-    """Write a map, with the identity of the eyes that made it. Raises OSError."""
+def write_map(path: Path, known: RoomMap, eyes: str, step_m: float) -> None:
+    """Write a map, with the identity of the eyes that made it and the length of a move. Raises OSError."""
     from safetensors.numpy import save
 
     arrays: dict[str, np.ndarray] = {
         name: np.ascontiguousarray(getattr(known, name), dtype) for name, dtype in DTYPES.items()
     }
-    header = {"format_version": FORMAT_VERSION, "eyes": eyes, "sha256": _sha256(arrays)}
+    header = {"format_version": FORMAT_VERSION, "eyes": eyes, "step_m": step_m, "sha256": _sha256(arrays)}
     with written_whole(path) as part:
         part.write_bytes(save(arrays, {HEADER: json.dumps(header)}))
 
 
-def read_map(path: Path, eyes: str, feature_count: int) -> RoomMap:
+def read_map(path: Path, eyes: str, step_m: float, feature_count: int) -> RoomMap:
     """The map in a file.
 
     Args:
         path: the file.
         eyes: identity of those that are to go by it.
+        step_m: length of their moves.
         feature_count: F, of theirs.
 
     Raises:
-        DeployError: it cannot be read, is no map, was altered, or other eyes made it.
+        DeployError: it cannot be read, is no map, was altered, or was made by other eyes or moves.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load
@@ -62,7 +63,7 @@ def read_map(path: Path, eyes: str, feature_count: int) -> RoomMap:
         raise DeployError(f"{path}: cannot be read ({fault.strerror}). Check the path") from fault
     try:
         header = parse_json(safetensors_metadata(content)[HEADER])
-        version, made_by, sha256 = (header[name] for name in ("format_version", "eyes", "sha256"))
+        version, made_by, sha256 = header["format_version"], header["eyes"], header["sha256"]
         arrays = load(content)
     except (SafetensorError, ValueError, KeyError, TypeError) as fault:
         reason = " ".join(str(fault).split())[:120]
@@ -72,6 +73,9 @@ def read_map(path: Path, eyes: str, feature_count: int) -> RoomMap:
         raise DeployError(f"{path}: of format {version!r:.20}, this clearway reads {FORMAT_VERSION}. {AGAIN}")
     if made_by != eyes:
         problem = f"{path}: made by other eyes ({made_by!r:.40}), and the agent's are {eyes!r:.40}"
+        raise DeployError(f"{problem}. {AGAIN}, or open the agent that made it")
+    if (made_at := header.get("step_m")) != step_m:
+        problem = f"{path}: made by moves of {made_at!r:.20} m, and the agent's are {step_m:g} m"
         raise DeployError(f"{problem}. {AGAIN}, or open the agent that made it")
     if problem := _problem(arrays, feature_count):
         raise DeployError(f"{path}: {problem}. {AGAIN}")

@@ -10,6 +10,7 @@ from importlib.metadata import version
 
 import numpy as np
 
+from clearway.rooms.camera import PICTURE_SIZE_PX
 from clearway.rooms.detail import DETAIL_NOTE, DETAILS, are_small, detail_for
 from clearway.scenes import floor_plans, plan_scenes
 from clearway.scenes.floor_plans import FloorPlan
@@ -17,8 +18,6 @@ from clearway.scenes.scene import Provenance, Scene
 from clearway.scenes.sensors import RGB, check_names
 from clearway.scenes.validate import check_moves
 from clearway.version import __version__
-
-PICTURE_SIZE_PX = (300, 400)  # height and width, of our own rooms
 
 
 def build_scene(

@@ -15,7 +15,7 @@ from clearway.scenes import sensors
 
 CAMERA_HEIGHT_M = 1.0
 VERTICAL_FOV_DEG = 60.0
-PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX = 300, 400
+PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX = PICTURE_SIZE_PX = 300, 400  # of our own rooms
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Shot:
         azimuth_deg: the direction it looks in across the floor, 0 along +x, 90 along +z.
         elevation_deg: 0 looks level, -90 straight down.
         moved_m: where the room's loose pieces stand for this picture, how far along x and along z and upwards each has
-            been moved (`pieces`); empty leaves them where they were built.
+            been moved (`pieces`); empty leaves them where the shot before had them, at first where they were built.
     """
 
     look_at_m: tuple[float, float, float]

@@ -56,7 +56,7 @@ def render(
         RunError: Ray is not installed, or the cluster cannot be reached.
     """
     pictures = view.empty_pictures(len(view.shots))
-    count = None if ray is not None or here else _process_count(workers, len(pictures))
+    count = None if ray is not None or here else process_count(workers, len(pictures))
     workers, ray = (None, None) if here else (count or workers, ray)
     size = RAY_SHARE_SHOTS if count is None else _share_size(len(pictures), count)
     with (
@@ -83,7 +83,7 @@ def studio(model: mujoco.MjModel, view: View, *, workers: int | None = None) -> 
     Yields:
         A function from shots to their pictures (`View.empty_pictures`); it raises what `render` raises.
     """
-    count = _process_count(workers, MOST_WORKERS)
+    count = process_count(workers, MOST_WORKERS)
     nothing = view.empty_pictures(0)
     with photographers(model, view, workers=workers) as crew:
         yield lambda shots: np.concatenate(
@@ -96,7 +96,7 @@ def photographers(
     model: mujoco.MjModel, view: View, *, workers: int | None = None
 ) -> Iterator[Workers[Sequence[Shot], np.ndarray]]:
     """The processes of a `studio`: what is submitted is taken while the caller does other things."""
-    count = _process_count(workers, MOST_WORKERS)
+    count = process_count(workers, MOST_WORKERS)
     with workers_for(_work(model, view, count), workers=count) as crew:
         yield crew
 
@@ -116,7 +116,7 @@ def _died(shots: Sequence[Shot], how: str) -> RenderError:
     )
 
 
-def _process_count(workers: int | None, shots: int) -> int:
+def process_count(workers: int | None, shots: int) -> int:
     """Number of processes for so many shots, 1 or more."""
     if workers is not None and workers < 1:
         raise RenderError(f"{workers} renderer processes cannot render; ask for 1 or more")

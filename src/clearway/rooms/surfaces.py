@@ -22,7 +22,6 @@ class Surface:
         right_m, up_m: (3,) its sides; right x up points into the room.
         albedo: (height, width, 3) picture at PIXELS_PER_METRE, or fewer, in [0, 1], row 0 at the bottom.
         group: MuJoCo's geom group.
-        flipped: the room is mirrored, so the picture runs against `right_m`.
     """
 
     name: str
@@ -31,7 +30,6 @@ class Surface:
     up_m: np.ndarray
     albedo: np.ndarray = field(repr=False)
     group: int = 2
-    flipped: bool = False
 
     @property
     def width_m(self) -> float:
