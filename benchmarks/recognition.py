@@ -1,7 +1,7 @@
 """How well the eyes that come along see in rooms, perturbed as off the grid, beside other encoders.
 
-    python benchmarks/recognition.py rooms-validation                        # files, or folders of them, with pictures
-    python benchmarks/recognition.py rooms-validation --rooms 16 --json record.json
+    python benchmarks/recognition.py rooms-test                              # files, or folders of them, with pictures
+    python benchmarks/recognition.py rooms-test --rooms 16 --json record.json
 
 *Recognised*: of every pose of a room's grid one picture is taken under perturbations of its own and compared with the
 pictures that the scene has of all its poses, by the cosine of features; the share whose nearest is of the same pose,
@@ -175,7 +175,7 @@ def main() -> None:
     print(table(summary(rooms)))
     if args.json:
         record = {"rooms": [file.stem for file in files], "seed": args.seed, "recognised": rooms, "told": told}
-        record |= {"hardware": hardware(), "versions": package_versions()}
+        record |= {"eyes": find_record(NAME, []).identity, "hardware": hardware(), "versions": package_versions()}
         args.json.write_text(json.dumps(record, indent=1) + "\n")
 
 
