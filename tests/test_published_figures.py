@@ -54,6 +54,29 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
 
 
+def test_own_goals_are_what_their_record_comes_to() -> None:
+    record = json.loads((DOCS / "figures" / "own-goals.json").read_text(encoding="utf-8"))
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Own goals")[2].partition("\n### ")[0]
+    tables = {
+        "fig5": [("steps away", "agent"), "| steps from a given target |", 2],
+        "fig6": [("targets a scene",), "| given targets |", 1],
+    }
+    for name, (keys, heading, width) in tables.items():
+        headings, *rows = record[name]
+        found = {}
+        for row in rows:
+            figures = dict(zip(headings, row, strict=True))
+            if figures["learner"]:
+                found[tuple(figures[key] for key in keys)] = figures
+        lines = page.partition(heading)[2].partition("\n\n")[0].splitlines()[2:]
+        assert len(lines) == len([key for key in found if key[0] not in ("", "average")])
+        for line in lines:
+            cells = [cell.strip() for cell in line.strip("|").split("|")]
+            figures = found[cells[0].replace("7 (two targets)", "8"), *cells[1:width]]
+            for cell, of in zip(cells[width:], ("sc", "sc within 4 x shortest", "SPL"), strict=True):
+                assert_written(numbers(cell)[0], 100 * float(figures[of]), f"{of} in {line}")
+
+
 def check_zones_of_cells(section: Section) -> None:
     """Rows and claims of its section of the evidence."""
     page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones of cells")[2]

@@ -16,6 +16,8 @@ ARRIVALS = ("false_arrivals", "missed_arrivals")
 SHARES = ("success", "success_4x", "spl")
 THIRD, FOURTH, FIFTH, SIXTH = (f"generalist-test-{number}.json" for number in ("third", "fourth", "fifth", "sixth"))
 TOURS, WALKERS, AGAIN = "generalist-tours.json", "walkers-test.json", "off-grid-again.json"
+EARLIER_WALKERS = "recurrent-test.json"
+THEIRS = ("RecurrentPPO, 16 x 128", "RecurrentPPO, 96 x 32")
 KINDS = ("collision-aware", "shortest", "bump", "clearance")
 ROWS = [
     (FIFTH, "rooms", "generalist", "| rooms | 100 % | 93.8"),
@@ -71,6 +73,10 @@ ROWS = [
     *((WALKERS, None, f"{kind}-{seed}", f"| {kind}, seed {seed} |") for kind in KINDS for seed in range(3)),
     *((WALKERS, None, f"collision-aware-again-{n}", f"| collision-aware, seed {n}, may try") for n in range(3)),
     (WALKERS, None, "random", "| walk at random in these rooms |"),
+    (EARLIER_WALKERS, None, "rec-aware", "| collision-aware | 97.5"),
+    (EARLIER_WALKERS, None, "rec-shortest", "| shortest | 98.1"),
+    (EARLIER_WALKERS, None, "rec-forgets", "| collision-aware, without memory |"),
+    (EARLIER_WALKERS, None, "random", "| random walk | 72.5 % (68.7"),
     (THIRD, "real-tour", "generalist", "| real plans, after a tour of 500 steps |"),
 ]
 
@@ -347,3 +353,73 @@ def test_adapting_takes_as_many_frames_as_its_record_says() -> None:
     assert any(f"in {took[0]} s, from nothing in {took[1]}," in line for line in lines)
     more = np.divide(frames["adapted without walks"][20], frames["adapted"][20])
     assert any(f"twenty in {more.min():.1f} to {more.max():.1f} times the frames" in line for line in lines)
+
+
+def record_of(name: str) -> dict:
+    return json.loads((DOCS / "figures" / name).read_text(encoding="utf-8"))
+
+
+def test_the_curve_over_scenes_is_what_its_record_comes_to() -> None:
+    record, curve = record_of("eyes-curve.json"), PAGE.partition("### How eyes grow")[2].partition("### Beside")[0]
+    labels = {"nothing": "eyes of the first stage"}
+    lines = [line.strip("|").split("|") for line in curve.splitlines() if line.startswith("| ") and "%" in line]
+    assert len(lines) == 6
+    means: dict[str, list[float]] = {"success": [], "spl": []}
+    for label, pictures, *cells in lines:
+        name = labels.get(label.strip(), label.strip())
+        part = record[f"{name}, 81,920 pictures" if pictures.strip() == "81,920" else name]
+        for figure, cell in zip(("success", "spl", "collisions"), cells, strict=True):
+            values = np.array([scene[figure] for scene in part["scenes"]]) * (1 if figure == "collisions" else 100)
+            mean, *interval = numbers(cell)
+            assert_written(mean, float(values.mean()), f"{figure} of {label}")
+            for written, value in zip(interval, ends(values), strict=bool(interval)):
+                assert_written(written, value, f"interval of {figure} of {label}")
+            if figure in means and pictures.strip() == "40,960":
+                means[figure].append(float(values.mean()))
+    said = re.search(
+        r"ten times as many scenes (\S+) points of success and (\S+) of SPL, for a\s+hundred times (\S+) and (\S+),",
+        curve,
+    )
+    assert said is not None
+    scenes = np.log10([18, 37, 74, 146])  # rooms and flats
+    slopes = [float(np.polyfit(scenes, means[figure], 1)[0]) for figure in ("success", "spl")]
+    for written, value in zip(said.groups(), (*slopes, *(2 * slope for slope in slopes)), strict=True):
+        assert_written(written, value, said[0])
+
+
+def test_the_first_two_generalists_are_what_their_records_come_to() -> None:
+    said = re.search(
+        r"generalist-test\.json\) \(no tour, SPL (\S+) %, (\S+) collisions;\s+flats: success (\S+) %, SPL (\S+) %\).*"
+        r"generalist-test-again\.json\) \((\S+) %, (\S+); flats: (\S+) %, (\S+) %\)",
+        PAGE,
+        re.S,
+    )
+    assert said is not None
+    asked = ("rooms", "spl"), ("rooms", "collisions"), ("flats", "success"), ("flats", "spl")
+    found = [
+        mean(record, part, THE, name) * (1 if name == "collisions" else 100)
+        for record in ("generalist-test.json", "generalist-test-again.json")
+        for part, name in asked
+    ]
+    for written, value in zip(said.groups(), found, strict=True):
+        assert_written(written, value, said[0])
+
+
+def test_the_recurrent_learner_is_as_fast_as_its_record_says() -> None:
+    speed = record_of("recurrent.json")["speed"]["figures"]
+    told = [speed["frames_per_second"][name] for name in ("ours", "ours, taught", *THEIRS)]
+    said = re.search(
+        r"ours (\S+) \(PPO\) and (\S+) \(while it is taught\), "
+        r"sb3-contrib's RecurrentPPO on the same table (\S+) \(.*?\)\s+"
+        r"and (\S+) \(.*?\): (\S+) and (\S+) times as many",
+        PAGE,
+    )
+    assert said is not None
+    for written, value in zip(said.groups(), (*told, told[0] / told[2], told[0] / told[3]), strict=True):
+        assert_written(written.replace(",", ""), value, said[0])
+    learning = (DOCS / "learning.md").read_text(encoding="utf-8")
+    said = re.search(r"five targets take (\d+) MB of table, and (\d+) MB of features", learning)
+    assert said is not None
+    kept = [speed["memory"][f"{name}_mb_per_1000_rooms"] for name in ("pair_table", "features_float16")]
+    for written, value in zip(said.groups(), kept, strict=True):
+        assert_written(written, value, said[0])
