@@ -13,6 +13,7 @@ from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from helpers.published import DOCS, assert_written, numbers
 
+RESULTS = (DOCS / "results.md").read_text(encoding="utf-8")
 AGENTS = r"collision-aware|dearer|shuffled|shortest"
 
 
@@ -75,6 +76,11 @@ def test_own_goals_are_what_their_record_comes_to() -> None:
             figures = found[cells[0].replace("7 (two targets)", "8"), *cells[1:width]]
             for cell, of in zip(cells[width:], ("sc", "sc within 4 x shortest", "SPL"), strict=True):
                 assert_written(numbers(cell)[0], 100 * float(figures[of]), f"{of} in {line}")
+        if name == "fig5":
+            (line,) = [line for line in RESULTS.splitlines() if line.startswith("| one to seven steps from five given")]
+            of_all = [found["average", agent] for agent in ("shortest", "collision-aware")]
+            for written, figures in zip(numbers(line.split("|")[3]), of_all, strict=True):
+                assert_written(written, 100 * float(figures["SPL"]), line)
 
 
 def check_zones_of_cells(section: Section) -> None:
