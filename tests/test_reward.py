@@ -12,6 +12,7 @@ from clearway.reward import (
     REWARDS,
     SHORTEST,
     Arrival,
+    Bump,
     Clearance,
     Moves,
     Reward,
@@ -129,6 +130,11 @@ def test_changes_that_cannot_be(parameters: dict, message: str) -> None:
         ((Time(),), "expected one term Arrival"),
         ((Time(), Time(), Arrival()), "a term occurs twice"),
         ((abs, Arrival()), "is no term"),
+        (
+            (Bump(), Time(), Arrival()),
+            "another order. Give Time, Zones, Bump, Clearance, then those of your own",
+        ),
+        ((Doubled(2.0), Time(), Arrival()), "stand in another order"),
     ],
 )
 def test_terms_that_make_no_reward(terms: tuple, message: str) -> None:
@@ -156,6 +162,13 @@ def test_a_reward_changed_twice_says_how_it_differs_from_the_one_of_its_name() -
     assert twice.name == "collision-aware, alpha -0.02, beta -0.6"
     assert twice.with_changes(beta=-0.02, alpha=-0.01) == COLLISION_AWARE
     assert COLLISION_AWARE.with_changes(beta=-0.02000001).name == "collision-aware, beta -0.02000001"
+
+
+def test_the_name_of_a_reward_of_one_s_own_says_its_last_changes() -> None:
+    mine = Reward("mine, for short", (Time(), Arrival()))
+    twice = mine.with_changes(alpha=-0.02, beta=-0.5).with_changes(alpha=-0.03)
+    assert twice.name == "mine, for short, alpha -0.03, beta -0.5"
+    assert twice.with_changes(alpha=None).name == twice.name
 
 
 def test_terms_cannot_write_to_the_tables() -> None:

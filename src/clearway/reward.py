@@ -166,7 +166,8 @@ class Reward:
 
     Attributes:
         name: in tables.
-        terms: in the order in which they apply; `Arrival` applies last, at the target alone.
+        terms: in the order in which they apply: ours as in `TERMS`, then others; `Arrival` applies last, at the target
+            alone, wherever it stands.
         clip: clip to [-1, 1] as Zhu's training loop does, so that the target is worth 1. In a training the algorithm's
             setting `clip_rewards` says so, see `learn.learner.Learner.paid`.
     """
@@ -181,7 +182,8 @@ class Reward:
         """Refuse what is no term.
 
         Raises:
-            RewardError: a term is none, a kind of term occurs twice, or there is no `Arrival`.
+            RewardError: a term is none, a kind of term occurs twice, they stand in another order, or there is no
+                `Arrival`.
         """
         if not isinstance(self.name, str) or not isinstance(self.clip, bool):
             raise RewardError(f"reward: name={self.name!r:.40}, clip={self.clip!r:.40}: expected a text, True or False")
@@ -193,6 +195,11 @@ class Reward:
         kinds = [type(term) for term in self.terms if not isinstance(term, _Unknown)]
         if len(set(kinds)) < len(kinds):
             raise RewardError(f"reward {self.name}: a term occurs twice. Give every kind of term once")
+        ours = list(TERMS.values())
+        places = [ours.index(kind) if kind in ours else len(ours) for kind in map(type, self.terms) if kind != Arrival]
+        if places != sorted(places):
+            order = ", ".join(kind.__name__ for kind in ours if kind is not Arrival)
+            raise RewardError(f"reward {self.name}: terms stand in another order. Give {order}, then those of your own")
         if sum(isinstance(term, Arrival) for term in self.terms) != 1:
             raise RewardError(f"reward {self.name}: expected one term Arrival, for the target. Give one")
         for name, value in self.parameters.items():
@@ -279,10 +286,19 @@ class Reward:
             kind = TERM_OF[name]
             terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
         changed = Reward(self.name, _in_order(terms), self.clip if clip is None else clip)
-        base = REWARDS.get(self.name.partition(",")[0], self)
-        known, now = base.parameters, changed.parameters
-        told = [f"{name} {value:.10g}" for name, value in now.items() if known.get(name) != value]
-        return replace(changed, name=", ".join([base.name, *told]))
+        base, before = self._told_by_name()
+        known, now = REWARDS.get(base, self).parameters, changed.parameters
+        told = {} if base in REWARDS else before
+        told |= {name: f"{value:.10g}" for name, value in now.items() if known.get(name) != value}
+        return replace(changed, name=", ".join([base, *(f"{name} {told[name]}" for name in now if name in told)]))
+
+    def _told_by_name(self) -> tuple[str, dict[str, str]]:
+        """The name without what `with_changes` has put behind it, and that: parameters as texts."""
+        parts, told = self.name.split(", "), dict[str, str]()
+        while len(parts) > 1 and (last := parts[-1].split(" "))[0] in self.parameters and len(last) == 2:
+            told[last[0]] = last[1]
+            parts.pop()
+        return ", ".join(parts), told
 
     def to_json(self) -> dict[str, object]:
         """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands."""

@@ -10,7 +10,7 @@ from clearway.envs.floor_map import FloorMap
 from clearway.envs.record import EpisodeRecord
 from clearway.envs.single import ImageGoalEnv
 from clearway.envs.vector import ImageGoalVectorEnv
-from clearway.scenes.actions import Action
+from clearway.scenes.actions import BLOCKED, Action
 from clearway.scenes.scene import Scene
 from clearway.zones import Zone, scene_zones
 from helpers.made import corridor_scene, grid_scene
@@ -103,7 +103,17 @@ def test_text() -> None:
     assert env.render().endswith("→")
     env.reset(options={"start": 12})
     env.step(Action.MOVE_FORWARD)
-    assert "step 1  ·  0 collisions  ·  target reached" in env.render()
+    assert "step 1  ·  0 collisions  ·  at the target" in env.render()
+
+
+def test_text_where_no_way_leads_to_the_target() -> None:
+    scene = corridor_scene(5)
+    graph = scene.graph.copy()
+    graph[16:] = np.where(graph[16:] < 16, BLOCKED, graph[16:])  # the last cell can be entered, not left
+    env = ImageGoalEnv(replace(scene, graph=graph), targets={"corridor": [0]}, render_mode="ansi")
+    env.reset(options={"start": 12})
+    env.step(Action.MOVE_FORWARD)
+    assert "no way to the target" in env.render()
 
 
 def test_a_batch_renders_each_environment() -> None:

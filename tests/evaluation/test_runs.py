@@ -51,6 +51,14 @@ def test_runs_of_other_zones_and_names_given_twice_are_refused(tmp_path: Path) -
             evaluate_runs({"one": one}, scenes, beside={name: lambda world: RandomWalk()})
 
 
+@pytest.mark.parametrize("name", ["random", "shortest path", "optimum of mine", "soft fixed point"])
+def test_a_reward_with_the_name_of_a_yardstick_is_refused(name: str, tmp_path: Path) -> None:
+    request = small_request(learner=small_learner(frames=160))
+    agent = load_agent(train(request, tmp_path).path)
+    with pytest.raises(RunError, match=f"the reward '{name}' has the name of a yardstick"):
+        evaluate_runs({name: agent}, request.scenes)
+
+
 def test_the_optimum_is_that_of_the_reward_as_training_paid_it() -> None:
     request = small_request(scenes=[SCENE], targets={SCENE.name: (5, 100)}, learner=small_learner(clip_rewards=True))
     record, world = record_of(request), request.trainer().world

@@ -79,6 +79,14 @@ def test_unseen_targets_are_so_many_steps_from_the_nearest_trained_one(tmp_path:
         assert set(own) <= set(there.tolist())
 
 
+def test_poses_that_cannot_be_come_to_are_no_unseen_targets() -> None:
+    scene = corridor_scene(8)
+    graph = scene.graph.copy()
+    graph[:28] = np.where(graph[:28] >= 28, BLOCKED, graph[:28])  # the last cell can be left, not entered
+    away = fig5.steps_to_nearest(replace(scene, graph=graph), (0,))
+    assert (away[28:] == -1).all() and away[:28].min() == 0 and away.max() == 8
+
+
 def test_where_no_pose_lies_so_far_away_the_report_says_so(tmp_path: Path) -> None:
     (table, _) = fig5.section(small_setting(tmp_path)).tables
     (note,) = [note for note in table.notes if note.startswith("bathroom has no pose")]

@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from clearway.evaluation import optimum
 from clearway.experiments.zones_or_step import DEARER, SHUFFLED, mean_cost, rewards
 from clearway.reward import COLLISION_AWARE, SHORTEST
 from clearway.scenes.actions import Action
@@ -35,3 +37,15 @@ def test_shuffled_zones_are_as_many_in_other_places(tmp_path: Path) -> None:
     assert (ours != theirs).any()
     dearer = by_name[DEARER].table(moves)[0]
     assert np.unique(dearer).tolist() == [mean_cost(setting)]
+
+
+def test_exact_policies_are_of_the_zones_that_training_pays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    world, tables, whole = small_setting(tmp_path).world(), [], optimum.task_of
+    (shuffled,) = (reward for reward in rewards(small_setting(tmp_path)) if reward.name == SHUFFLED)
+    monkeypatch.setattr(optimum, "task_of", lambda *words: (tables.append(words[-1]), whole(*words))[1])
+    optimum.world_yardsticks(world, shuffled)
+    paid = shuffled.table(world.moves())
+    assert world.scene_count > 1 and len(tables) == world.target_count
+    for scene, table in zip(world.target_scene.tolist(), tables, strict=True):
+        first, last = world.scene_offset[scene : scene + 2].tolist()
+        np.testing.assert_array_equal(table, paid[:, first:last])

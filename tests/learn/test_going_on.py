@@ -8,13 +8,18 @@ import torch
 
 from clearway.errors import RunError
 from clearway.learn import train
+from clearway.learn.bc import BC
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.figures import Figures
+from clearway.learn.learner import Learner
+from clearway.learn.q_learning import QLearning
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.solved import SUCCESS, unsolved_targets
 from clearway.learn.train import RunRequest
 from clearway.learn.trainer import Trainer
-from helpers.small_runs import small_learner, small_request, small_scenes
+from clearway.reward import COLLISION_AWARE
+from helpers.made import corridor_scene
+from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_request, small_scenes
 
 
 def of_frames(frames: int) -> RunRequest:
@@ -72,6 +77,17 @@ def test_a_run_stops_once_every_target_is_solved(tmp_path: Path, monkeypatch: py
     assert [(row["frames"], row["solved_targets"]) for row in folder.metrics()] == [(400, 0), (560, 5)]
     train.train(request, tmp_path, resume=True, until_solved=True)  # solved already
     assert frames_of(folder) == 560
+
+
+@pytest.mark.parametrize("algorithm", [QLearning(), BC()], ids=["q-learning", "bc"])
+def test_whoever_solves_every_target_stops(algorithm: Learner, tmp_path: Path) -> None:
+    scene = corridor_scene(5, feature_count=FEATURES)
+    learner = small_learner(algorithm, frames=200_000)
+    request = RunRequest([scene], {"corridor": CORRIDOR_TARGETS}, learner, COLLISION_AWARE, seed=0)
+    folder = train.train(request, tmp_path, until_solved=True)
+    assert frames_of(folder) < 100_000
+    assert folder.metrics()[-1]["solved_targets"] == 3
+    assert unsolved_targets(folder) == {}
 
 
 def test_a_run_that_solves_not_every_target_uses_all_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 import pytest
 
 from clearway.errors import RunError
+from clearway.learn.ppo import PPO
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.settings import with_settings
 
@@ -18,6 +19,21 @@ def test_a_setting_that_the_algorithm_lacks_is_refused_with_the_names_of_those_i
     for learner, word, has in ((PAPER_A2C, "epochs=2", "hindsight"), (PAPER_A3C, "hindsight=true", "clip_norm")):
         with pytest.raises(RunError, match=rf"^--set {word}: .* {learner.algorithm}'s settings: frames, .*{has}"):
             with_settings(learner, [word])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"frames": 4e2}, "frames is 400.0, expected a whole number"),
+        ({"envs": "10"}, "envs is '10', expected a whole number"),
+        ({"optimiser": "Adam"}, "optimiser is 'Adam', expected 'adam' or 'rmsprop'"),
+        ({"hindsight": "no"}, "hindsight is 'no', expected True or False"),
+        ({"discount": None}, "discount is None, expected a finite number"),
+    ],
+)
+def test_settings_of_another_type_are_refused_before_anything_is_written(changes: dict, message: str) -> None:
+    with pytest.raises(RunError, match=f"^{message}. Correct it"):
+        PPO(**changes)
 
 
 def test_no_words_change_nothing() -> None:

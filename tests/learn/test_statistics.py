@@ -73,15 +73,12 @@ def test_success_is_taken_when_the_window_is_full_and_then_anew() -> None:
     statistics, target = made_statistics(), [0, 1]
     for _ in range(WINDOW - 1):
         statistics.add(one_step(target, [1, 0], [0, 1]))
-        statistics.refresh_success()
     assert statistics.solved == 0  # one episode short
     statistics.add(one_step(target, [1, 1], [0, 0]))
-    statistics.refresh_success()
     assert statistics.recent_success.tolist() == [1, 1 / WINDOW, 0]
     assert statistics.solved == 1
     for _ in range(WINDOW):
         statistics.add(one_step(target, [0, 1], [1, 0]))
-    statistics.refresh_success()
     assert statistics.recent_success.tolist() == [0, 1, 0]
 
 

@@ -93,7 +93,8 @@ class Renderer:
         here, bumps = int(episode.states[-1]), len(episode.bumps)
         to_go = int(self._steps_to[target, here])
         zone = ZONE_NAMES[self._zones[here]]
-        place = "target reached" if to_go == 0 else f"{_counted(to_go, 'step')} to go"
+        ways = {0: "at the target", -1: "no way to the target"}
+        place = ways.get(to_go, f"{_counted(to_go, 'step')} to go")
         return f"step {len(episode.states) - 1}  ·  {_counted(bumps, 'collision')}  ·  {place}  ·  {zone} zone"
 
 

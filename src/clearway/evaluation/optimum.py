@@ -9,7 +9,7 @@ import torch
 
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import by_table
-from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, make_task, yardstick
+from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, task_of, yardstick
 from clearway.reward import Reward
 from clearway.world.world import World
 
@@ -55,12 +55,11 @@ def world_yardsticks(
         entropy_weight: see there.
         starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
     """
-    zone, clearance_m = world.zone.cpu().numpy(), world.clearance_m.cpu().numpy()
+    zone, table = world.zone.cpu().numpy(), reward.table(world.moves())  # of all scenes together, as training pays it
     found = []
     for target, scene in enumerate(world.target_scene.tolist()):
         first, last = world.scene_offset[scene : scene + 2].tolist()
-        tables = zone[first:last], world.scene_state(target), reward, clearance_m[first:last]
-        task = make_task(world.graph(scene), *tables)
+        task = task_of(world.graph(scene), zone[first:last], world.scene_state(target), table[:, first:last])
         exact = yardstick(task, discount, entropy_weight, None if starts is None else starts[target] - first)
         found.append(TargetYardstick(world.scene_names[scene], task.target, exact))
     return found

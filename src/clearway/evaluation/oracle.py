@@ -105,14 +105,19 @@ def make_task(
     Raises:
         SceneError: no state leads to the target.
     """
-    after = next_states(graph)
-    blocked = graph == BLOCKED
     clearance_m = np.full(len(graph), np.inf) if clearance_m is None else clearance_m
+    table = reward.table(Moves(next_states(graph), graph == BLOCKED, zone, clearance_m))
+    return task_of(graph, zone, target, table)
+
+
+def task_of(graph: np.ndarray, zone: np.ndarray, target: int, table: np.ndarray) -> Task:
+    """Likewise, by what every action earns: (2, S, A), see `Reward.table`."""
+    after, blocked = next_states(graph), graph == BLOCKED
     steps = distances_to(graph, np.array([target]))[0]
     starts = np.flatnonzero(is_start(steps))
     if not len(starts):
         raise SceneError("graph", f"no state leads to target {target}", "Choose a target in the largest component")
-    step, arrival = reward.table(Moves(after, blocked, zone, clearance_m))
+    step, arrival = table
     earned = np.where(after == target, arrival, step)
     return Task(target, after, blocked, earned, zone, starts, steps)
 

@@ -57,6 +57,9 @@ def evaluate_runs(
     world = run_world(first, scenes, targets)
     with torch_threads(1):
         optima = _optima(world, [record.reward for record in records])
+        for name in agents:
+            if name in (RANDOM, SHORTEST_PATH) or name.startswith((OPTIMUM, SOFT_FIXED_POINT)):
+                raise RunError(f"the reward {name!r:.80} has the name of a yardstick in the table. Name it otherwise")
         for name in beside:
             if name in (*agents, *optima, RANDOM, SHORTEST_PATH):
                 raise RunError(f"beside: {name!r:.80} is the name of another agent in the table. Choose another")

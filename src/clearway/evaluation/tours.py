@@ -84,7 +84,8 @@ def walk_tour(world: World, touring: Touring, scene: Scene, seed: int, takes: Ta
         happened = env.step(torch.from_numpy(decisions.action.astype(np.int64)))
         collisions += int(happened.blocked)
     been.add(int(env.state))
-    return Tour(state, start, collisions, len(been) / np.count_nonzero(scene.components == 0))
+    largest = set(np.flatnonzero(scene.components == 0).tolist())
+    return Tour(state, start, collisions, len(been & largest) / len(largest))
 
 
 def tour_begin(scene: Scene, seed: int) -> tuple[int, int]:

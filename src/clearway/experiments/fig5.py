@@ -143,11 +143,11 @@ def _unseen(scene: Scene, trained: tuple[int, ...], steps: int, most: int) -> tu
 
 
 def steps_to_nearest(scene: Scene, trained: tuple[int, ...]) -> np.ndarray:
-    """Steps from each pose to the nearest trained target, (S,) int; -1 where none can be reached."""
+    """Steps from each pose of the scene's largest part to the nearest trained target, (S,) int; else -1."""
     steps = scene.distances_to(np.array(trained)).astype(np.int64)
     far = np.iinfo(np.int64).max
     nearest = np.where(steps < 0, far, steps).min(0)
-    return np.where(nearest == far, -1, nearest)
+    return np.where((nearest == far) | (scene.components != 0), -1, nearest)
 
 
 def _replaced(setting: Setting) -> list[str]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, get_type_hints
 
 from clearway.errors import RunError
+from clearway.learn.kinds import called, fits
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -70,10 +71,13 @@ class Learner:
         """Refuse settings that cannot work.
 
         Raises:
-            RunError: a value is out of range.
+            RunError: a value is of another type than its field, or out of range.
         """
+        types = get_type_hints(type(self))
         for name, value in asdict(self).items():
             _check_range(name, value)
+            if not fits(value, types[name]):
+                raise RunError(f"{name} is {value!r:.40}, expected {called(types[name])}. Correct it")
 
     @property
     def clip_rewards(self) -> bool | None:

@@ -79,7 +79,8 @@ class TrainedNetwork:
         """The network on the states of a world with the run's scenes, for its targets.
 
         Raises:
-            RunError: the world has other scenes, or other features or none.
+            RunError: the world has other scenes, or no features or another number of them. Whether they are those of
+                the same encoder nobody can tell here.
         """
         if world.features is None:
             raise RunError("the scenes have no features. Encode them as for training")

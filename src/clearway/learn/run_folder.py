@@ -21,7 +21,8 @@ from pathlib import Path
 from clearway.errors import ClearwayError, RunError, reason_of
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
-from clearway.learn.run_record import RunRecord, fits, maker, record_from
+from clearway.learn.kinds import fits
+from clearway.learn.run_record import RunRecord, maker, record_from
 from clearway.regular_files import read_bytes, read_text
 from clearway.version import __version__
 

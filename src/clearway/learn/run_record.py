@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
-from types import UnionType
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.learn.algorithms import algorithm
+from clearway.learn.kinds import fits
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
@@ -192,14 +191,3 @@ def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
     if scene.name in ("", ".", "..") or any(letter in scene.name for letter in "/\\\0"):
         raise RunError(f"scene {scene.name!r:.40} cannot be part of a file's name")
     return scene
-
-
-def fits(value: object, wanted: Any) -> bool:
-    """Whether a JSON value is of a setting's type: bool, int, str, float (any finite number), a choice or a union."""
-    if get_origin(wanted) is Literal:
-        return value in get_args(wanted)
-    if get_origin(wanted) is UnionType:
-        return any(fits(value, one) for one in get_args(wanted))
-    if wanted is float:
-        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    return isinstance(value, wanted) and (wanted is bool or not isinstance(value, bool))

@@ -72,7 +72,7 @@ class EpisodeStatistics:
         self.recent_success = torch.zeros(target_count, dtype=torch.float64, device=device)
 
     def add(self, rollout: Counted) -> None:
-        """Count all steps of a rollout."""
+        """Count all steps of a rollout, and take success rates anew."""
         ended = rollout.reached | rollout.truncated
         steps = _since_the_last_end(torch.ones_like(ended), ended, self.open_steps)
         collisions = _since_the_last_end(rollout.blocked, ended, self.open_collisions)
@@ -81,6 +81,7 @@ class EpisodeStatistics:
         self.totals.index_add_(0, target, row)
         self.window.index_add_(0, target, row[:, :2])
         self.open_steps, self.open_collisions = (count[-1] * ~ended[-1] for count in (steps, collisions))
+        self.refresh_success()
 
     def drop_open(self) -> None:
         """Forget the episodes under way, which do not go on."""

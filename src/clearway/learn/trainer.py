@@ -331,7 +331,6 @@ class Trainer:
 
     def _rebalance(self) -> None:
         """Draw targets more often that are reached less often, and own goals as far as there are any."""
-        self.statistics.refresh_success()
         choice, learner = self.navigation.choice, self.learner
         if self.own_goals:
             choice.reweigh(self.own_goals.weights(choice, 1 + learner.balance * (1 - self.statistics.recent_success)))
