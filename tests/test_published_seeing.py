@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
+from clearway.perception.encode import find_record
+from clearway.perception.eyes import NAME
 from helpers.published import DOCS, assert_written, numbers
 
 PAGE = "".join((DOCS / page).read_text(encoding="utf-8") for page in ("seeing.md", "evidence.md"))
@@ -423,3 +425,33 @@ def test_the_recurrent_learner_is_as_fast_as_its_record_says() -> None:
     kept = [speed["memory"][f"{name}_mb_per_1000_rooms"] for name in ("pair_table", "features_float16")]
     for written, value in zip(said.groups(), kept, strict=True):
         assert_written(written, value, said[0])
+
+
+def test_the_shipped_eyes_see_as_their_record_says() -> None:
+    record = record_of("recognition.json")
+    assert record["eyes"] == find_record(NAME, []).identity, "other eyes: measure them anew"
+    rows = {
+        "these eyes": "clearway",
+        "pixels, 18 x 24, centred": "pixels 18 x 24",
+        "random ResNet-50": "random-resnet50",
+        "random ResNet-50, whitened": "random-resnet50, whitened",
+    }
+    page = PAGE.partition("### Beside other encoders")[2].partition("\n### ")[0]
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ") and "%" in line]
+    assert [label for label, *_ in lines] == list(rows)
+    for label, *cells in lines:
+        found = record["recognised"][f"all: {rows[label]}"]
+        for cell, figure in zip(cells, ("recognised", "recognised_near"), strict=True):
+            values = 100 * np.array(found[figure])
+            for written, value in zip(numbers(cell), (float(values.mean()), *ends(values)), strict=True):
+                assert_written(written, value, f"{figure} of {label}")
+    said = re.search(
+        r"within (\S+) m and (\S+) degrees \(medians\), both within half a metre and 15 degrees in (\S+) %; "
+        r"the free way\s+ahead within a quarter of a metre in (\S+) % \(one answer for all: (\S+) %\)",
+        page,
+    )
+    assert said is not None
+    told = record["told"]["all"]
+    scales = {"place_m": 1, "turn_deg": 1, "poses": 100, "free_ahead": 100, "free_ahead_constant": 100}
+    for written, (name, scale) in zip(said.groups(), scales.items(), strict=True):
+        assert_written(written, scale * float(np.mean(told[name])), name)

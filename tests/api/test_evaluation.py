@@ -88,5 +88,12 @@ def test_load_agent_takes_text_and_refuses_the_rest(trained) -> None:
     assert repr(trained.agent) == f"<TrainedNetwork: ppo, 800 frames in {trained.scenes[0].name}>"
     with pytest.raises(clearway.ClearwayError, match="no run here"):
         clearway.load_agent("nowhere")
+    with pytest.raises(clearway.ClearwayError, match=r"genralist: no run here .* Did you mean generalist\?"):
+        clearway.load_agent("genralist")
+    for ask in (clearway.load_agent, clearway.evaluate):
+        with pytest.raises(
+            ArgumentError, match=r"generalist: comes with clearway, .* Give it goals: clearway.evaluate_goals"
+        ):
+            ask("generalist")
     with pytest.raises(ArgumentError, match="run=None: expected a path"):
         clearway.load_agent(None)

@@ -127,6 +127,7 @@ def test_a3c_by_name() -> None:
         ({"targets": [1.5]}, r"targets\['corridor'\]=1\.5: expected a whole number"),
         ({"targets": {"cellar": [1]}}, "no scene 'cellar' is given. Name one of corridor"),
         ({"targets": {"corridor": 1}}, "Give a list of them"),
+        ({"targets": []}, r"targets\['corridor'\] is empty: .* Leave it out for five seeded ones"),
     ],
 )
 def test_what_does_not_fit_is_told_in_one_line_that_is_also_a_value_error(corridor, arguments, part) -> None:

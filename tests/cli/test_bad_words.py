@@ -30,6 +30,8 @@ from helpers.small_demo import still
         (("scenes", "import", "imges"), ("imges", "Did you mean images?")),
         (("train", "x.h5", "--out", "run", "--framse", "3"), ("--framse", "Did you mean --frames?")),
         (("train", "x.h5", "--out", "run", "--aplha=3"), ("--aplha=3", "Did you mean --alpha?")),
+        (("evaluate", "run", "--episode", "3"), ("options: --episode, 3. Did you mean --episodes?",)),
+        (("view", "run", "--scene", "kitchen"), ("options: --scene, kitchen. Did you mean --scenes?",)),
         (("scenes", "build", "--room", "bathrom", "--out", "x"), ("Did you mean bathroom?", "'kitchen', 'all')")),
         (("train", "x.h5", "--out", "run", "--preset", "best"), ("best", "paper")),
         (("evaluate", "run", "--episodes", "many"), ("--episodes", "'many'")),
@@ -214,10 +216,17 @@ def test_flags_of_encoding_need_something_to_encode(clearway, dump, tmp_path, wo
     assert not out.exists()
 
 
+def test_no_rooms_are_made_for_an_agent_that_knows_its_own_alone(clearway, trained, monkeypatch):
+    monkeypatch.setattr("clearway.api.generation.generate", lambda *_, **__: pytest.fail("made"))
+    asked = clearway("evaluate", trained.run, "--rooms", "validation")
+    assert asked.refusal("--rooms: an agent of the algorithm ppo walks where it was trained alone", "generalist")
+
+
 def test_flags_of_the_live_evaluation_that_say_nothing(clearway, trained):
     assert clearway("evaluate", trained.run, "--live", "--strengths", "0.25").refusal("--strengths", "Add --sweep")
     assert clearway("evaluate", trained.run, "--live", "--targets").refusal("--targets", "Leave it out with --live")
-    assert clearway("evaluate", trained.run, "--selection", "argmax").refusal("--selection", "need --live")
+    assert clearway("evaluate", trained.run, "--selection", "argmax").refusal("--selection", "Add --live")
+    assert clearway("evaluate", trained.run, "--light", 0.1).refusal("--light: walks off the grid", "Add --live")
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,7 @@ def test_it_walks_in_scenes_that_it_was_not_trained_in(clearway, run, monkeypatc
     assert shown.code == 0 and "10 goals in 2 scenes" in shown.out and "shortest path" in shown.out
     monkeypatch.setenv("COLUMNS", "80")
     shown = clearway(*words).out
+    assert "at most 20 steps, seed 0" in shown and "SPL: success weighted by path length" in " ".join(shown.split())
     assert "…" not in shown and max(len(line.rstrip()) for line in shown.splitlines()) <= 80
     assert shown.split().count("arrivals") == 2  # both whole
 

@@ -67,6 +67,21 @@ def test_the_command_that_makes_a_run_longer(tmp_path, words, expected):
     assert longer(words.split(), Path("r"), 9) == f"clearway {expected}"
 
 
+def test_who_interrupts_a_training_is_told_how_to_go_on(clearway, trained, small, tmp_path, monkeypatch):
+    def interrupted(*given, on_begin, **how):
+        RunFolder(how["out"]).write_record(RunFolder(trained.run).read_record())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("clearway.api.training.train", interrupted)
+    monkeypatch.setattr("sys.argv", ["clearway", "train", "x.h5", "--frames", "800"])
+    answer = clearway("train", trained.scene, "--out", tmp_path / "run", *small)
+    assert answer.code == 130
+    told = (
+        f"{tmp_path / 'run'}: interrupted. To go on: clearway train x.h5 --frames 800 --out {tmp_path / 'run'} --resume"
+    )
+    assert told in answer.err.splitlines()
+
+
 def test_a_training_may_end_once_all_is_solved(clearway, trained, tmp_path):
     run, words = tmp_path / "run", ("--set", "envs=100", "width=128")
     answer = clearway(

@@ -196,3 +196,6 @@ def test_ranges_are_explained_only_where_they_are_shown(evaluations):
         shown = printed(which, levels)
         assert ("Ranges: 95 %" in shown) == ("–" in shown) == (which is one_scene)
     assert "Ranges: 95 %" in printed(evaluations, ["targets", "average"])
+    single = [replace(one, protocol=replace(one.protocol, episodes_per_target=1)) for one in evaluations]
+    shown = printed(single, ["average"])  # of one episode none can be told
+    assert "Ranges" not in shown and "–" not in shown and "1 episode a target" in shown

@@ -25,7 +25,7 @@ from helpers.plan_maps import plan_of
 
 def test_a_scene_that_is_no_room_of_ours_is_refused():
     scene = replace(corridor_scene(), made_by=Provenance("thor_v1"))
-    with pytest.raises(SceneError, match=r"corridor: .*comes from thor_v1.*Walk live in a scene"):
+    with pytest.raises(SceneError, match=r"corridor: .*comes from thor_v1.*It cannot be seen anew"):
         live_room(scene)
 
 

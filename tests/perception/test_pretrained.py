@@ -211,6 +211,10 @@ def test_offline_asks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "getaddrinfo", lambda host, *_, **__: asked.append(host) or [])
     with pytest.raises(EncoderError, match="HF_HUB_OFFLINE"):
         find_record("microsoft/resnet-50")
+    with pytest.raises(
+        EncoderError, match=r"encoder 'clearwya': .* Did you mean clearway\? .*use clearway, which comes"
+    ):
+        find_record("clearwya")
     assert not asked
 
 

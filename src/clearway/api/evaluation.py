@@ -16,7 +16,7 @@ from clearway.api.arguments import as_choice, as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.targets import Targets, chosen_targets
 from clearway.api.training import TrainResult
-from clearway.choices import GENERALIST, HELD_OUT
+from clearway.choices import GENERALIST, HELD_OUT, is_generalist
 from clearway.deploy.card import Card
 from clearway.deploy.navigator import open_agent
 from clearway.errors import ArgumentError
@@ -142,8 +142,11 @@ def load_agent(run: str | os.PathLike[str], checkpoint: str | os.PathLike[str] |
         ArgumentError: an argument is no path.
         ClearwayError: there is no such run, the checkpoint is damaged or lies in another folder.
     """
-    chosen = None if checkpoint is None else as_path("checkpoint", checkpoint)
-    return load.load_agent(as_path("run", run), chosen)
+    chosen, path = None if checkpoint is None else as_path("checkpoint", checkpoint), as_path("run", run)
+    if is_generalist(path):
+        problem = f"{GENERALIST}: comes with clearway, for any room, and has no run"
+        raise ArgumentError(f"{problem}. Give it goals: clearway.evaluate_goals, clearway.evaluate_live")
+    return load.load_agent(path, chosen)
 
 
 def evaluate(

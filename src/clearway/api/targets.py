@@ -42,6 +42,8 @@ def chosen_targets(scenes: Sequence[Scene], targets: Targets, seed: int) -> dict
         if isinstance(states, str) or not isinstance(states, Iterable):
             raise ArgumentError(f"targets[{name!r}]={states!r:.80}: {expected}. Give a list of them")
         chosen[name] = tuple(as_whole(f"targets[{name!r}]", state) for state in states)
+        if not chosen[name]:
+            raise ArgumentError(f"targets[{name!r}] is empty: {expected}. Leave it out for five seeded ones")
     return {scene.name: chosen[scene.name] or default_targets(scene, seed) for scene in scenes}
 
 

@@ -122,7 +122,7 @@ class Evaluate:
 
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
-        from clearway.api.goals import goal_agent
+        from clearway.api.goals import check_knows_any_room, goal_agent
         from clearway.api.takes import TAKES, perturbations_asked
         from clearway.cli.goals import evaluate_at_goals
 
@@ -131,6 +131,8 @@ class Evaluate:
             raise ClearwayError("--takes: without --perturb a pose has one picture. Add --perturb")
         goals = as_whole("goals", _or(self.goals, GOALS), 1)
         agent, perturbations = goal_agent(self.folder, self.checkpoint), perturbations_asked(self.perturb)
+        if self.rooms is not None:
+            check_knows_any_room(agent)
         evaluate_at_goals(
             agent,
             self._scenes_of_goals(),  # made last, which may take long

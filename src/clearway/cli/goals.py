@@ -13,6 +13,7 @@ from clearway.cli.live import Live, status_line
 from clearway.errors import ClearwayError
 
 if TYPE_CHECKING:
+    from rich.console import Group
     from rich.table import Table
 
     from clearway.agents.generalist import Generalist
@@ -47,7 +48,7 @@ def evaluate_at_goals(
     from clearway.api.goals import evaluate_goals
 
     if not files:
-        raise ClearwayError("--goals: no scenes. Name scene files behind the run, or give --rooms validation")
+        raise ClearwayError("no scenes to walk in. Name scene files behind the agent, or give --rooms validation")
     found = evaluate_goals(
         agent,
         scene_files(files),
@@ -63,7 +64,7 @@ def evaluate_at_goals(
         own, *others = (one.to_json() for one in found)
         print_json({**own, "others": others})
         return
-    stdout_console().print(_table(found))
+    stdout_console().print(_noted(_table(found), step_limit, seed))
 
 
 def generated(split: SplitName, kind: PlanKind, count: int) -> list[Path]:
@@ -104,7 +105,7 @@ def evaluate_at_goals_live(
     if json:
         print_json({"results": [one.to_json() for one in found]})
         return
-    stdout_console().print(_live_table(found))
+    stdout_console().print(_noted(_live_table(found), step_limit, seed))
 
 
 def _live_table(found: Sequence[GoalEvaluation]) -> Table:
@@ -143,8 +144,21 @@ def _table(found: Sequence[GoalEvaluation]) -> Table:
 
 
 def _counted(found: GoalEvaluation) -> str:
-    scenes = len(found.scenes)
-    return f"{found.average.episodes} goals in {scenes} scene{'s' if scenes > 1 else ''}"
+    goals, scenes = found.average.episodes, len(found.scenes)
+    return f"{goals} goal{'s' * (goals > 1)} in {scenes} scene{'s' * (scenes > 1)}"
+
+
+def _noted(table: Table, step_limit: int, seed: int) -> Group:
+    """The table, and what its figures mean."""
+    from rich.console import Group
+    from rich.text import Text
+
+    notes = (
+        f"One episode a goal from a random start, at most {step_limit:,} steps, seed {seed}; means over scenes.",
+        "Within 4 x: in at most four times the steps of the shortest path. SPL: success weighted by path length.",
+        "False, missed arrivals: episodes in which it said to be there elsewhere, and did not say so at the goal.",
+    )
+    return Group(table, *(Text(note, style="dim") for note in notes))
 
 
 def _empty(title: str, first: str, names: Sequence[str], headings: dict[str, str]) -> Table:

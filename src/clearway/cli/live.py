@@ -48,8 +48,8 @@ class Live:
     def check(self) -> None:
         """Check the flags; without --live they must be as they are by default."""
         if not self.live:
-            if self != Live():
-                raise ClearwayError("perturbations, --against, --selection, --sweep, --strengths need --live. Add it")
+            if asked := [flag for flag, given in self.given().items() if given]:
+                raise ClearwayError(f"{asked[0]}: walks off the grid. Add --live")
             return
         numbers = {k: v for k, v in self.perturbations.to_json().items() if not isinstance(v, bool)}
         check_finite(**numbers)

@@ -17,6 +17,8 @@ from clearway.spelling import did_you_mean
 CORNERS = ("╭", "╰")
 LENGTHY = ("Perhaps you meant", "Argument helptext")  # parts of a refusal that --help says better
 _UNKNOWN = re.compile(r"Unrecognized options: (.+)")
+_ASTRAY = re.compile(r"Unrecognized or misplaced options: (.+? \(applied to [^)]+\))(?=\.|$)")
+_APPLIED = re.compile(r" \(applied to [^)]+\) ?")
 _FULL_HELP = re.compile(r"For full helptext, (?:run|see):? .*$")
 _NO_CHOICE = re.compile(r"invalid choice '(.*)' for argument ")
 
@@ -36,9 +38,17 @@ def refusals_in_one_line(words: Sequence[str], commands: object) -> Iterator[Non
     except SystemExit as leaving:
         if not leaving.code:
             raise
-        refused = _FULL_HELP.sub("", one_line(said.getvalue()))
+        refused = _plain(_FULL_HELP.sub("", one_line(said.getvalue())))
         named = " ".join(["clearway", *words[: command_of(words, commands)[1]]])
         raise ClearwayError(f"{_with_suggestion(refused, words, commands).strip()} Help: {named} --help") from leaving
+
+
+def _plain(refused: str) -> str:
+    """A refusal that names unknown options alone, where tyro says of each word what it was applied to."""
+    if found := _ASTRAY.match(refused):
+        words = [word for word in _APPLIED.split(found[1]) if word]
+        return f"Unrecognized options: {', '.join(words)}{refused[found.end() :]}"
+    return refused
 
 
 def _with_suggestion(refused: str, words: Sequence[str], commands: object) -> str:

@@ -29,15 +29,17 @@ def free_run_folder(files: Sequence[Path], reward: str, algorithm: str, seed: in
     return path
 
 
-def longer(words: Sequence[str], out: Path, frames: int) -> str:
+def longer(words: Sequence[str], out: Path, frames: int | None = None) -> str:
     """The command, fit for a shell, that trains on from a `clearway train` until so many frames; without secrets.
 
     Args:
         words: of the training, without the program's name.
         out: its run folder.
-        frames: in all.
+        frames: in all; None: as many as it was to have.
     """
-    words = _with_option(_with_option(words, "--out", str(out)), "--frames", str(frames))
+    words = _with_option(words, "--out", str(out))
+    if frames is not None:
+        words = _with_option(words, "--frames", str(frames))
     if "--no-resume" in words:
         words.remove("--no-resume")
     if "--resume" not in words:

@@ -100,33 +100,39 @@ class Train:
     def run(self) -> None:
         """Train."""
         from clearway.api.training import train
+        from clearway.learn.run_folder import RunFolder
 
         files = scene_files(self.files)
         targets = given_targets(self.targets, len(files))
         reward, learner = chosen_reward(self.reward, self.parameters), self._learner()
         out = self._folder(files, reward, learner)
-        result = train(
-            files,
-            targets,
-            reward=reward,
-            algorithm=learner,
-            seed=self.seed,
-            out=out,
-            resume=self.resume,
-            copy_to=self.copy_to,
-            zone_level=self.zones,
-            perturb=self.perturb,
-            takes=self.takes,
-            device=self.device,
-            feature_store=self.feature_store,
-            threads=self.threads,
-            workers=self.workers,
-            ray=self.ray,
-            until_solved=self.until == "solved",
-            track=self.track,
-            on_begin=self._begun,
-            show_progress=True,
-        )
+        try:
+            result = train(
+                files,
+                targets,
+                reward=reward,
+                algorithm=learner,
+                seed=self.seed,
+                out=out,
+                resume=self.resume,
+                copy_to=self.copy_to,
+                zone_level=self.zones,
+                perturb=self.perturb,
+                takes=self.takes,
+                device=self.device,
+                feature_store=self.feature_store,
+                threads=self.threads,
+                workers=self.workers,
+                ray=self.ray,
+                until_solved=self.until == "solved",
+                track=self.track,
+                on_begin=self._begun,
+                show_progress=True,
+            )
+        except KeyboardInterrupt:
+            if RunFolder(out).exists:
+                say(f"{out}: interrupted. To go on: {longer(sys.argv[1:], out)}")
+            raise
         _say_trained(result, out)
 
     def _folder(self, files: list[Path], reward: Reward, learner: Learner) -> Path:

@@ -76,7 +76,9 @@ class Video:
         if self.selection != "sampled" or self.scenes:
             option = "--scenes" if self.scenes else "--selection"
             raise ClearwayError(f"{option}: says nothing to the generalist. Leave it out")
-        if (self.room is None) == (self.scene is None):
+        if self.room is not None and self.scene is not None:
+            raise ClearwayError("--room makes a room, and --scene names one. Leave one of the two out")
+        if self.room is None and self.scene is None:
             raise ClearwayError("the generalist walks in a scene. Give --scene FILE or --room SEED")
         found = load_scene(self.scene) if self.scene is not None else chosen_room(int(self.room or 0))
         generalist = Generalist.shipped().stepping([found])

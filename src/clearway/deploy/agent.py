@@ -85,6 +85,8 @@ def checked_picture(picture: np.ndarray, card: Card | None = None) -> np.ndarray
     Raises:
         DeployError: it is something else, too large, or has another aspect than an agent for any room was taught on.
     """
+    if picture.dtype.kind in "US":
+        raise DeployError("the picture is a text. Give its pixels: of a file, np.asarray(PIL.Image.open(path))")
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
         problem = f"the picture is {picture.dtype} {picture.shape}, expected uint8 (height, width, 3)"
         raise DeployError(f"{problem}. Give an RGB picture with values from 0 to 255")

@@ -74,9 +74,9 @@ def check_switch(name: str, value: object) -> None:
 
 
 def chosen_targets(
-    targets: Mapping[str, Sequence[int]] | str | None, scenes: Sequence[Scene]
+    targets: Mapping[str, Sequence[int]] | Sequence[int] | str | None, scenes: Sequence[Scene]
 ) -> dict[str, Sequence[int]]:
-    """Targets by scene name, the scenes' default ones for None, for "held-out" such ones.
+    """Targets by scene name, or alone for a single scene; the scenes' default ones for None, for "held-out" such ones.
 
     Raises:
         EnvError: they are nothing of the kind.
@@ -87,7 +87,10 @@ def chosen_targets(
     if targets is None:
         return {scene.name: default_targets(scene) for scene in scenes}
     if not isinstance(targets, Mapping):
-        raise EnvError(f"targets={targets!r:.80}: expected state ids by scene name, such as {{'bathroom': [26, 37]}}")
+        if isinstance(targets, str) or not isinstance(targets, Iterable) or len(scenes) > 1:
+            expected = "expected state ids by scene name, such as {'bathroom': [26, 37]}"
+            raise EnvError(f"targets={targets!r:.80}: {expected}; of one scene a list will do")
+        targets = {scenes[0].name: targets}
     for name, states in targets.items():
         if isinstance(states, str) or not isinstance(states, Iterable):
             raise EnvError(f"targets[{name!r}]={states!r:.80}: expected state ids, such as [26, 37]")

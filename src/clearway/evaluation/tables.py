@@ -62,13 +62,13 @@ class _Column:
     percent: bool = False
     least: Width = "all"
 
-    def cell(self, result: Result) -> Cell:
+    def cell(self, result: Result, ranges: bool) -> Cell:
         """The figure of this column. Large figures lose decimals, the ends of the interval keep as many."""
         scale = 100 if self.percent else 1
         value = scale * result.values[self.metric]
         low, high = (scale * end for end in result.intervals[self.metric])
         digits = max(0, self.digits - (value >= 10) - (value >= 100))
-        return Cell(f"{value:.{digits}f}", f"{low:.{digits}f}–{high:.{digits}f}")
+        return Cell(f"{value:.{digits}f}", f"{low:.{digits}f}–{high:.{digits}f}" if ranges else "")
 
 
 COLUMNS = (
@@ -109,11 +109,11 @@ def table_text(
             *_place(result, level),
             Cell(evaluation.agent, evaluation.protocol.action_selection if names.count(evaluation.agent) > 1 else ""),
             _solved(result),
-            *(column.cell(result) for column in columns),
+            *(column.cell(result, _has_ranges(evaluation)) for column in columns),
         )
         for result, evaluation in _results(evaluations, level)
     )
-    return TableText(headings, rows, tuple(_notes(evaluations, ranges)))
+    return TableText(headings, rows, tuple(_notes(evaluations, ranges and _has_ranges(evaluations[0]))))
 
 
 def markdown_table(evaluations: Sequence[Evaluation], level: Level = "average", *, width: Width = "all") -> str:
@@ -180,6 +180,11 @@ def _rich(content: TableText, intervals: bool) -> Table:
     return table
 
 
+def _has_ranges(evaluation: Evaluation) -> bool:
+    """One episode a target says nothing of others."""
+    return evaluation.protocol.episodes_per_target > 1
+
+
 def _results(evaluations: Sequence[Evaluation], level: Level) -> list[tuple[Result, Evaluation]]:
     """Results place after place, within a place agent after agent."""
     if level == "average":
@@ -212,10 +217,11 @@ def _solved(result: Result) -> Cell:
 def _notes(evaluations: Sequence[Evaluation], ranges: bool) -> list[str]:
     protocol = evaluations[0].protocol
     encoders = ", ".join(dict.fromkeys(evaluation.encoder for evaluation in evaluations))
+    count = protocol.episodes_per_target
     notes = [
         f"Encoder: {encoders}.",
         *dict.fromkeys(f"{found.agent}: {found.trained}." for found in evaluations if found.trained),
-        f"{protocol.episodes_per_target} episodes a target from random starts, at most {protocol.step_limit:,} "
+        f"{count} episode{'s' * (count > 1)} a target from random starts, at most {protocol.step_limit:,} "
         f"steps, seed {protocol.seed}.{' Ranges: 95 % bootstrap intervals over episodes.' if ranges else ''}",
     ]
     for name, meaning in REFERENCES.items():

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import PoseAgent, network_on_poses
+from clearway.choices import GENERALIST
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
 from clearway.learn.described import described
@@ -208,7 +209,7 @@ def _among(given: Sequence[Scene], wanted: SceneRecord) -> Scene:
             return replace(scene, name=wanted.name)
     others = ", ".join(list(by_name)[:TOLD_SCENES]) + ",..." * (len(by_name) > TOLD_SCENES)
     problem = f"scene {wanted.name} of the run is not among the files given ({others}), by name or by what they hold"
-    raise RunError(f"{problem}. Add it to --scenes")
+    raise RunError(f"{problem}. Add it to --scenes; an agent walks where it was trained, and {GENERALIST} anywhere")
 
 
 def _in_file(name: str, path: str | None) -> Scene:

@@ -18,12 +18,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from clearway.choices import GENERALIST
 from clearway.errors import ClearwayError, RunError, reason_of
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.kinds import fits
 from clearway.learn.run_record import RunRecord, maker, record_from
 from clearway.regular_files import read_bytes, read_text
+from clearway.spelling import did_you_mean
 from clearway.version import __version__
 
 FORMAT_VERSION = 2
@@ -180,9 +182,9 @@ class RunFolder:
             content = read_json(path)
             found = int(content["format_version"])
         except (FileNotFoundError, NotADirectoryError) as error:
-            raise RunError(
-                f"{self.path}: no run here ({RUN_FILE} is missing). Name a folder that clearway train made"
-            ) from error
+            meant = did_you_mean(self.path.name, [GENERALIST])
+            told = f"{self.path}: no run here ({RUN_FILE} is missing).{meant} Name a folder that clearway train made"
+            raise RunError(told) from error
         except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
             raise RunError(f"{path}: not readable ({reason_of(error)}). Restore it or train again") from error
         if found > FORMAT_VERSION:

@@ -153,7 +153,7 @@ def check_is_room(scene: Scene) -> None:
         raise SceneError(
             scene.name,
             f"there is no room to walk in: the scene comes from {made.source}",
-            "Walk live in a scene that clearway scenes build, generate, import floor-plan or import mjcf made",
+            "It cannot be seen anew: give what clearway scenes build, generate, import floor-plan or import mjcf made",
         )
 
 

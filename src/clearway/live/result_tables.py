@@ -86,11 +86,13 @@ def compared_rows(results: Sequence[LiveResult]) -> Rows:
 def notes(report: LiveReport) -> list[str]:
     """What belongs under the tables."""
     protocol = report.protocol
+    count = protocol.episodes_per_target
+    compared = " Differences are paired by episode." if any(result.comparison for result in report.results) else ""
     return [
-        f"Encoder: {report.encoder}. Actions {protocol.selection}. {protocol.episodes_per_target} episodes a target "
+        f"Encoder: {report.encoder}. Actions {protocol.selection}. {count} episode{'s' * (count > 1)} a target "
         f"from the starts of the grid's evaluation, at most {protocol.step_limit:,} steps, seed {protocol.seed}.",
         f"Success: within {100 * SUCCESS_M:g} cm, at most half a cell, and {SUCCESS_DEG:g}° of the target's pose. "
-        "Ranges: 95 % bootstrap intervals over episodes; differences are paired by episode.",
+        f"Ranges: 95 % bootstrap intervals over episodes.{compared} None: nothing is perturbed.",
         f"{ON_GRID.capitalize()}: the same agents, targets, starts and number of episodes on the scene's grid; success "
         "is the target's very pose, a contact a blocked move, and there is no clearance.",
     ]
@@ -116,10 +118,8 @@ def _markdown(headings: Sequence[str], rows: Rows) -> list[str]:
 
 
 LABEL_WIDTH = 16
-TERMINAL_NOTE = (
-    "Least and mean: clearance. ≤10 cm, ≤30 cm: share of the time that near. P(larger): probability of the larger "
-    "least clearance."
-)
+TERMINAL_NOTE = "Least and mean: clearance. ≤10 cm, ≤30 cm: share of the time that near."
+COMPARED_NOTE = "P(larger): probability of the larger least clearance."
 
 
 def rich_tables(report: LiveReport) -> Group:
@@ -132,12 +132,13 @@ def rich_tables(report: LiveReport) -> Group:
         if not number or rows[number - 1][0] != label:
             of_agents.add_row(label, style="bold")
         of_agents.add_row(f" {name}", *_with_intervals(cells))
-    tables = [of_agents]
+    tables, told = [of_agents], TERMINAL_NOTE
     if compared := compared_rows(report.results):
         tables.append(_rich(f"\n{compared[0][1]}, shares in points", (*COMPARED, LARGER)))
         for label, _, cells in compared:
             tables[-1].add_row(label, *_with_intervals(cells))
-    return Group(*tables[:-1], noted(tables[-1], ["", TERMINAL_NOTE, *notes(report)]))
+        told += f" {COMPARED_NOTE}"
+    return Group(*tables[:-1], noted(tables[-1], ["", told, *notes(report)]))
 
 
 def _rich(title: str, columns: Sequence[_Column]) -> Table:

@@ -219,7 +219,8 @@ def _encode_all(
 def pictures_of(scene: Scene, sensor: str = RGB) -> Observations:
     """What a sensor saw of a scene, to be encoded. Raises EncoderError where there is nothing of it."""
     if not scene.sensors:
-        raise EncoderError(f"scene {scene.name} has no pictures to encode. Use the features that its file holds")
+        remedy = "Give one with pictures; clearway train learns by the features that its file holds"
+        raise EncoderError(f"scene {scene.name} has no pictures to encode. {remedy}")
     try:
         return scene.seen_by(sensor)
     except SceneError as fault:

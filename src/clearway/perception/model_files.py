@@ -7,11 +7,13 @@ from pathlib import Path
 from clearway.errors import EncoderError
 from clearway.files import read_json
 from clearway.perception.preprocess import Preprocessing, preprocessing_from_json
+from clearway.spelling import did_you_mean
 
 PROBE_TIMEOUT_S = 3.0  # for the one small request that decides whether the hub can be reached
 WANTED_FILES = ("*.json", "*.safetensors")  # never pickles, which could run code
 CONFIG, PREPROCESSOR, WEIGHTS = "config.json", "preprocessor_config.json", "*.safetensors"
 DEFAULT_SIDE = 224
+NAMES = ("clearway", "resnet50", "random-resnet50")  # of encoders, for those who meant one of ours
 
 
 def find_model(model: str) -> Path:
@@ -54,9 +56,10 @@ def _downloaded(model: str) -> Path:
     from huggingface_hub import get_hf_file_metadata, hf_hub_url, is_offline_mode, snapshot_download
     from huggingface_hub.errors import HfHubHTTPError
 
-    remedy = "Connect, or use a local folder with the model, or random-resnet50"
+    remedy = "Connect, or use clearway, which comes along, a local folder with the model, or random-resnet50"
+    meant = did_you_mean(model, NAMES)
     if is_offline_mode():
-        raise EncoderError(f"encoder '{model}': is not in the cache, and HF_HUB_OFFLINE is set. {remedy}")
+        raise EncoderError(f"encoder '{model}': is not in the cache, and HF_HUB_OFFLINE is set.{meant} {remedy}")
     try:
         get_hf_file_metadata(hf_hub_url(model, CONFIG), timeout=PROBE_TIMEOUT_S)
         return Path(
@@ -67,12 +70,12 @@ def _downloaded(model: str) -> Path:
     except HfHubHTTPError as fault:
         status = fault.response.status_code if fault.response is not None else "no"
         problem = f"encoder '{model}': the Hugging Face hub does not hand it out (status {status})"
-        raise EncoderError(f"{problem}. Check the name, or use random-resnet50") from fault
+        raise EncoderError(f"{problem}.{meant} Check the name, or use {', '.join(NAMES)}") from fault
     except Exception as fault:
         if not _is_network_fault(fault):
             raise
         problem = f"encoder '{model}': is not in the cache, and the Hugging Face hub cannot be reached"
-        raise EncoderError(f"{problem} ({type(fault).__name__}). {remedy}") from fault
+        raise EncoderError(f"{problem} ({type(fault).__name__}).{meant} {remedy}") from fault
 
 
 def _is_network_fault(fault: Exception) -> bool:
