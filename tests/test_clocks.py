@@ -15,6 +15,7 @@ OF_CLOCKS = {"time", "datetime", "date", "os"}  # the modules and types that the
 OF_FILES = {"st_mtime", "st_mtime_ns", "st_ctime", "st_atime", "getmtime"}
 KNOWN = {
     ("serve/access_log.py", "datetime.now"): "a line says when it was written",
+    ("learn/run_record.py", "datetime.now"): "a record says when its run was begun",
     ("learn/tracking.py", "time.time"): "where TensorBoard draws a run on its axis of days",
     ("scenes/file_pictures.py", "st_mtime_ns"): "held against the one before, as equal or not",
     ("experiments/jobs.py", "st_mtime_ns"): "held against the one before, as equal or not",

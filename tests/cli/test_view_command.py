@@ -151,7 +151,7 @@ def test_the_generalist_is_filmed_with_what_it_holds(clearway, pictured, tmp_pat
     [
         ((GENERALIST,), ("walks in a scene", "--room SEED")),
         ((GENERALIST, "--scene", "none.h5"), ("none.h5", "no such file")),
-        ((GENERALIST, "--scene", "a.h5", "--room", 3), ("walks in a scene",)),
+        ((GENERALIST, "--scene", "a.h5", "--room", 3), ("Leave one of the two out",)),
         ((GENERALIST, "--room", 3, "--selection", "argmax"), ("--selection",)),
         ((GENERALIST, "--room", -3), ("--room -3",)),
         (("run", "--room", 3), ("--room", "goes with the generalist")),

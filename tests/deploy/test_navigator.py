@@ -144,7 +144,7 @@ PICTURE = np.zeros((4, 4, 3), np.uint8)
         (np.zeros((4, 4, 4), np.uint8), r"\(4, 4, 4\)"),
         (np.zeros((0, 4, 3), np.uint8), r"\(0, 4, 3\)"),
         (PICTURE[None], r"\(1, 4, 4, 3\)"),
-        ("picture.png", "Give an RGB picture"),
+        ("picture.png", "the picture is a text. Give its pixels"),
         (None, "Give an RGB picture"),
         ([[1, 2], [3]], "what is seen is no picture .*Give an array"),
         (np.zeros((1, 4097, 3), np.uint8), "4097 x 1 pixels, expected at most 4096"),

@@ -272,11 +272,11 @@ def test_a_session_without_a_target_and_methods_that_are_not_there(client) -> No
 
 def test_what_takes_too_long_is_given_up_and_leaves_the_session_as_it_was(called) -> None:
     model = Sums()
-    client = called(Service(model, Limits(deadline_s=0.5), TOKENS))
+    client = called(Service(model, Limits(deadline_s=1.5), TOKENS))
     session = opened(client)
     client.put(f"{session}/target", content=grey(0), headers=PNG)
     assert stepped(client, session, 1).json()["value"] == 4
-    model.seconds = 1.0
+    model.seconds = 3.0
     assert fault(stepped(client, session, 9)) == "504 deadline_passed"
     with client.websocket_connect(f"{session}/stream") as socket:
         socket.send_bytes(grey(9))

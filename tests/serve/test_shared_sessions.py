@@ -39,13 +39,13 @@ def shared(
     return SharedSessions(table, most, lambda: owners, KEY, SHAPES)
 
 
-def slowed(monkeypatch, table: SessionTable, name: str) -> threading.Event:
+def slowed(monkeypatch, table: SessionTable, name: str, seconds: float = 0.4) -> threading.Event:
     """Let a method of the table take time before it does what it does; is set once it has begun."""
     done, begun = getattr(table, name), threading.Event()
 
     def slow(*arguments: object) -> object:
         begun.set()
-        time.sleep(0.4)
+        time.sleep(seconds)
         return done(*arguments)
 
     monkeypatch.setattr(table, name, slow)
@@ -167,11 +167,11 @@ def test_a_record_that_is_too_large_is_our_own_mistake(tmp_path) -> None:
 
 def test_a_step_that_was_kept_is_answered_though_the_deadline_passes(tmp_path, called, monkeypatch) -> None:
     """It was once refused, and walked."""
-    service = Service(Sums(), Limits(deadline_s=0.3), TOKENS)
+    service = Service(Sums(), Limits(deadline_s=1.0), TOKENS)
     sessions = service.sessions = shared(tmp_path)
     client, png = called(service), {"content-type": "image/png"}
     session = f"/sessions/{client.post('/sessions', json={}).json()['session_id']}"
-    slowed(monkeypatch, sessions._table, "write")
+    slowed(monkeypatch, sessions._table, "write", 1.2)
     assert client.put(f"{session}/target", content=grey(2), headers=png).status_code == 204
     answer = client.post(f"{session}/steps", content=grey(1), headers=png)
     assert (answer.status_code, answer.json()["step"]) == (200, 1)

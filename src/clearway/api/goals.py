@@ -128,16 +128,6 @@ def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Gen
     return agent.generalist
 
 
-def check_knows_any_room(agent: object) -> None:
-    """Raise ArgumentError where an agent walks in the scenes of its training alone, and rooms are made for it."""
-    from clearway.learn.load import TrainedAgent
-    from clearway.learn.recurrent import TrainedRecurrent
-
-    if isinstance(agent, TrainedAgent) and not isinstance(agent, TrainedRecurrent):
-        problem = f"rooms: an agent of the algorithm {agent.record.learner.algorithm} walks where it was trained alone"
-        raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
-
-
 def check_can_tour(agent: object, steps: int) -> None:
     """Raise ArgumentError where an agent that keeps no map is given steps to look around."""
     from clearway.agents.generalist import Generalist

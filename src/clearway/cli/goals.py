@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clearway.choices import GENERALIST
 from clearway.cli.arguments import scene_files
 from clearway.cli.console import print_json, stdout_console
 from clearway.cli.live import Live, status_line
@@ -65,6 +66,16 @@ def evaluate_at_goals(
         print_json({**own, "others": others})
         return
     stdout_console().print(_noted(_table(found), step_limit, seed))
+
+
+def check_knows_any_room(agent: object) -> None:
+    """Raise ClearwayError where an agent walks in the scenes of its training alone, and rooms would be made for it."""
+    from clearway.learn.load import TrainedAgent
+    from clearway.learn.recurrent import TrainedRecurrent
+
+    if isinstance(agent, TrainedAgent) and not isinstance(agent, TrainedRecurrent):
+        problem = f"--rooms: an agent of the algorithm {agent.record.learner.algorithm} walks in its own alone"
+        raise ClearwayError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
 
 
 def generated(split: SplitName, kind: PlanKind, count: int) -> list[Path]:

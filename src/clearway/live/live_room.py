@@ -102,11 +102,9 @@ class LiveRoom:
 
     def check_can_be_rearranged(self, perturbations: Perturbations) -> None:
         """Raise SceneError where perturbations move what cannot be moved here."""
+        check_can_be_rearranged(self.scene, perturbations, fixed=self.room is None)
         wanted = [name for name in REARRANGING if getattr(perturbations, name)]
-        if not wanted:
-            return
-        check_can_be_rearranged(self.scene, perturbations)
-        if self.room is None or not self.model.nmocap:
+        if wanted and not self.model.nmocap:
             problem = f"the room was built with nothing loose in it, and {wanted[0]} is asked for"
             raise SceneError(self.scene.name, problem, "Build it loose, or leave the room to clearway")
 
@@ -157,10 +155,13 @@ def check_is_room(scene: Scene) -> None:
         )
 
 
-def check_can_be_rearranged(scene: Scene, perturbations: Perturbations) -> None:
-    """Check by a scene's record that its room can be rearranged, if that is asked for. Raises SceneError."""
+def check_can_be_rearranged(scene: Scene, perturbations: Perturbations, *, fixed: bool | None = None) -> None:
+    """Raise SceneError where a room is to be rearranged that cannot be.
+
+    fixed: nothing can be moved in it; None: as the scene's record says.
+    """
     wanted = [name for name in REARRANGING if getattr(perturbations, name)]
-    if wanted and scene.made_by.source == MODEL_SOURCE:
+    if wanted and (scene.made_by.source == MODEL_SOURCE if fixed is None else fixed):
         problem = f"nothing can be moved in a MuJoCo model, and {wanted[0]} is asked for"
         raise SceneError(scene.name, problem, f"Leave out {' and '.join(REARRANGING)}")
 
