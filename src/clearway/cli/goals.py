@@ -65,7 +65,7 @@ def evaluate_at_goals(
         own, *others = (one.to_json() for one in found)
         print_json({**own, "others": others})
         return
-    stdout_console().print(_noted(_table(found), step_limit, seed))
+    stdout_console().print(_explained(_table(found), step_limit, seed))
 
 
 def check_knows_any_room(agent: object) -> None:
@@ -116,7 +116,7 @@ def evaluate_at_goals_live(
     if json:
         print_json({"results": [one.to_json() for one in found]})
         return
-    stdout_console().print(_noted(_live_table(found), step_limit, seed))
+    stdout_console().print(_explained(_live_table(found), step_limit, seed))
 
 
 def _live_table(found: Sequence[GoalEvaluation]) -> Table:
@@ -159,17 +159,17 @@ def _counted(found: GoalEvaluation) -> str:
     return f"{goals} goal{'s' * (goals > 1)} in {scenes} scene{'s' * (scenes > 1)}"
 
 
-def _noted(table: Table, step_limit: int, seed: int) -> Group:
-    """The table, and what its figures mean."""
-    from rich.console import Group
-    from rich.text import Text
+def _explained(table: Table, step_limit: int, seed: int) -> Group:
+    """The table, and what its figures mean; fits 80 columns whole."""
+    from clearway.terminal import noted
 
     notes = (
-        f"One episode a goal from a random start, at most {step_limit:,} steps, seed {seed}; means over scenes.",
-        "Within 4 x: in at most four times the steps of the shortest path. SPL: success weighted by path length.",
-        "False, missed arrivals: episodes in which it said to be there elsewhere, and did not say so at the goal.",
+        f"One episode a goal from a random start, at most {step_limit:,} steps, seed {seed}.",
+        "Means over scenes. Within 4 x: in at most four times the shortest path's steps.",
+        "SPL: success weighted by path length. False arrivals: episodes in which it said",
+        "to be there elsewhere; missed: in which it did not say so at the goal.",
     )
-    return Group(table, *(Text(note, style="dim") for note in notes))
+    return noted(table, notes)
 
 
 def _empty(title: str, first: str, names: Sequence[str], headings: dict[str, str]) -> Table:

@@ -25,7 +25,7 @@ from clearway.live.body import SAMPLES, Motion
 from clearway.live.conditions import Perturbations
 from clearway.live.draws import Draws
 from clearway.live.live_room import LiveRoom, layout_of_episode
-from clearway.live.walker import Walker
+from clearway.live.walker import Walker, within_m
 from clearway.reward import COLLISION_AWARE
 from clearway.rooms.camera import Shot, first_person_shot
 from clearway.rooms.render import Camera
@@ -35,15 +35,10 @@ from clearway.world.navigation import Navigation
 from clearway.world.world import World
 
 LiveSelection = Literal["sampled", "argmax"]
-SUCCESS_M, SUCCESS_DEG = 0.25, 45.0
-"""A target is reached within so much of its pose; in rooms of smaller cells within half of one (`within_m`)."""
+SUCCESS_DEG = 45.0
+"""A target is reached when the body looks its way within so much, and stands within `walker.within_m` of it."""
 NEAR_M, CLOSE_M = 0.3, 0.1
 STEP_S = 1.0  # a step takes so long, move or turn
-
-
-def within_m(cell_size_m: float) -> float:
-    """How near its target's place a body has reached it, so that it does not where a neighbouring cell is."""
-    return min(SUCCESS_M, cell_size_m / 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from clearway.live.episodes import SUCCESS_DEG, SUCCESS_M
+from clearway.live.episodes import SUCCESS_DEG
 from clearway.live.results import Figures, LiveReport, LiveResult
+from clearway.live.walker import SUCCESS_M
 from clearway.markdown import table_lines
 from clearway.terminal import noted
 

@@ -14,6 +14,7 @@ Pose = tuple[float, float, float]
 
 ARC_PARTS = 8  # chords that a step takes which moves and turns
 SPARE = 1e-9  # of a tolerance, for rounding
+SUCCESS_M = 0.25  # a target is reached within so much of its place, in rooms of smaller cells within half of one
 
 
 class Walker:
@@ -87,6 +88,11 @@ class Walker:
         if free:
             free = min(free, self.body.free_steps(-self.step_m, self.heading_deg, 2))
         return (Zone.COLLISION, Zone.PRECOLLISION, Zone.FREE)[free]
+
+
+def within_m(cell_size_m: float) -> float:
+    """How near its target's place a body has reached it, so that it does not where a neighbouring cell is."""
+    return min(SUCCESS_M, cell_size_m / 2)
 
 
 def near(poses: Pose | np.ndarray, other: Pose, within_m: float, within_deg: float) -> np.ndarray:

@@ -27,7 +27,7 @@ from clearway.envs.arguments import (
 )
 from clearway.errors import EnvError
 from clearway.live.conditions import REARRANGING
-from clearway.live.episodes import within_m
+from clearway.live.walker import within_m
 from clearway.live_envs.arguments import (
     CLEARANCE,
     LIVE_RENDER_MODES,
