@@ -1,6 +1,7 @@
 """What the pages say of agents is what their records come to."""
 
 import json
+import math
 import re
 import runpy
 import tarfile
@@ -180,6 +181,33 @@ def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> 
         assert_written(steps, episodes["steps"].mean(), begin)
         assert_written(collisions, episodes["collisions"].mean(), begin)
         assert failed == f"{len(set(episodes['target'][~episodes['reached'].astype(bool)].tolist()))} of 20"
+
+
+@pytest.mark.slow
+def test_four_rooms_on_the_eyes_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
+    records["unpack"](DOCS / "records" / "four-rooms-eyes.tar.xz", tmp_path / "four")
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
+    trials = sorted((tmp_path / "four").glob("runs/*/trials/*.json"))
+    assert len(trials) == 4
+    for trial in trials:
+        content = json.loads(trial.read_text(encoding="utf-8"))
+        run = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
+        assert {scene["encoder"] for scene in run["scenes"]} == {"clearway"}
+        begin = f"| {run['reward']['name']}, by the eyes | {5 if content['about']['halfway'] else 10} M | "
+        (line,) = [line for line in page.splitlines() if line.startswith(begin)]
+        *cells, failed = line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
+        episodes = {name: np.array(column) for name, column in content["episodes"].items()}
+        reached = episodes["reached"].astype(bool)
+        assert failed == f"{len(set(episodes['target'][~reached].tolist()))} of 20"
+        room = np.array([number for number, scene in enumerate(run["scenes"]) for _ in scene["targets"]])
+        assert [scene["name"] for scene in run["scenes"]] == ["bathroom", "bedroom", "living_room", "kitchen"]
+        for number, cell in enumerate(cells):
+            own = room[episodes["target"]] == number
+            steps, collisions, arrive, _ = cell.split()
+            assert_written(steps, episodes["steps"][own].mean(), line)
+            assert_written(collisions, episodes["collisions"][own].mean(), line)
+            assert int(arrive) == math.floor(100 * reached[own].mean()), line
 
 
 @pytest.mark.slow
