@@ -5,7 +5,9 @@ import math
 import re
 import runpy
 import tarfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,53 +163,56 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
 
 
-def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> None:
+def four_rooms(record: str, folder: Path) -> Iterator[tuple[dict[str, Any], int, dict[str, np.ndarray], str]]:
+    """Of each trial of a record: its run, after how many million frames, its episodes, and which targets were lost."""
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "four-rooms-otherwise.tar.xz", tmp_path / "four")
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
-    trials = sorted((tmp_path / "four").glob("runs/*/trials/*.json"))
-    assert len(trials) == 8
-    for trial in trials:
+    records["unpack"](DOCS / "records" / f"{record}.tar.xz", folder)
+    for trial in sorted(folder.glob("runs/*/trials/*.json")):
         content = json.loads(trial.read_text(encoding="utf-8"))
-        settings = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
-        reward, frames = settings["reward"]["name"], 5 if content["about"]["halfway"] else 10
-        learner = settings["learner"]
+        run = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
+        episodes = {name: np.array(column) for name, column in content["episodes"].items()}
+        lost = set(episodes["target"][~episodes["reached"].astype(bool)].tolist())
+        yield run, 5 if content["about"]["halfway"] else 10, episodes, f"{len(lost)} of 20"
+
+
+def row_of(begin: str) -> list[str]:
+    """Cells of the row of the evidence that begins so, without commas."""
+    lines = (DOCS / "evidence.md").read_text(encoding="utf-8").splitlines()
+    (line,) = [line for line in lines if line.startswith(begin)]
+    return line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
+
+
+def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    trials = list(four_rooms("four-rooms-otherwise", tmp_path / "four"))
+    assert len(trials) == 8
+    for run, frames, episodes, lost in trials:
+        learner = run["learner"]
         changed = "whitened" if learner["whiten_features"] else "3 x rate"
         assert learner["lr_start"] == (0.0007 if changed == "whitened" else 0.0021)
-        begin = f"| {reward}, {changed} | {frames} M | "
-        (line,) = [line for line in page.splitlines() if line.startswith(begin)]
-        steps, collisions, failed = line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
-        episodes = {name: np.array(column) for name, column in content["episodes"].items()}
+        begin = f"| {run['reward']['name']}, {changed} | {frames} M | "
+        steps, collisions, failed = row_of(begin)
         assert_written(steps, episodes["steps"].mean(), begin)
         assert_written(collisions, episodes["collisions"].mean(), begin)
-        assert failed == f"{len(set(episodes['target'][~episodes['reached'].astype(bool)].tolist()))} of 20"
+        assert failed == lost
 
 
 @pytest.mark.slow
 def test_four_rooms_on_the_eyes_are_what_their_record_comes_to(tmp_path: Path) -> None:
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "four-rooms-eyes.tar.xz", tmp_path / "four")
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
-    trials = sorted((tmp_path / "four").glob("runs/*/trials/*.json"))
+    trials = list(four_rooms("four-rooms-eyes", tmp_path / "four"))
     assert len(trials) == 4
-    for trial in trials:
-        content = json.loads(trial.read_text(encoding="utf-8"))
-        run = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
+    for run, frames, episodes, lost in trials:
         assert {scene["encoder"] for scene in run["scenes"]} == {"clearway"}
-        begin = f"| {run['reward']['name']}, by the eyes | {5 if content['about']['halfway'] else 10} M | "
-        (line,) = [line for line in page.splitlines() if line.startswith(begin)]
-        *cells, failed = line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
-        episodes = {name: np.array(column) for name, column in content["episodes"].items()}
-        reached = episodes["reached"].astype(bool)
-        assert failed == f"{len(set(episodes['target'][~reached].tolist()))} of 20"
-        room = np.array([number for number, scene in enumerate(run["scenes"]) for _ in scene["targets"]])
         assert [scene["name"] for scene in run["scenes"]] == ["bathroom", "bedroom", "living_room", "kitchen"]
+        begin = f"| {run['reward']['name']}, by the eyes | {frames} M | "
+        *cells, failed = row_of(begin)
+        assert failed == lost
+        room = np.array([number for number, scene in enumerate(run["scenes"]) for _ in scene["targets"]])
         for number, cell in enumerate(cells):
             own = room[episodes["target"]] == number
             steps, collisions, arrive, _ = cell.split()
-            assert_written(steps, episodes["steps"][own].mean(), line)
-            assert_written(collisions, episodes["collisions"][own].mean(), line)
-            assert int(arrive) == math.floor(100 * reached[own].mean()), line
+            assert_written(steps, episodes["steps"][own].mean(), begin)
+            assert_written(collisions, episodes["collisions"][own].mean(), begin)
+            assert int(arrive) == math.floor(100 * episodes["reached"][own].mean()), begin
 
 
 @pytest.mark.slow

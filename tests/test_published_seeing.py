@@ -10,7 +10,7 @@ import pytest
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
 from clearway.perception.encode import find_record
 from clearway.perception.eyes import NAME
-from helpers.published import DOCS, assert_written, numbers
+from helpers.published import DOCS, assert_written, numbers, words_of
 
 PAGE = "".join((DOCS / page).read_text(encoding="utf-8") for page in ("seeing.md", "evidence.md"))
 COLUMNS = ("success", "success_4x", "spl", "collisions")
@@ -115,12 +115,11 @@ def test_a_row_of_the_page_is_what_the_record_comes_to(record: str, part: str, a
 
 
 def test_success_with_a_word_of_it_is_what_the_records_come_to() -> None:
-    said = re.search(
+    said = words_of(
         r"(\S+) % in rooms, (\S+) % in flats, (\S+) % on real plans, (\S+) % off the grid with everything perturbed; "
         r"after a tour (\S+) % in rooms, (\S+) % in flats, (\S+) % on real plans",
         PAGE,
     )
-    assert said is not None
     parts = (FIFTH, "rooms"), (FIFTH, "flats"), (SIXTH, "real"), (AGAIN, "live: all, strength 1")
     toured = (THIRD, "rooms-tour"), (THIRD, "flats-tour"), (THIRD, "real-tour")
     for written, (record, part) in zip(said.groups(), (*parts, *toured), strict=True):
@@ -130,12 +129,11 @@ def test_success_with_a_word_of_it_is_what_the_records_come_to() -> None:
 
 
 def test_tours_come_to_as_many_poses_and_collisions_as_is_said() -> None:
-    said = re.search(
+    said = words_of(
         r"come to (\d+) % of the poses of rooms, (\d+) % of flats, (\d+) % of real plans, "
         r"and have (\d+), (\d+) and (\d+) collisions themselves",
         PAGE,
     )
-    assert said is not None
     record = json.loads((DOCS / "figures" / THIRD).read_text(encoding="utf-8"))
     tours = [record[part]["generalist"]["tour"] for part in ("rooms-tour", "flats-tour", "real-tour")]
     found = [100 * tour["poses"] for tour in tours] + [tour["collisions"] for tour in tours]
@@ -148,8 +146,7 @@ def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_sai
         np.array([scene["spl"] for scene in scenes_of(TOURS, "rooms-perturbed-tour", agent)])
         for agent in ("generalist", "nearest picture of the tour")
     ]
-    said = re.search(r"by (\S+) points of SPL \((\S+) to ([\d.]+)\)", PAGE)
-    assert said is not None
+    said = words_of(r"by (\S+) points of SPL \((\S+) to ([\d.]+)\)", PAGE)
     apart = 100 * (spl[0] - spl[1])
     for written, value in zip(said.groups(), (apart.mean(), *ends(apart)), strict=True):
         assert_written(written, float(value), said[0])
@@ -226,31 +223,27 @@ def test_the_summary_says_how_it_goes_off_the_grid() -> None:
     (line,) = [line for line in PAGE.splitlines() if line.startswith("| off the grid, success in 500 steps, of")]
     for written, value in zip(numbers(line.split("|")[4]), (alone, together), strict=True):
         assert_written(written, 100 * value, line)
-    said = re.search(r"within four times the shortest path it is (\d+) % of what it is with nothing", PAGE, re.I)
-    assert said is not None
+    said = words_of(r"within four times the shortest path it is (\d+) % of what it is with nothing", PAGE, re.I)
     parts = [mean(SIXTH, part, THE, "success_4x") for part in ("rooms-perturbed", "rooms")]
     assert_written(said[1], 100 * parts[0] / parts[1], said[0])
-    said = re.search(r"all at once leaves (\d+) % \(49 % as registered\), turns (\d+) %, moves (\d+) %", PAGE)
-    assert said is not None
+    said = words_of(r"all at once leaves (\d+) % \(49 % as registered\), turns (\d+) %, moves (\d+) %", PAGE)
     for written, part in zip(said.groups(), (ALL, TURNS, MOVES), strict=True):
         share = off_grid(part, "success_4x") / off_grid(UNPERTURBED, "success_4x")
         assert_written(written, 100 * share, said[0])
     building = (DOCS / "building.md").read_text(encoding="utf-8")
-    said = re.search(r"in (\d+) to (\d+) % of\s+episodes, by what is perturbed", building)
-    assert said is not None
+    said = words_of(r"in (\d+) to (\d+) % of\s+episodes, by what is perturbed", building)
     false = [off_grid(part, "false_arrivals") for part in (UNPERTURBED, *ALONE, OBSTACLE, ALL)]
     for written, value in zip(said.groups(), (min(false), max(false)), strict=True):
         assert_written(written, 100 * value, said[0])
 
 
 def test_walkers_and_the_generalist_are_compared_in_the_same_rooms() -> None:
-    said = re.search(
+    said = words_of(
         r"has (\S+) collisions and SPL (\S+) % \[in the first fifty of these rooms\].*?"
         r"has (\S+) and (\S+) % \(means of three seeds\): (\S+) more \((\S+) to ([\d.]+)\)",
         PAGE,
         re.S,
     )
-    assert said is not None
     found = {}
     for name in ("collisions", "spl"):
         own = {scene["scene"]: scene[name] for scene in scenes_of(SIXTH, "rooms", "generalist")}
@@ -273,8 +266,7 @@ def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
         np.array([scene["collisions"] for scene in scenes_of(FIFTH, "rooms", agent)])
         for agent in ("collisions cost nothing", "generalist")
     )
-    said = re.search(r"spares (\S+) collisions an\s+episode \((\S+) to ([\d.]+)\)", PAGE)
-    assert said is not None
+    said = words_of(r"spares (\S+) collisions an\s+episode \((\S+) to ([\d.]+)\)", PAGE)
     for written, value in zip(said.groups(), ((careless - careful).mean(), *ends(careless - careful)), strict=True):
         assert_written(written, float(value), said[0])
 
@@ -287,8 +279,7 @@ def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch
     asked = [("shortest", "collision-aware"), ("bump", "collision-aware"), ("shortest", "clearance")]
     aware, bump, clearance = judged(record, "collisions", asked)
     assert (aware.holds, bump.holds, clearance.holds) == (True, False, False)
-    by_seed = re.search(r"by seed it is (\S+), (\S+) and (\S+): almost all", PAGE)
-    assert by_seed is not None
+    by_seed = words_of(r"by seed it is (\S+), (\S+) and (\S+): almost all", PAGE)
     for written, value in zip(by_seed.groups(), aware.by_seed.mean(axis=1), strict=True):
         assert_written(written, float(value), by_seed[0])
     said = re.search(r"has (\S+) collisions fewer than `shortest` \((\S+) to (\S+), p = (\S+) for three", PAGE)
@@ -378,11 +369,10 @@ def test_the_curve_over_scenes_is_what_its_record_comes_to() -> None:
                 assert_written(written, value, f"interval of {figure} of {label}")
             if figure in means and pictures.strip() == "40,960":
                 means[figure].append(float(values.mean()))
-    said = re.search(
+    said = words_of(
         r"ten times as many scenes (\S+) points of success and (\S+) of SPL, for a\s+hundred times (\S+) and (\S+),",
         curve,
     )
-    assert said is not None
     scenes = np.log10([18, 37, 74, 146])  # rooms and flats
     slopes = [float(np.polyfit(scenes, means[figure], 1)[0]) for figure in ("success", "spl")]
     for written, value in zip(said.groups(), (*slopes, *(2 * slope for slope in slopes)), strict=True):
@@ -390,13 +380,12 @@ def test_the_curve_over_scenes_is_what_its_record_comes_to() -> None:
 
 
 def test_the_first_two_generalists_are_what_their_records_come_to() -> None:
-    said = re.search(
+    said = words_of(
         r"generalist-test\.json\) \(no tour, SPL (\S+) %, (\S+) collisions;\s+flats: success (\S+) %, SPL (\S+) %\).*"
         r"generalist-test-again\.json\) \((\S+) %, (\S+); flats: (\S+) %, (\S+) %\)",
         PAGE,
         re.S,
     )
-    assert said is not None
     asked = ("rooms", "spl"), ("rooms", "collisions"), ("flats", "success"), ("flats", "spl")
     found = [
         mean(record, part, THE, name) * (1 if name == "collisions" else 100)
@@ -410,18 +399,16 @@ def test_the_first_two_generalists_are_what_their_records_come_to() -> None:
 def test_the_recurrent_learner_is_as_fast_as_its_record_says() -> None:
     speed = record_of("recurrent.json")["speed"]["figures"]
     told = [speed["frames_per_second"][name] for name in ("ours", "ours, taught", *THEIRS)]
-    said = re.search(
+    said = words_of(
         r"ours (\S+) \(PPO\) and (\S+) \(while it is taught\), "
         r"sb3-contrib's RecurrentPPO on the same table (\S+) \(.*?\)\s+"
         r"and (\S+) \(.*?\): (\S+) and (\S+) times as many",
         PAGE,
     )
-    assert said is not None
     for written, value in zip(said.groups(), (*told, told[0] / told[2], told[0] / told[3]), strict=True):
         assert_written(written.replace(",", ""), value, said[0])
     learning = (DOCS / "learning.md").read_text(encoding="utf-8")
-    said = re.search(r"five targets take (\d+) MB of table, and (\d+) MB of features", learning)
-    assert said is not None
+    said = words_of(r"five targets take (\d+) MB of table, and (\d+) MB of features", learning)
     kept = [speed["memory"][f"{name}_mb_per_1000_rooms"] for name in ("pair_table", "features_float16")]
     for written, value in zip(said.groups(), kept, strict=True):
         assert_written(written, value, said[0])
@@ -445,12 +432,11 @@ def test_the_shipped_eyes_see_as_their_record_says() -> None:
             values = 100 * np.array(found[figure])
             for written, value in zip(numbers(cell), (float(values.mean()), *ends(values)), strict=True):
                 assert_written(written, value, f"{figure} of {label}")
-    said = re.search(
+    said = words_of(
         r"within (\S+) m and (\S+) degrees \(medians\), both within half a metre and 15 degrees in (\S+) %; "
         r"the free way\s+ahead within a quarter of a metre in (\S+) % \(one answer for all: (\S+) %\)",
         page,
     )
-    assert said is not None
     told = record["told"]["all"]
     scales = {"place_m": 1, "turn_deg": 1, "poses": 100, "free_ahead": 100, "free_ahead_constant": 100}
     for written, (name, scale) in zip(said.groups(), scales.items(), strict=True):

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.learn.reward_record import reward_from_json
 from clearway.reward import (
     BUMP,
     CLEARANCE,
@@ -20,7 +21,6 @@ from clearway.reward import (
     Term,
     Time,
     Zones,
-    reward_from_json,
     reward_named,
 )
 from clearway.world.world import make_world

@@ -149,11 +149,16 @@ TERM_OF = {own.name: kind for kind in TERMS.values() for own in fields(kind)}
 
 
 @dataclass(frozen=True)
-class _Unknown(Term):
+class UnknownTerm(Term):
     """A term of somebody's own, as a run's record tells of it: its code is not loaded because a file names it."""
 
     path: str
     parameters: tuple[tuple[str, Any], ...]
+
+    @property
+    def called(self) -> str:
+        """The name of its class."""
+        return self.path.rpartition(":")[2]
 
     def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
         """Raises RewardError."""
@@ -192,7 +197,7 @@ class Reward:
         for term in self.terms:
             if not isinstance(term, Term) or not is_dataclass(term):
                 raise RewardError(f"reward {self.name}: {term!r:.60} is no term. Give dataclasses derived from Term")
-        kinds = [type(term) for term in self.terms if not isinstance(term, _Unknown)]
+        kinds = [type(term) for term in self.terms if not isinstance(term, UnknownTerm)]
         if len(set(kinds)) < len(kinds):
             raise RewardError(f"reward {self.name}: a term occurs twice. Give every kind of term once")
         ours = list(TERMS.values())
@@ -216,14 +221,14 @@ class Reward:
     @property
     def is_known(self) -> bool:
         """All terms can be computed here."""
-        return not any(isinstance(term, _Unknown) for term in self.terms)
+        return not any(isinstance(term, UnknownTerm) for term in self.terms)
 
     def as_known(self) -> Reward:
         """The same without the terms whose code is not loaded, under a name that says so."""
         if self.is_known:
             return self
-        left = ", ".join(term.path.rpartition(":")[2] for term in self.terms if isinstance(term, _Unknown))
-        known = tuple(term for term in self.terms if not isinstance(term, _Unknown))
+        left = ", ".join(term.called for term in self.terms if isinstance(term, UnknownTerm))
+        known = tuple(term for term in self.terms if not isinstance(term, UnknownTerm))
         return replace(self, name=f"{self.name} without {left}", terms=known)
 
     def table(self, moves: Moves) -> np.ndarray:
@@ -244,7 +249,7 @@ class Reward:
 
     def _earned(self, term: Term, before: np.ndarray, moves: Moves) -> np.ndarray:
         """What a term gives, checked; one that is not ours may raise anything."""
-        if type(term) in TERMS.values() or isinstance(term, _Unknown):
+        if type(term) in TERMS.values() or isinstance(term, UnknownTerm):
             return self._checked(term, term(before, moves), before.shape)
         try:
             earned = term(before, moves)
@@ -285,7 +290,7 @@ class Reward:
                 raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
             kind = TERM_OF[name]
             terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
-        changed = Reward(self.name, _in_order(terms), self.clip if clip is None else clip)
+        changed = Reward(self.name, in_order(terms), self.clip if clip is None else clip)
         base, before = self._told_by_name()
         known, now = REWARDS.get(base, self).parameters, changed.parameters
         told = {} if base in REWARDS else before
@@ -304,7 +309,7 @@ class Reward:
         """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands."""
         others = {}
         for term in self.terms:
-            if isinstance(term, _Unknown):
+            if isinstance(term, UnknownTerm):
                 others[term.path] = dict(term.parameters)
             elif type(term) not in TERMS.values():
                 path = f"{type(term).__module__}:{type(term).__qualname__}"
@@ -320,51 +325,11 @@ class Reward:
         """Its parameters, as tables print them."""
         told = [f"{name} {value:g}" for name, value in self.parameters.items()]
         others = [term for term in self.terms if type(term) not in TERMS.values()]
-        told += [term.path.rpartition(":")[2] if isinstance(term, _Unknown) else type(term).__name__ for term in others]
+        told += [term.called if isinstance(term, UnknownTerm) else type(term).__name__ for term in others]
         return ", ".join(told) + (", clipped to [-1, 1]" if self.clip else "")
 
 
-def reward_from_json(content: Mapping[str, Any]) -> Reward:
-    """The reward that `to_json` was called of, or that version 0.1 wrote.
-
-    Raises:
-        KeyError, TypeError: it is none.
-    """
-    name, clip = content["name"], content["clip"]
-    values = {key: value for key, value in content.items() if key not in ("name", "clip", "terms")}
-    for key, value in values.items():
-        if key not in TERM_OF:
-            raise KeyError(key)
-        if not (value is None or (isinstance(value, int | float) and not isinstance(value, bool))):
-            raise TypeError(f"{key} is {value!r:.40}")
-    if not isinstance(name, str) or not isinstance(clip, bool):
-        raise TypeError(f"name is {name!r:.40}, clip {clip!r:.40}")
-    if set(values) == {"alpha", "beta", "gamma", "terminal", "blocked"} and values["blocked"] is None:
-        return _of_format_1(name, values, clip)
-    if name == "bump" and set(values) == {"alpha", "beta", "gamma", "terminal", "blocked"}:
-        return _of_format_1(name, values, clip)
-    terms: dict[type[Term], Term] = {}
-    for key, value in values.items():
-        if value is not None:
-            kind = TERM_OF[key]
-            terms[kind] = replace(terms.get(kind, kind()), **{key: value})
-    others = [_Unknown(path, tuple(sorted(own.items()))) for path, own in content.get("terms", {}).items()]
-    arrival = terms.pop(Arrival, None)
-    if arrival is None:
-        raise KeyError("terminal")
-    return Reward(name, (*_in_order(terms), *others, arrival), clip)
-
-
-def _of_format_1(name: str, values: Mapping[str, float | None], clip: bool) -> Reward:
-    """A reward whose record held all five values, those of the zones even where they were an ordinary step's."""
-    base = REWARDS.get(name, Reward(name, (Time(), Arrival())))
-    told = {"alpha", "terminal", "blocked", *base.parameters}
-    kept = {key: value for key, value in values.items() if key in told or value != values["alpha"]}
-    changed = base.with_changes(clip=clip, **kept)
-    return changed if name in REWARDS else replace(changed, name=name)
-
-
-def _in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:
+def in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:
     """Ours as in `TERMS`, others before `Arrival`."""
     ours = [terms[kind] for kind in TERMS.values() if kind in terms and kind is not Arrival]
     others = [term for kind, term in terms.items() if kind not in TERMS.values()]

@@ -11,6 +11,13 @@ def numbers(cell: str) -> list[str]:
     return re.findall(r"\d+(?:\.\d+)?", cell)
 
 
+def words_of(pattern: str, page: str, flags: int = 0) -> re.Match[str]:
+    """Where a page says something, which it has to."""
+    found = re.search(pattern, page, flags)
+    assert found is not None, f"no page says {pattern}"
+    return found
+
+
 def assert_written(written: str, value: float, what: str) -> None:
     """A figure is written to its last digit."""
     digits = len(written.partition(".")[2])

@@ -15,9 +15,10 @@ from clearway.learn.kinds import fits
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
+from clearway.learn.reward_record import reward_from_json
 from clearway.remote.address import addresses_without_secrets
 from clearway.remote.records import origin
-from clearway.reward import Reward, reward_from_json
+from clearway.reward import Reward
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.features import FileFeatures
 from clearway.scenes.scene import Scene

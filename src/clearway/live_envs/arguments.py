@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from clearway.choices import MODEL_SUFFIXES
-from clearway.envs.arguments import scene_of_file
+from clearway.envs.arguments import check_switch, scene_of_file
 from clearway.errors import EnvError
 from clearway.live.conditions import MOST, Perturbations
 from clearway.live.live_room import LiveRoom, live_room, live_room_named
 from clearway.rooms import ROOM_NAMES
 from clearway.scenes.floor_plan_files import SUFFIXES as PLAN_SUFFIXES
 from clearway.scenes.scene import Scene
-from clearway.scenes.sensors import SENSORS, Sensor
+from clearway.scenes.sensors import RGB, SENSORS, Sensor
 from clearway.spelling import did_you_mean
 
 RoomSource = str | Path | Scene | LiveRoom
@@ -148,3 +148,31 @@ def checked_ends(option: str, value: object, env_count: int) -> list[int | tuple
         return [(x_m, z_m, math.fmod(heading_deg, 360) % 360) for x_m, z_m, heading_deg in poses.tolist()]
     expected = f"a state or a pose (x, z, heading), or one for each of the {env_count}"
     raise EnvError(f"options['{option}']: expected {expected}, got {value!r:.80}")
+
+
+def check_switches(continuous: bool, stop: bool, render_mode: str | None, sensors: Sequence[Sensor]) -> None:
+    """Raise EnvError where one of them is of another kind, or two do not go together."""
+    check_switch("continuous", continuous)
+    check_switch("stop", stop)
+    if continuous and stop:
+        raise EnvError("stop=True is a fifth discrete action. Leave out stop or continuous")
+    if render_mode is not None and render_mode not in LIVE_RENDER_MODES:
+        raise EnvError(f"render_mode={render_mode!r:.40} is unknown. Use {LIVE_RENDER_MODES[0]!r}, or None")
+    if render_mode is not None and RGB not in [sensor.name for sensor in sensors]:
+        raise EnvError(f"render_mode={render_mode!r} shows colour pictures. Name {RGB!r} among the sensors")
+
+
+def check_workers(workers: int | None) -> None:
+    """Raise EnvError where it is no number of renderer processes."""
+    if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
+        raise EnvError(f"workers={workers!r:.40}: expected a whole number from 1 on, or None for one a core")
+
+
+def checked_targets(targets: Sequence[int] | str | None) -> np.ndarray | None:
+    """State ids, (T,) int64, or None as it is; EnvError where they are none."""
+    if targets is None:
+        return None
+    found = np.asarray(targets)
+    if found.ndim != 1 or not len(found) or not np.issubdtype(found.dtype, np.integer):
+        raise EnvError(f"targets={targets!r:.80}: expected state ids, such as [26, 37]")
+    return found.astype(np.int64)

@@ -19,7 +19,6 @@ from clearway.envs.arguments import (
     RESET_MASK,
     Seeds,
     check_numbers,
-    check_switch,
     checked_actions,
     chosen_autoreset,
     environments_to_reset,
@@ -33,20 +32,24 @@ from clearway.live_envs.arguments import (
     LIVE_RENDER_MODES,
     PerturbationSource,
     RoomSource,
+    check_switches,
+    check_workers,
     checked_drives,
     checked_ends,
     checked_number,
     checked_perturbations,
     checked_sensors,
+    checked_targets,
     opened_room,
 )
 from clearway.live_envs.episode import End, EpisodePlan, Episodes, LiveEpisode, Rules
 from clearway.live_envs.eyes import Eyes, Pictures
+from clearway.live_envs.spaces import sensor_keys, space_of
 from clearway.reward import Reward, reward_named
 from clearway.rooms.camera import first_person_shot
 from clearway.rooms.detail import are_small
 from clearway.scenes.actions import ACTION_COUNT
-from clearway.scenes.sensors import RGB, Sensor
+from clearway.scenes.sensors import RGB
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
@@ -128,9 +131,8 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         check_numbers(num_envs, 1 if history_length is None else history_length, max_episode_steps, None)
         self.autoreset_mode = chosen_autoreset(autoreset_mode)
         self._sensors = checked_sensors(sensors, height_px, width_px)
-        _check_switches(continuous, stop, render_mode, self._sensors)
-        if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
-            raise EnvError(f"workers={workers!r:.40}: expected a whole number from 1 on, or None for one a core")
+        check_switches(continuous, stop, render_mode, self._sensors)
+        check_workers(workers)
         if step_m is not None:
             checked_number("step_m", step_m, FARTHEST_M)
         if turn_deg is not None:
@@ -156,14 +158,14 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.live, self._continuous, self._stop = live, continuous, stop
         self._limit = None if max_episode_steps == NO_LIMIT else max_episode_steps
         held_out = isinstance(targets, str) and targets == HELD_OUT
-        named = None if held_out else _checked_targets(targets)
+        named = None if held_out else checked_targets(targets)
         self._episodes = Episodes(live, rules, live.possible_targets(held_out) if named is None else named)
         cameras = [sensor for sensor in self._sensors if sensor.name != CLEARANCE]
         self._eyes = Eyes(live, cameras, workers)
 
         self._history = history_length or 1
         leading = () if history_length is None else (history_length,)
-        self.single_observation_space = _observation_space(self._sensors, leading)
+        self.single_observation_space = space_of(self._sensors, leading)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         actions = ACTION_COUNT + stop
         self.single_action_space = spaces.Box(-1, 1, (2,), np.float32) if continuous else spaces.Discrete(actions)
@@ -174,8 +176,8 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._elapsed = np.zeros(num_envs, np.int64)
         self._ended = np.zeros(num_envs, bool)
         # (N, K, ...) of the poses and (N, ...) of the targets, by the observation's keys
-        self._poses = {_keys(s)[0]: np.zeros((num_envs, self._history, *s.shape), s.dtype) for s in self._sensors}
-        self._goals = {_keys(s)[1]: np.zeros((num_envs, *s.shape), s.dtype) for s in cameras}
+        self._poses = {sensor_keys(s)[0]: np.zeros((num_envs, self._history, *s.shape), s.dtype) for s in self._sensors}
+        self._goals = {sensor_keys(s)[1]: np.zeros((num_envs, *s.shape), s.dtype) for s in cameras}
         self._stacked = history_length is not None
 
     @property
@@ -271,7 +273,7 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             return None
         if None in self._running:
             raise ResetNeeded("render() before the first reset: call reset()")
-        poses, goals = (seen[key] for seen, key in zip((self._poses, self._goals), _keys(RGB), strict=True))
+        poses, goals = (seen[key] for seen, key in zip((self._poses, self._goals), sensor_keys(RGB), strict=True))
         return tuple(np.concatenate([seen[-1], goal], axis=1) for seen, goal in zip(poses, goals, strict=True))
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -320,7 +322,7 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Let agents see what was asked for."""
         for envs, anew, pictures in asked:
             for sensor in self._sensors:
-                pose_key, goal_key = _keys(sensor.name)
+                pose_key, goal_key = sensor_keys(sensor.name)
                 poses = self._poses[pose_key]
                 if sensor.name == CLEARANCE:
                     seen = np.array([[self._episode(env).clearance_m] for env in envs], sensor.dtype)
@@ -370,40 +372,3 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             final_obs[env] = {key: value[env] for key, value in last.items()}
         final_info = self._info(contact, success, ended)
         return {"final_obs": final_obs, "_final_obs": ended.copy(), "final_info": final_info, "_final_info": ended}
-
-
-def _keys(sensor: Sensor | str) -> tuple[str, str]:
-    """Keys of the poses' observations by a sensor and of the target's, as in the environments on the grid."""
-    name = sensor if isinstance(sensor, str) else sensor.name
-    return ("observation", "target") if name == RGB else (name, f"target_{name}")
-
-
-def _observation_space(sensors: Sequence[Sensor], leading: tuple[int, ...]) -> spaces.Dict:
-    boxes: dict[str, spaces.Space] = {}
-    for sensor in sensors:
-        dtype = np.dtype(sensor.dtype).type
-        poses, target = _keys(sensor)
-        boxes[poses] = spaces.Box(sensor.low, sensor.high, (*leading, *sensor.shape), dtype)
-        if sensor.name != CLEARANCE:
-            boxes[target] = spaces.Box(sensor.low, sensor.high, sensor.shape, dtype)
-    return spaces.Dict(boxes)
-
-
-def _check_switches(continuous: bool, stop: bool, render_mode: str | None, sensors: Sequence[Sensor]) -> None:
-    check_switch("continuous", continuous)
-    check_switch("stop", stop)
-    if continuous and stop:
-        raise EnvError("stop=True is a fifth discrete action. Leave out stop or continuous")
-    if render_mode is not None and render_mode not in LIVE_RENDER_MODES:
-        raise EnvError(f"render_mode={render_mode!r:.40} is unknown. Use {LIVE_RENDER_MODES[0]!r}, or None")
-    if render_mode is not None and RGB not in [sensor.name for sensor in sensors]:
-        raise EnvError(f"render_mode={render_mode!r} shows colour pictures. Name {RGB!r} among the sensors")
-
-
-def _checked_targets(targets: Sequence[int] | str | None) -> np.ndarray | None:
-    if targets is None:
-        return None
-    found = np.asarray(targets)
-    if found.ndim != 1 or not len(found) or not np.issubdtype(found.dtype, np.integer):
-        raise EnvError(f"targets={targets!r:.80}: expected state ids, such as [26, 37]")
-    return found.astype(np.int64)
