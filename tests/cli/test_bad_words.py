@@ -218,8 +218,11 @@ def test_flags_of_encoding_need_something_to_encode(clearway, dump, tmp_path, wo
 
 def test_no_rooms_are_made_for_an_agent_that_knows_its_own_alone(clearway, trained, monkeypatch):
     monkeypatch.setattr("clearway.api.generation.generate", lambda *_, **__: pytest.fail("made"))
-    asked = clearway("evaluate", trained.run, "--rooms", "validation")
-    assert asked.refusal("--rooms: an agent of the algorithm ppo walks in its own alone", "generalist")
+    for words in ((), ("--live",), ("--live", "--goals", 2)):
+        asked = clearway("evaluate", trained.run, "--rooms", "validation", *words)
+        assert asked.refusal("--rooms: an agent of the algorithm ppo walks in its own alone", "generalist")
+    assert clearway("evaluate", "nowhere", "--rooms", "validation", "--live").refusal("nowhere: no run here")
+    assert clearway("evaluate", "generalist", "--rooms", "train", "--live", "--goals", 0).refusal("--goals 0")
 
 
 def test_flags_of_the_live_evaluation_that_say_nothing(clearway, trained):

@@ -42,6 +42,9 @@ def test_who_has_no_git_gets_versions_alone(checkout: Path, monkeypatch: pytest.
     assert "commit" not in provenance.package_versions()
 
 
-def test_an_installed_package_has_no_commit(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(provenance, "__file__", str(checkout / "lib" / "site-packages" / "clearway" / "learn" / "x.py"))
+@pytest.mark.parametrize("where", ["vendor", "lib/site-packages"])
+def test_a_package_installed_in_another_s_repository_has_no_commit(
+    where: str, checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(provenance, "__file__", str(checkout / where / "clearway" / "learn" / "x.py"))
     assert "commit" not in provenance.package_versions()

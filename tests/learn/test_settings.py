@@ -1,3 +1,9 @@
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Optional
+
+import numpy as np
 import pytest
 
 from clearway.errors import RunError
@@ -34,6 +40,30 @@ def test_a_setting_that_the_algorithm_lacks_is_refused_with_the_names_of_those_i
 def test_settings_of_another_type_are_refused_before_anything_is_written(changes: dict, message: str) -> None:
     with pytest.raises(RunError, match=f"^{message}. Correct it"):
         PPO(**changes)
+
+
+def test_numbers_of_numpy_are_kept_as_records_hold_them() -> None:
+    learner = PPO(frames=np.int64(400), lr_start=np.float32(0.5), hindsight=np.bool_(True))
+    assert [type(value) for value in (learner.frames, learner.lr_start, learner.hindsight)] == [int, float, bool]
+
+
+@dataclass(frozen=True)
+class Unkept(PPO):
+    shapes: tuple[int, ...] = (1, 2)
+
+
+@dataclass(frozen=True)
+class Elsewhere(PPO):
+    known: ClassVar[Nowhere]  # noqa: F821 (as of an import for types alone)
+    start: Optional[float] = None  # noqa: UP045 (written so before Python 3.10)
+
+
+def test_types_of_another_package_s_settings() -> None:
+    with pytest.raises(RunError, match=r"^Unkept: shapes is of the type .*, and settings are numbers, True"):
+        Unkept()
+    assert (Elsewhere().start, Elsewhere(start=1.0).start) == (None, 1.0)
+    with pytest.raises(RunError, match="start is 'x', expected a finite number or None"):
+        Elsewhere(start="x")
 
 
 def test_no_words_change_nothing() -> None:

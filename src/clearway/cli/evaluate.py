@@ -146,7 +146,9 @@ class Evaluate:
         )
 
     def _at_goals_live(self) -> None:
-        from clearway.cli.goals import evaluate_at_goals_live
+        from clearway.api.arguments import as_whole
+        from clearway.api.goals import goal_agent
+        from clearway.cli.goals import check_knows_any_room, evaluate_at_goals_live
 
         self.room.check()
         given = {
@@ -158,11 +160,14 @@ class Evaluate:
         if self.perturb or self.takes is not None:
             option = "--perturb" if self.perturb else "--takes"
             raise ClearwayError(f"{option}: walks on the grid. Leave it out: --live has a flag for each perturbation")
+        goals, agent = as_whole("goals", _or(self.goals, GOALS), 1), goal_agent(self.folder)
+        if self.rooms is not None:
+            check_knows_any_room(agent)
         evaluate_at_goals_live(
-            self.folder,
-            self._scenes_of_goals(),
+            agent,
+            self._scenes_of_goals(),  # made last, which may take long
             self.room,
-            goals=_or(self.goals, GOALS),
+            goals=goals,
             step_limit=_or(self.step_limit, GOAL_STEPS),
             seed=self.seed,
             tour=self.tour,

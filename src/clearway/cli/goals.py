@@ -86,7 +86,7 @@ def generated(split: SplitName, kind: PlanKind, count: int) -> list[Path]:
 
 
 def evaluate_at_goals_live(
-    agent: Path,
+    agent: TrainedAgent | Generalist,
     files: Sequence[Path],
     options: Live,
     *,
@@ -100,10 +100,10 @@ def evaluate_at_goals_live(
     from clearway.api.live import evaluate_live
 
     if not files:
-        raise ClearwayError("--live: no scenes. Name scene files behind the agent")
+        raise ClearwayError("no scenes to walk in. Name scene files behind the agent, or give --rooms validation")
     with status_line() as show:
         found = evaluate_live(
-            str(agent),
+            agent,
             scene_files(files),
             goals=goals,
             step_limit=step_limit,

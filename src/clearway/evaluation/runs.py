@@ -58,8 +58,9 @@ def evaluate_runs(
     with torch_threads(1):
         optima = _optima(world, [record.reward for record in records])
         for name in agents:
-            if name in (RANDOM, SHORTEST_PATH) or name.startswith((OPTIMUM, SOFT_FIXED_POINT)):
-                raise RunError(f"the reward {name!r:.80} has the name of a yardstick in the table. Name it otherwise")
+            if name in (*optima, RANDOM, SHORTEST_PATH):
+                problem = f"the reward {name!r:.80} has the name of a yardstick in the table"
+                raise RunError(f"{problem}. Name it otherwise, of a trained run in its run.json")
         for name in beside:
             if name in (*agents, *optima, RANDOM, SHORTEST_PATH):
                 raise RunError(f"beside: {name!r:.80} is the name of another agent in the table. Choose another")

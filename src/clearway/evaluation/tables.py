@@ -151,7 +151,7 @@ def main_rows(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
     return [
         one
         for one in evaluations
-        if one.protocol.action_selection == way and not one.agent.startswith(tuple(REFERENCES))
+        if one.protocol.action_selection == way and not one.agent.startswith(tuple(f"{name} (" for name in REFERENCES))
     ]
 
 
@@ -225,7 +225,7 @@ def _notes(evaluations: Sequence[Evaluation], ranges: bool) -> list[str]:
         f"steps, seed {protocol.seed}.{' Ranges: 95 % bootstrap intervals over episodes.' if ranges else ''}",
     ]
     for name, meaning in REFERENCES.items():
-        if any(evaluation.agent.startswith(name) for evaluation in evaluations):
+        if any(evaluation.agent.startswith(f"{name} (") for evaluation in evaluations):
             notes.append(f"{name.capitalize()}: {meaning}.")
     if any(evaluation.average.failed_targets for evaluation in evaluations):
         notes.append(

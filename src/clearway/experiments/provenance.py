@@ -32,7 +32,8 @@ def made_by(out: Path, jobs: Sequence[Job]) -> dict[str, str]:
 
 def _told(command: Sequence[str]) -> str:
     """A command as it is typed; "python -c" where no file was named."""
-    called = Path(command[0]).name if command else ""
+    path = Path(command[0] if command else "")
+    called = path.parent.name if path.name == "__main__.py" else path.name.removesuffix(".exe")
     return shlex.join([*(("python", "-c") if called in ("", "-c") else (called,)), *command[1:]])
 
 

@@ -6,13 +6,12 @@ the same name mean the same in all of them. The names are in `algorithms`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, ClassVar, get_type_hints
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, ClassVar
 
 from clearway.errors import RunError
-from clearway.learn.kinds import called, fits
+from clearway.learn.kinds import called, field_types, fits, is_finite
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -73,11 +72,14 @@ class Learner:
         Raises:
             RunError: a value is of another type than its field, or out of range.
         """
-        types = get_type_hints(type(self))
-        for name, value in asdict(self).items():
+        for name, wanted in field_types(type(self)).items():
+            value = getattr(self, name)
+            if type(value).__module__ == "numpy" and hasattr(value, "item"):  # a number as records hold it
+                value = value.item()
+                object.__setattr__(self, name, value)
             _check_range(name, value)
-            if not fits(value, types[name]):
-                raise RunError(f"{name} is {value!r:.40}, expected {called(types[name])}. Correct it")
+            if not fits(value, wanted):
+                raise RunError(f"{name} is {value!r:.40}, expected {called(wanted)}. Correct it")
 
     @property
     def clip_rewards(self) -> bool | None:
@@ -202,8 +204,8 @@ def setting_names(kind: type[Learner]) -> tuple[str, ...]:
 def _check_range(name: str, value: object) -> None:
     if not isinstance(value, int | float):
         return
-    if not math.isfinite(value):
-        raise RunError(f"{name} is {value}, expected a finite figure. Give a large one instead")
+    if not is_finite(value):
+        raise RunError(f"{name} is {value!r:.40}, expected a finite figure. Give a large one instead")
     if name in AT_LEAST_ONE and value < 1:
         raise RunError(f"{name} is {value}, expected at least 1. Give a larger {name}")
     if name in ZERO_TO_ONE and not 0 <= value <= 1:

@@ -20,14 +20,15 @@ GIT_LIMIT_S = 10.0
 def package_versions() -> dict[str, str]:
     """Versions of Python, clearway and the packages that shape results; of a checkout its `commit`, too."""
     found = {"python": platform.python_version(), "clearway": __version__}
-    if (commit := _commit(Path(__file__).parents[3])) is not None:
+    sources = Path(__file__).parents[2]
+    if sources.name == "src" and (commit := _commit(sources.parent)) is not None:
         found["commit"] = commit
     return found | {name: _installed_version(name) for name in PACKAGES}
 
 
 @cache
 def _commit(checkout: Path) -> str | None:
-    """Of a checkout, "-dirty" behind it where files differ; None where the folder is none, or git does not tell."""
+    """Of a checkout, "-dirty" behind it where files that it tracks differ; None: it is none, or git tells nothing."""
     if not (checkout / ".git").exists():
         return None
     words = ["git", "-C", str(checkout), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=10"]

@@ -6,12 +6,12 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.learn.algorithms import algorithm
-from clearway.learn.kinds import fits
+from clearway.learn.kinds import field_types, fits
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
 from clearway.learn.provenance import hardware, package_versions
@@ -177,7 +177,7 @@ def _settings(kind: type[Learner], content: Mapping[str, Any]) -> Learner:
     expected = {field.name for field in fields(kind)}
     if set(content) != expected:
         raise KeyError(", ".join(sorted(set(content) ^ expected)))
-    types = get_type_hints(kind)
+    types = field_types(kind)
     for name in expected:
         if not fits(content[name], types[name]):
             raise TypeError(f"{name} is {content[name]!r:.40}")

@@ -25,7 +25,7 @@ from clearway.live.body import SAMPLES, Motion
 from clearway.live.conditions import Perturbations
 from clearway.live.draws import Draws
 from clearway.live.live_room import LiveRoom, layout_of_episode
-from clearway.live.walker import Walker, within_m
+from clearway.live.walker import Walker, success_radius_m
 from clearway.reward import COLLISION_AWARE
 from clearway.rooms.camera import Shot, first_person_shot
 from clearway.rooms.render import Camera
@@ -36,7 +36,7 @@ from clearway.world.world import World
 
 LiveSelection = Literal["sampled", "argmax"]
 SUCCESS_DEG = 45.0
-"""A target is reached when the body looks its way within so much, and stands within `walker.within_m` of it."""
+"""A target is reached when the body looks its way within so much, and stands within `walker.success_radius_m` of it."""
 NEAR_M, CLOSE_M = 0.3, 0.1
 STEP_S = 1.0  # a step takes so long, move or turn
 
@@ -171,7 +171,7 @@ class Walking:
         self.layout = layout_of_episode(live, start, target, draws)
         body = live.body(self.layout)
         self.walker = Walker(body, live.pose_of(start), draws, step_m=scene.cell_size_m, turn_deg=scene.turn_deg)
-        self.target, self._within_m = live.pose_of(target), within_m(scene.cell_size_m)
+        self.target, self._within_m = live.pose_of(target), success_radius_m(scene.cell_size_m)
         self.changed = self.layout != live.as_built()
         self.steps: list[Motion] = []
         self.walk = [self.walker.pose]

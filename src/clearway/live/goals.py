@@ -15,7 +15,7 @@ from clearway.evaluation.goals import GoalEvaluation, GoalFigures, drawn_goals
 from clearway.evaluation.metrics import SC_DETOUR
 from clearway.live.conditions import Condition
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
-from clearway.live.live_room import LiveRoom, check_can_be_rearranged, check_is_room, live_room
+from clearway.live.live_room import MODEL_SOURCE, LiveRoom, check_is_room, check_movable, live_room
 from clearway.live.tours import walk_live_tour
 from clearway.rooms.detail import taken_fast
 from clearway.rooms.render import Camera, studio
@@ -71,7 +71,7 @@ def walk_to_goals(
     for scene in scenes:  # before what takes long
         check_is_room(scene)
         for setting in settings:
-            check_can_be_rearranged(scene, setting.perturbations)
+            check_movable(scene.name, setting.perturbations, fixed=scene.made_by.source == MODEL_SOURCE)
         scene.seen_by(RGB)
         wanted[scene.name] = drawn_goals(scene, goals, seed)
     figures: list[dict[str, GoalFigures]] = [{} for _ in settings]

@@ -102,7 +102,7 @@ class LiveRoom:
 
     def check_can_be_rearranged(self, perturbations: Perturbations) -> None:
         """Raise SceneError where perturbations move what cannot be moved here."""
-        check_can_be_rearranged(self.scene, perturbations, fixed=self.room is None)
+        check_movable(self.scene.name, perturbations, fixed=self.room is None)
         wanted = [name for name in REARRANGING if getattr(perturbations, name)]
         if wanted and not self.model.nmocap:
             problem = f"the room was built with nothing loose in it, and {wanted[0]} is asked for"
@@ -155,15 +155,12 @@ def check_is_room(scene: Scene) -> None:
         )
 
 
-def check_can_be_rearranged(scene: Scene, perturbations: Perturbations, *, fixed: bool | None = None) -> None:
-    """Raise SceneError where a room is to be rearranged that cannot be.
-
-    fixed: nothing can be moved in it; None: as the scene's record says.
-    """
-    wanted = [name for name in REARRANGING if getattr(perturbations, name)]
-    if wanted and (scene.made_by.source == MODEL_SOURCE if fixed is None else fixed):
+def check_movable(name: str, perturbations: Perturbations, *, fixed: bool) -> None:
+    """Raise SceneError where something is to be moved in a room of that name, and nothing can be: it is fixed."""
+    wanted = [part for part in REARRANGING if getattr(perturbations, part)]
+    if fixed and wanted:
         problem = f"nothing can be moved in a MuJoCo model, and {wanted[0]} is asked for"
-        raise SceneError(scene.name, problem, f"Leave out {' and '.join(REARRANGING)}")
+        raise SceneError(name, problem, f"Leave out {' and '.join(REARRANGING)}")
 
 
 def live_room_named(name: str, seed: int = 0, *, small: bool = False, loose: bool = True) -> LiveRoom:

@@ -90,7 +90,7 @@ class Walker:
         return (Zone.COLLISION, Zone.PRECOLLISION, Zone.FREE)[free]
 
 
-def within_m(cell_size_m: float) -> float:
+def success_radius_m(cell_size_m: float) -> float:
     """How near its target's place a body has reached it, so that it does not where a neighbouring cell is."""
     return min(SUCCESS_M, cell_size_m / 2)
 

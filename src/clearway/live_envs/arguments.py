@@ -164,7 +164,7 @@ def check_switches(continuous: bool, stop: bool, render_mode: str | None, sensor
 
 def check_workers(workers: int | None) -> None:
     """Raise EnvError where it is no number of renderer processes."""
-    if workers is not None and (not isinstance(workers, (int, np.integer)) or workers < 1):
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1):
         raise EnvError(f"workers={workers!r:.40}: expected a whole number from 1 on, or None for one a core")
 
 

@@ -26,7 +26,7 @@ from clearway.envs.arguments import (
 )
 from clearway.errors import EnvError
 from clearway.live.conditions import REARRANGING
-from clearway.live.walker import within_m
+from clearway.live.walker import success_radius_m
 from clearway.live_envs.arguments import (
     CLEARANCE,
     LIVE_RENDER_MODES,
@@ -90,9 +90,9 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     ## Arguments
     Those of `LiveImageGoalEnv`; `num_envs`, `autoreset_mode`, and `workers`, renderer processes for each camera (None:
-    one a core). `reset` takes `options={"target": ..., "start": ..., "reset_mask": mask}`, all optional; a target or
-    start is one for all environments or one for each. Of three environments, three whole numbers are three states, and
-    a pose has a decimal point: (1.0, 2.0, 90.0). What `reset` refuses leaves everything as it was.
+    one a core; 16 at most). `reset` takes `options={"target": ..., "start": ..., "reset_mask": mask}`, all optional; a
+    target or start is one for all environments or one for each. Of three environments, three whole numbers are three
+    states, and a pose has a decimal point: (1.0, 2.0, 90.0). What `reset` refuses leaves everything as it was.
 
     ## Version History
     * v0: first version.
@@ -148,7 +148,7 @@ class LiveImageGoalVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             earned,
             step_m=float(live.scene.cell_size_m if step_m is None else step_m),
             turn_deg=float(live.scene.turn_deg if turn_deg is None else turn_deg),
-            success_m=float(within_m(live.scene.cell_size_m) if success_m is None else success_m),
+            success_m=float(success_radius_m(live.scene.cell_size_m) if success_m is None else success_m),
             success_deg=float(success_deg),
             stop=stop,
             perturbations=perturbed,
