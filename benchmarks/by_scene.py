@@ -14,6 +14,7 @@ import numpy as np
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
 from clearway.evaluation.goals import GoalEvaluation
+from clearway.experiments.correction import holm
 
 SHOWN = ("success", "success_4x", "spl", "collisions", "steps", "false_arrivals", "missed_arrivals")
 COUNTS = ("collisions", "steps")
@@ -30,6 +31,13 @@ def interval(values: np.ndarray) -> tuple[float, float]:
     drawn = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
     low, high = intervals(np.nanmean(values[drawn], axis=1))
     return float(low), float(high)
+
+
+def p_of_mean(values: np.ndarray) -> float:
+    """Two-sided p of a mean over scenes (scenes,) that is zero: twice the share of redrawn means on its other side."""
+    drawn = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    means = values[drawn].mean(axis=1)
+    return min(1.0, 2 * (1 + min(int((means <= 0).sum()), int((means >= 0).sum()))) / (RESAMPLES + 1))
 
 
 def shown(name: str, values: np.ndarray) -> str:
@@ -55,6 +63,13 @@ def print_table(found: Mapping[str, GoalEvaluation]) -> None:
 def print_difference(one: GoalEvaluation, other: GoalEvaluation, name: str, what: str) -> None:
     """By how much a figure of one is higher than that of the other, scene by scene."""
     print(f"{what}: {shown(name, column(one, name) - column(other, name))}")
+
+
+def print_higher(one: GoalEvaluation, others: Mapping[str, GoalEvaluation], name: str) -> None:
+    """Claims that a figure of one is higher than that of each of the others; p is corrected for all of them (Holm)."""
+    ps = [p_of_mean(column(one, name) - column(other, name)) for other in others.values()]
+    for (told, other), p in zip(others.items(), holm(ps), strict=True):
+        print_difference(one, other, name, f"{name} higher than {told}, p = {p:.2g} (Holm, {len(ps)} claims)")
 
 
 def write_record(path: Path, about: Mapping[str, Any], found: Mapping[str, GoalEvaluation]) -> None:

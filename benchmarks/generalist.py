@@ -5,6 +5,7 @@
     python benchmarks/generalist.py rooms-test --perturb all
     python benchmarks/generalist.py rooms-test --json record.json       # figures of every scene
     python benchmarks/generalist.py rooms-test --eyes eyes --rivals     # alone; by eyes of your own
+    python benchmarks/generalist.py rooms-test --tour 500 --rivals memory cells   # with these taken away
 
 Scenes are files or folders of them, with pictures. All agents walk to the same goals from the same starts. Intervals
 are of the mean over scenes, and so are differences, scene by scene; see `by_scene`.
@@ -16,8 +17,9 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from by_scene import print_difference, print_table, write_record
+from by_scene import print_difference, print_higher, print_table, write_record
 from retrieval import Retrieving
+from taken_away import WithoutCells, WithoutMemory
 
 import clearway
 from clearway.agents.generalist import Generalist
@@ -26,7 +28,9 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.perception import eyes
 
 CARELESS, RETRIEVAL = "collisions cost nothing", "nearest picture of the tour"
-RIVALS = ("careless", "nearest")
+NO_MEMORY, NO_CELLS = "without memory", "without the map's cells"
+RIVALS = ("careless", "nearest", "memory", "cells")
+USUAL = RIVALS[:2]
 
 
 def main() -> None:
@@ -38,15 +42,22 @@ def main() -> None:
     parser.add_argument("--tour", type=int, default=0, help="steps")
     parser.add_argument("--perturb", nargs="+", default=["none"])
     parser.add_argument("--eyes", default=eyes.NAME, help="a folder of eyes; by default those that come along")
-    told = "careless: collisions cost nothing; nearest: goes by the tour's nearest pictures. Without a name: none"
-    parser.add_argument("--rivals", nargs="*", choices=RIVALS, default=RIVALS, help=told)
+    told = (
+        "careless: collisions cost nothing; nearest: goes by the tour's nearest pictures; memory, cells: see taken_away"
+    )
+    parser.add_argument("--rivals", nargs="*", choices=RIVALS, default=USUAL, help=f"{told}. Without a name: none")
     parser.add_argument("--json", type=Path, help="where the record is written")
     args = parser.parse_args()
     generalist = Generalist.by_eyes(eyes.from_record(eyes.find_record(args.eyes)))
     careless = replace(generalist, settings=replace(generalist.settings, collision_cost=0.0))
     agents = {"generalist": generalist} | ({CARELESS: careless} if "careless" in args.rivals else {})
+    parts = generalist.encoder, generalist.sight, generalist.settings
     if "nearest" in args.rivals and args.tour:
-        agents[RETRIEVAL] = Retrieving(generalist.encoder, generalist.sight, generalist.settings)
+        agents[RETRIEVAL] = Retrieving(*parts)
+    if "cells" in args.rivals and args.tour:
+        agents[NO_CELLS] = WithoutCells(*parts)
+    if "memory" in args.rivals:
+        agents[NO_MEMORY] = WithoutMemory(*parts)
     asked = {"goals": args.goals, "seed": args.seed, "tour": args.tour, "perturb": args.perturb}
     record = {"asked": asked, "eyes": args.eyes, "versions": package_versions(), "hardware": hardware()}
     found: dict[str, GoalEvaluation] = {}
@@ -59,8 +70,7 @@ def main() -> None:
     own = found["generalist"]
     if CARELESS in found:
         print_difference(found[CARELESS], own, "collisions", "collisions spared an episode")
-    if RETRIEVAL in found:
-        print_difference(own, found[RETRIEVAL], "spl", "SPL above the nearest picture's")
+    print_higher(own, {name: found[name] for name in (NO_MEMORY, NO_CELLS, RETRIEVAL) if name in found}, "spl")
 
 
 if __name__ == "__main__":

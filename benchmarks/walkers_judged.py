@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from by_scene import shown
+from by_scene import p_of_mean, shown
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
 from clearway.experiments.correction import LEVEL, holm
@@ -70,13 +70,6 @@ def paired(record: Mapping[str, Any], figure: str, above: str, below: str) -> tu
     seeds = sorted(one)
     first, second = (np.array([[kind[seed][scene] for scene in scenes] for seed in seeds]) for kind in (one, other))
     return first, second
-
-
-def p_of_mean(values: np.ndarray) -> float:
-    """Two-sided p of a mean over scenes (scenes,) that is zero: twice the share of redrawn means on its other side."""
-    drawn = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
-    means = values[drawn].mean(axis=1)
-    return min(1.0, 2 * (1 + min(int((means <= 0).sum()), int((means >= 0).sum()))) / (RESAMPLES + 1))
 
 
 def with_other_seeds(above: np.ndarray, below: np.ndarray) -> tuple[float, float]:

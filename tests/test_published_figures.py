@@ -429,7 +429,7 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
     assert sum(row[1:2] in (["holds"], ["undecided"], ["does not hold"]) for row in rows) == len(claims) == 15
     ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "paper").glob("runs/*/metrics.jsonl")]
     seconds = [json.loads(end)["seconds"] for end in ends]
-    assert f"{min(seconds):.0f}"[:-1] + "0 to " + f"{max(seconds):.0f}"[:-1] + "0 s a run" in page
+    assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
     results = (DOCS / "results.md").read_text(encoding="utf-8")
     asked = [claim for claim in claims if not claim.further]
     counts = [sum(claim.verdict == verdict for claim in asked) for verdict in ("holds", "does not hold", "undecided")]
