@@ -7,10 +7,11 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 
+from criteria import Criteria, Quality, quality
+
 from clearway.agents.by_pose import PoseAgent, network_on_poses
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import SC_STEPS
-from clearway.evaluation.quality import Criteria, Quality, quality
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of

@@ -8,10 +8,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from criteria import quality
+
 from clearway.agents.agent import Agent
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, run_episodes
 from clearway.evaluation.metrics import SC_STEPS
-from clearway.evaluation.quality import quality
 from clearway.world.world import World
 
 CHECK_SEED = 1

@@ -28,7 +28,9 @@ def files_below(folder: Path) -> set[str]:
 def test_runs_are_listed(clearway, runs):
     answer = clearway("runs", "list")
     assert (answer.code, answer.err) == (0, "")
-    head, first, second = (line.split() for line in answer.out.splitlines())
+    *rows, caption = answer.out.splitlines()
+    head, first, second = (line.split() for line in rows)
+    assert caption.startswith("success, steps, collisions: of training's episodes")
     assert head == ["run", "reward", "algorithm", "frames", "solved", "success", "steps", "collisions"]
     assert (first[0], second[:5]) == ("runs/a", ["runs/sub/b", "shortest", "ppo", "1,280", "0"])
     told = clearway("runs", "list", "runs", "--json").json
@@ -129,6 +131,21 @@ def test_on_80_columns_a_long_name_stays_whole(clearway, runs, monkeypatch):
     assert (lines[0], lines[1].split()[0], lines[1].split()[-1], lines[2]) == ("run", "reward", "collisions", str(long))
     assert max(map(len, lines)) <= 80
     assert "runs/sub/b" in lines and any(line.split()[:2] == ["shortest", "ppo"] for line in lines)
+
+
+def test_on_80_columns_a_long_training_under_way_stays_whole(clearway, runs, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    path = runs / "a" / "run.json"
+    content = json.loads(path.read_text())
+    content["learner"]["frames"] = 5_000_000
+    path.write_text(json.dumps(content))
+    metrics = runs / "a" / "metrics.jsonl"
+    last = json.loads(metrics.read_text().splitlines()[-1]) | {"frames": 4_946_176, "solved_targets": 1797}
+    metrics.write_text(json.dumps(last) + "\n")
+    told = clearway("runs", "list").out
+    assert max(len(line.rstrip()) for line in told.splitlines()) <= 80
+    assert "\N{HORIZONTAL ELLIPSIS}" not in told
+    assert {"algorithm", "success", "collisions", "4,946,176", "5,000,000", "1797"} < set(told.split())
 
 
 def test_compared_runs_of_long_names_are_numbered(clearway, runs, monkeypatch):

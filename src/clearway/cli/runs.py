@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 CURVES_AT_MOST = 8  # runs in one picture
 HEADINGS = ("run", "reward", "algorithm", "frames", "solved", "success", "steps", "collisions")
+CAPTION = "success, steps, collisions: of training's episodes, in its latest stretch"
 INDENT = 2  # of a run's figures below its folder
+BROKEN = HEADINGS[1:].index("reward"), HEADINGS[1:].index("frames")
 
 
 @dataclass(frozen=True)
@@ -152,19 +154,26 @@ def _print_runs(runs: Sequence[RunSummary]) -> None:
     rows = [_row(summary) for summary in runs]
     if _width([max(map(len, column)) for column in zip(HEADINGS, *rows, strict=True)]) <= stdout_console().width:
         _print_table(HEADINGS, rows)
+        _print_whole(CAPTION)
         return
     widths = _widths_below([HEADINGS[1:], *(row[1:] for row in rows)])
     for row in (HEADINGS, *rows):
         _print_whole(row[0])
         _print_below(row[1:], widths)
+    _print_whole(CAPTION)
 
 
 def _widths_below(rows: Sequence[Sequence[str]]) -> list[int]:
-    """Of columns below a name; the first, of rewards, is broken between words where there is too little room."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    """Of columns below a name; rewards, then frames, are broken between words where there is too little room."""
+    columns = list(zip(*rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
     over = INDENT + _width(widths) - stdout_console().width
-    longest = max(len(word) for row in rows for word in row[0].split())
-    return [max(longest, widths[0] - max(over, 0)), *widths[1:]]
+    for place in BROKEN:
+        longest = max(len(word) for cell in columns[place] for word in cell.split())
+        spared = max(0, min(over, widths[place] - longest))
+        widths[place] -= spared
+        over -= spared
+    return widths
 
 
 def _print_below(cells: Sequence[str], widths: Sequence[int]) -> None:

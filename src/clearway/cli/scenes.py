@@ -162,7 +162,8 @@ def _print_table(content: dict[str, object]) -> None:
     for key, value in content.items():
         if value is None:
             continue
-        table.add_row(key.replace("_", " "), Text(printable(_cell(value))))
+        name = "picture height, width" if key == "picture_size" else key.replace("_", " ")
+        table.add_row(name, Text(printable(_cell(value))))
     stdout_console().print(table)
 
 
