@@ -31,6 +31,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first scene that is walked in")
     parser.add_argument("--goals", type=int, default=20, help="of each scene")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--perturb", nargs="+", default=["none"])
     parser.add_argument("--trying-again", metavar="KIND", help="whose agents walk once more")
     parser.add_argument("--json", type=Path, help="where the record is written, after each agent")
     args = parser.parse_args()
@@ -38,7 +39,7 @@ def main() -> None:
     if args.trying_again and args.trying_again not in kinds:
         parser.error(f"--trying-again {args.trying_again}: the runs are of {', '.join(sorted(kinds))}")
     files = sorted(args.scenes.glob("*.h5"))[args.first :]
-    asked = {"goals": args.goals, "seed": args.seed}
+    asked = {"goals": args.goals, "seed": args.seed, "perturb": args.perturb}
     runs = learnt(args.runs)
     record = {"asked": asked, "versions": package_versions(), "hardware": hardware(), "runs": runs}
     found: dict[str, GoalEvaluation] = {}
