@@ -12,8 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clearway.experiments.convergence import mark_steps, settled_row
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_folder import RunFolder
 from helpers.published import DOCS, assert_written, numbers
 
 RESULTS = (DOCS / "results.md").read_text(encoding="utf-8")
@@ -30,7 +33,8 @@ def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
 def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
     records["unpack"](DOCS / "records" / "memory-bathroom.tar.xz", tmp_path / "memory")
-    ((section,), page) = gather(tmp_path / "memory").sections, (DOCS / "results.md").read_text(encoding="utf-8")
+    found, page = gather(tmp_path / "memory"), (DOCS / "results.md").read_text(encoding="utf-8")
+    (section,) = found.sections
     assert not section.missing
     (table,) = section.tables
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
@@ -54,6 +58,10 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
             assert_written(mean, row[name], f"{name} after {count} frames")
             recorded = numbers(str(row[f"95 % of {name}"]))
             assert not interval or [*map(float, interval)] == [*map(float, recorded)]
+    mark = mark_steps(found.setting, found.setting.targets)
+    runs = [RunFolder(path) for path in (tmp_path / "memory" / "runs").glob("ppo-*")]
+    settled = [settled_row(run.metrics(), mark)["frames"] for run in runs]
+    assert len(settled) == 5 and f"settled after {round(np.mean(settled), -3):,.0f} frames" in page
     verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
 
@@ -148,6 +156,22 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         assert interval == numbers(str(rows[agent]["95 %"]).replace(",", ""))
         assert int(settled.split()[0]) == rows[agent]["settled"]
     evidence = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones, or a larger step?")[2]
+    evidence = evidence.partition("\n### ")[0]
+    seconds = [
+        json.loads(path.read_text().splitlines()[-1])["seconds"]
+        for path in (tmp_path / "zones").glob("runs/*/metrics.jsonl")
+        if json.loads((path.parent / "run.json").read_text())["zone_level"] == "pose"
+    ]
+    assert f"{min(seconds):.0f} to {round(max(seconds), -1):,.0f} s a run" in evidence
+    table = section.tables[0]
+    for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows):
+        if row["seeds"] == 5:
+            (line,) = [line for line in evidence.splitlines() if line.startswith(f"| {row['agent']} |")]
+            cell = line.strip("|").split("|")[2 if row["figure"] == "steps" else 3]
+            mean, *interval = numbers(cell)
+            assert_written(mean, row["average"], line)
+            for written, end in zip(interval, numbers(str(row["95 %"])), strict=True):
+                assert_written(written, float(end), line)
     claims = {" than ".join(re.findall(AGENTS, claim.text)): claim for claim in section.claims[1:]}
     claims["collision-aware than shortest"] = section.claims[0]
     for name, claim in claims.items():

@@ -13,7 +13,7 @@ import clearway
 from clearway import evaluate_goals
 from clearway.agents.agent import FEATURES
 from clearway.agents.by_pose import RandomWalk
-from clearway.errors import ArgumentError, ClearwayError, EncoderError, SceneError
+from clearway.errors import AgentError, ArgumentError, ClearwayError, EncoderError, SceneError
 from clearway.live import live_room
 from clearway.live.conditions import Perturbations
 from clearway.perception import encoder_from_record, eyes
@@ -21,9 +21,10 @@ from clearway.perception.eyes import write_eyes
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import RGB
 from clearway.scenes.thor_v1 import write_scene
+from clearway.scenes.validate import SceneWarning
 from clearway.views import grid
 from helpers.agents import Spy
-from helpers.made import corridor_scene, grid_scene, scene_of_cells
+from helpers.made import corridor_scene, grid_scene, scene_of_cells, with_depth
 from helpers.small_eyes import seen_by_eyes, small_eyes
 
 SMALL = {"frames": 800, "envs": 10, "rollout_steps": 8, "step_limit": 30, "width": 16}
@@ -77,6 +78,16 @@ def test_an_agent_of_one_s_own_and_its_maker(run):
         assert own.scenes == random.scenes
 
 
+def test_an_agent_called_as_a_yardstick_is_refused(run):
+    def random(world):
+        return RandomWalk()
+
+    with pytest.raises(AgentError, match=r"'random': the name of two agents in the table\. Give the function or class"):
+        evaluate_goals(random, [corridor_scene(5)], goals=4)
+    with pytest.raises(AgentError, match="'random': the name of two agents in the table"):
+        clearway.evaluate(random, [corridor_scene(5)], episodes=1)
+
+
 @pytest.mark.slow
 def test_others_walk_in_the_scenes_of_their_training_alone(tmp_path):
     write_scene(corridor_scene(5, feature_count=12), tmp_path / "corridor.h5")
@@ -85,6 +96,9 @@ def test_others_walk_in_the_scenes_of_their_training_alone(tmp_path):
     assert told.average.episodes == 6
     with pytest.raises(ClearwayError, match="corridor"):
         evaluate_goals(trained.folder, [grid_scene(1)], goals=6)
+    with pytest.warns(SceneWarning, match=r"grid: left out, as the run was not trained there\. .* walks generalist"):
+        both, *_ = evaluate_goals(trained.folder, [grid_scene(1), tmp_path / "corridor.h5"], goals=6, step_limit=40)
+    assert both.scenes == told.scenes
 
 
 @pytest.fixture
@@ -135,8 +149,13 @@ def test_agents_of_one_s_own_see_takes_of_what_they_see(run, taken):
     made = []
     evaluate_goals(lambda world: made.append(Spy(RGB)) or made[-1], [scene], **settings)
     assert made[-1].seen[0][RGB].max() < 128
+    unknown = replace(scene, encoder=None)
+    evaluate_goals(lambda world: made.append(Spy(RGB)) or made[-1], [unknown], **settings)
+    assert made[-1].seen[0][RGB].max() < 128
     evaluate_goals(RandomWalk(), [corridor_scene(5)], **settings)
-    assert len(taken) == 2, "nothing is taken for who sees no pictures"
+    assert len(taken) == 3, "nothing is taken for who sees no pictures"
+    with pytest.raises(AgentError, match="sees depth, and there are perturbed takes of rgb and features alone"):
+        evaluate_goals(Spy("depth"), [with_depth(scene)], **settings)
 
 
 def test_perturbations_that_cannot_be_had_are_one_line(run, taken, tmp_path, monkeypatch):

@@ -1,10 +1,15 @@
 """A run's settings as a file, from Python."""
 
+import numpy as np
 import pytest
 
+from clearway.api import training
 from clearway.api.run_settings import reward_options
+from clearway.api.takes import perturbations_asked
 from clearway.api.training import train
+from clearway.evaluation.takes import Takes
 from clearway.learn.run_folder import RunFolder
+from clearway.live.conditions import Perturbations
 from clearway.reward import BUMP, REWARDS, Arrival, Reward, Term, Time
 from clearway.scenes.thor_v1 import write_scene
 from clearway.settings_file import read_settings
@@ -37,6 +42,22 @@ def test_a_training_from_files_leaves_its_settings_and_one_from_memory_none(tmp_
     assert settings["targets"] == {name: list(states) for name, states in targets.items()}
     train(scene, out=tmp_path / "other", **SMALL)
     assert not (tmp_path / "other" / "run.yaml").exists()
+
+
+def test_perturbations_are_left_to_the_last_digit_and_takes_with_them(tmp_path, monkeypatch):
+    scene = small_scenes()[0]
+    write_scene(scene, tmp_path / "a.h5")
+    asked = Perturbations(light=1 / 3, distance_noise=0.01234567)
+
+    def takes_seen(scenes, perturbations, *_, takes, **__):
+        of_scene = np.repeat(np.asarray(scenes[0].features)[:, None], takes, axis=1)
+        return Takes(takes, {"features": [of_scene]}, {"label": "some"})
+
+    monkeypatch.setattr(training, "takes_seen", takes_seen)
+    train(tmp_path / "a.h5", out=tmp_path / "run", perturb=asked, **SMALL)
+    settings = read_settings(tmp_path / "run" / "run.yaml")
+    assert perturbations_asked(settings["perturb"]) == asked
+    assert settings["takes"] == 4
 
 
 def test_a_lengthened_run_s_settings_say_so(tmp_path):

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 import clearway
+from clearway.api import training
 from clearway.api.training import chosen_learner
 from clearway.errors import ArgumentError, ClearwayError
 from clearway.learn.presets import DEFAULT, PAPER_A3C
@@ -144,6 +145,19 @@ def test_perturbed_pictures_are_of_rooms_and_for_algorithms_that_learn_by_them(c
         clearway.train(corridor, perturb="fog", **SMALL)
     with pytest.raises(ClearwayError, match=r"encoder made-up: .* Encode the scene again"):
         clearway.train(corridor, perturb="all", **SMALL)
+
+
+def test_what_is_wrong_is_told_before_pictures_are_taken(corridor, monkeypatch) -> None:
+    monkeypatch.setattr(training, "takes_seen", lambda *_, **__: pytest.fail("taken"))
+    for wrong, part in (
+        ({"reward": "shortst"}, "shortst"),
+        ({"zone_level": "room"}, "zone_level='room'"),
+        ({"device": 3}, "device=3"),
+        ({"threads": 0}, "threads=0"),
+        ({"until_solved": "yes"}, "until_solved='yes'"),
+    ):
+        with pytest.raises(ClearwayError, match=part):
+            clearway.train(corridor, perturb="all", **wrong, **SMALL)
 
 
 def test_a_reward_that_clips_needs_settings_that_do(corridor) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from clearway.choices import BudgetName, ExperimentName, LearnerName
+from clearway.errors import SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
@@ -262,6 +263,23 @@ def test_seeds_begin_where_they_are_told_to(dumps: Path, tmp_path: Path, monkeyp
     assert reproduce.gather(tmp_path).setting.seeds == (5, 6)
     with pytest.raises(ValueError, match="-1 where a number of at least 0 is expected"):
         reproduce._checked(replace(request, first_seed=-1))
+
+
+def test_what_cannot_be_asked_of_the_scenes_is_refused_and_not_kept(
+    dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(setting: object) -> list[Job]:
+        raise SceneError("bathroom", "no", "Leave tables 2 and 3 out")
+
+    monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
+    tables = {**reproduce.EXPERIMENTS, "table2": replace(reproduce.EXPERIMENTS["table2"], jobs=refused)}
+    monkeypatch.setattr(reproduce, "EXPERIMENTS", tables)
+    out = tmp_path / "out"
+    request = ReproduceRequest(names=("table2",), out=out, budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1)
+    with pytest.raises(SceneError, match="Leave tables 2 and 3 out"):
+        reproduce.reproduce(request)
+    found = reproduce.reproduce(replace(request, names=("fig3",)))
+    assert [section.name for section in found.sections] == ["fig3"]
 
 
 def test_the_command_that_ends_last_reports_what_others_asked_for_meanwhile(

@@ -82,6 +82,31 @@ def test_certainty_for_all_at_once_is_none() -> None:
         run_episodes(WORLD, agent, episodes_per_target=3)
 
 
+ARRIVED = {
+    "one for all": (lambda n: np.ones(1, bool), r"gave arrived bool \(1,\), expected bool \(6,\)"),
+    "how sure": (lambda n: np.full(n, 0.2), r"gave arrived float64 \(6,\), expected bool \(6,\)"),
+    "not any more": (lambda n: None, "gave arrived at some steps alone. Give it at each, or at none"),
+}
+
+
+@pytest.mark.parametrize("name", ARRIVED)
+def test_whether_it_has_arrived_is_a_flag_for_each_episode_at_each_step(name: str) -> None:
+    wrong, said = ARRIVED[name]
+
+    class Tells(RandomWalk):
+        steps = 0
+
+        def act(self, observation, state):
+            self.steps += 1
+            decisions, after = super().act(observation, state)
+            count = len(decisions.action)
+            told = np.zeros(count, bool) if self.steps == 1 else wrong(count)
+            return Decisions(decisions.action, arrived=told), after
+
+    with pytest.raises(AgentError, match=said):
+        run_episodes(WORLD, Tells(), episodes_per_target=3, seed=4)
+
+
 @pytest.mark.parametrize("kind", [np.int8, np.int32])
 def test_short_integers_are_actions_too(kind: type) -> None:
     turning, short = (

@@ -56,5 +56,7 @@ def test_a_claim_that_holds_by_itself_may_not_hold_among_many() -> None:
 
 def test_learners_are_families_of_their_own_and_what_was_not_tested_stays() -> None:
     assert [claim.verdict for claim in corrected(section_of(0.03, 0.03, names="ab")).claims] == ["holds", "holds"]
+    first, *_ = corrected(section_of(0.032, None, None)).claims
+    assert (first.verdict, "for 3 claims 0.096 (Holm)" in first.evidence) == ("undecided", True)  # as it will be
     (claim,) = corrected(section_of(None)).claims
     assert claim.evidence == "E."

@@ -10,7 +10,7 @@ import pytest
 
 from clearway.agents.agent import Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk
-from clearway.errors import SceneError
+from clearway.errors import AgentError, SceneError
 from clearway.evaluation.goals import drawn_goals
 from clearway.live import goals
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built
@@ -100,6 +100,22 @@ def test_who_holds_to_be_there_is_asked_where_it_is_and_where_it_is_not(live, cl
     figures = told.scenes["walkable"]
     assert 0 < figures.success < 1
     assert figures.false_arrivals == float(claims) and figures.missed_arrivals == float(not claims)
+
+
+def test_what_no_agent_may_do_is_one_line_off_the_grid_too(live):
+    class Wrong(RandomWalk):
+        def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+            decisions, after = super().act(observation, state)
+            return Decisions(decisions.action, arrived=np.ones(1, bool)), after
+
+    with pytest.raises(AgentError, match=r"gave arrived bool \(1,\), expected bool \(8,\)"):
+        walk_to_goals("wrong", Wrong(), [live.scene], [NONE], **SETTINGS)
+
+
+def test_two_scenes_of_one_name_are_refused_before_any_room_is_built(live, monkeypatch):
+    monkeypatch.setattr(goals, "live_room", lambda scene: pytest.fail("built"))
+    with pytest.raises(SceneError, match="two scenes have this name"):
+        walk_to_goals("random", RandomWalk(), [live.scene, live.scene], [NONE], **SETTINGS)
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from pathlib import Path
@@ -45,6 +45,17 @@ def as_workers(workers: object, ray: str | None) -> int:
 def as_seed(name: str, value: object) -> int:
     """A seed. Raises ArgumentError."""
     return as_whole(name, value, 0, SEED_LIMIT - 1)
+
+
+def as_paths(name: str, sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
+    """A path, or several. Raises ArgumentError."""
+    if isinstance(sources, str | os.PathLike):
+        return [as_path(name, sources)]
+    if not isinstance(sources, Iterable):
+        raise ArgumentError(f"{name}={sources!r:.80}: expected a file, a folder, or several. Give one of these")
+    if not (paths := [as_path(name, source) for source in sources]):
+        raise ArgumentError(f"{name}: none given. Give at least one file or folder")
+    return paths
 
 
 def as_word(name: str, value: object) -> str:

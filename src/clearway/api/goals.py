@@ -160,7 +160,7 @@ def _takes(
     from clearway.learn.recurrent import TrainedRecurrent
 
     encoder: Encoder | None = None
-    sees: tuple[str, ...] = (RGB,) if scenes[0].features is None else (RGB, FEATURES)
+    sees: tuple[str, ...] = (RGB,) if scenes[0].features is None or scenes[0].encoder is None else (RGB, FEATURES)
     if isinstance(agent, TrainedRecurrent | Generalist):
         encoder, sees = agent.encoder, (FEATURES,)
     elif _is_made(agent):

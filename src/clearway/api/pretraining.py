@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from clearway.api.arguments import as_path, as_whole, as_word, as_workers
+from clearway.api.arguments import as_path, as_paths, as_whole, as_word, as_workers
 
 if TYPE_CHECKING:
     from clearway.choices import TrackerName
@@ -76,8 +76,8 @@ def pretrain(
     shape = EyesShape() if kept is None else kept.eyes.shape
     settings = PretrainSettings(pictures=as_whole("pictures", pictures, 1, MAX_PICTURES), shape=shape)
     count = None if threads is None else as_whole("threads", threads, 1)
-    tried = views_in([as_path("try_on", path) for path in try_on]) if try_on else None
-    shown = views_in([as_path("views", path) for path in views])
+    tried = views_in(as_paths("try_on", try_on)) if try_on else None
+    shown = views_in(as_paths("views", views))
     request = PretrainRequest(shown, settings, as_whole("seed", seed, 0, MAX_SEED), kept, as_word("device", device))
     folder = as_path("out", out)
     if processes > 1:

@@ -173,16 +173,21 @@ def train(
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
     learner.warn_of(loaded)
+    earned, word = reward_named(reward), as_word("device", device)  # before what takes long
+    level = as_choice("zone_level", zone_level, get_args(ZoneLevel))
+    thread_count = None if threads is None else as_whole("threads", threads, 1)
+    until_solved = as_truth("until_solved", until_solved)
+    copied = None if copy_to is None else as_word("copy_to", copy_to)
     seen = _takes(loaded, perturbations_asked(perturb), takes, number, learner, show_progress)
     request = RunRequest(
         scenes=loaded,
         targets=chosen,
         learner=learner,
-        reward=reward_named(reward),
+        reward=earned,
         seed=number,
-        zone_level=as_choice("zone_level", zone_level, get_args(ZoneLevel)),  # type: ignore[arg-type]
+        zone_level=level,  # type: ignore[arg-type]
         paths=by_name(pairs),
-        device=as_word("device", device),
+        device=word,
         feature_store=store,  # type: ignore[arg-type]
         takes=None if seen is None else seen.seen[FEATURES],
         takes_made=None if seen is None else {**seen.made, "seed": number},
@@ -193,7 +198,7 @@ def train(
             path,
             reward_options(reward),
             perturb=_as_words(perturb),
-            takes=takes,
+            takes=None if seen is None else seen.count,
             threads=threads,
             workers=processes if processes > 1 else None,
             until="solved" if until_solved else None,
@@ -203,7 +208,7 @@ def train(
             on_begin(path)
 
     with ExitStack() as stack:
-        stack.enter_context(torch_threads(None if threads is None else as_whole("threads", threads, 1)))
+        stack.enter_context(torch_threads(thread_count))
         path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
         together = partial(train_by_workers, workers=processes, threads=threads, ray=ray)
         train_run = train_alone if processes == 1 else together
@@ -212,10 +217,10 @@ def train(
             path,
             resume=resume,
             show_progress=show_progress,
-            until_solved=as_truth("until_solved", until_solved),
+            until_solved=until_solved,
             track=track,
             on_begin=begun,
-            copy_to=None if copy_to is None else as_word("copy_to", copy_to),
+            copy_to=copied,
         )
         return TrainResult(
             agent=load_agent(path),
@@ -279,7 +284,7 @@ def _takes(
 def _as_words(perturb: Perturbed) -> tuple[str, ...]:
     """What is perturbed, as words of the command line."""
     if isinstance(perturb, Perturbations):
-        return tuple(f"{name}={value:g}" for name, value in perturb.to_json().items() if value)
+        return tuple(f"{name}={float(value)!r}" for name, value in perturb.to_json().items() if value)
     return tuple(perturb.split() if isinstance(perturb, str) else perturb)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clearway.api.arguments import as_path, as_size, as_truth, as_whole
+from clearway.api.arguments import as_path, as_paths, as_size, as_truth, as_whole
 from clearway.errors import ArgumentError
 from clearway.scenes.scene_files import scene_files
 from clearway.scenes.sensors import RGB, check_names
@@ -85,7 +85,7 @@ def take_views(
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"out={str(folder)!r}: a file. Give a folder")
     crew = None if workers is None else as_whole("workers", workers, 1)
-    files = scene_files(_paths("scenes", scenes))
+    files = scene_files(as_paths("scenes", scenes))
     with (
         kept_connected(ray, crew),
         work_progress("taking views", len(files), show_progress, unit="rooms") as show_done,
@@ -106,14 +106,4 @@ def open_views(views: str | os.PathLike[str] | Iterable[str | os.PathLike[str]])
     """
     from clearway.views.stream import views_in
 
-    return views_in(_paths("views", views))
-
-
-def _paths(name: str, sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> list[Path]:
-    if isinstance(sources, str | os.PathLike):
-        return [as_path(name, sources)]
-    if not isinstance(sources, Iterable):
-        raise ArgumentError(f"{name}={sources!r:.80}: expected a file, a folder, or several. Give one of these")
-    if not (paths := [as_path(name, source) for source in sources]):
-        raise ArgumentError(f"{name}: none given. Give at least one file or folder")
-    return paths
+    return views_in(as_paths("views", views))

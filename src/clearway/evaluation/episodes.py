@@ -6,22 +6,21 @@ Axis letters: N episodes, B of them still walking, A actions, M targets, Z zones
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from clearway.agents.agent import Agent, Decisions, rows
+from clearway.agents.agent import Agent, rows
+from clearway.agents.answers import arrivals_of, check_decisions, check_state, tells_arrivals
 from clearway.agents.chance import CHANCE
 from clearway.agents.selection import ActionSelection, selecting
-from clearway.errors import AgentError
 from clearway.evaluation.loops import LoopSkipper, Tally
 from clearway.evaluation.sight import Sight
 from clearway.evaluation.takes import Takes
 from clearway.reward import COLLISION_AWARE
-from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
 from clearway.world.navigation import Navigation, Transition
 from clearway.world.randomness import stream_keys
@@ -154,7 +153,7 @@ class _Walk:
         self.env = Navigation(world, COLLISION_AWARE, seeds, history_length=1)
         self.env.reset(target=target)
         self.memory = agent.reset(sight(world.target_state[target]), seeds.cpu().numpy())
-        _check_state(self.memory, count)
+        check_state(self.memory, count)
         self.target, self.start = target, self.env.state.clone()
         self.walking = torch.arange(count, device=world.device)  # (B,) episode of each row of the batch
         self.tally = Tally.zero(count, world.device)
@@ -164,15 +163,16 @@ class _Walk:
         self.loops = LoopSkipper(count, self.tally)
         self.diary: list[tuple[Tensor, Tensor, Tensor]] | None = [] if record else None
         self.false_arrivals, self.told_arrival = np.zeros(count, np.int64), np.zeros(count, bool)
-        self.tells_arrivals = False
+        self.tells_arrivals: bool | None = None  # asked at the first step
 
     def to_the_end(self) -> EpisodeTable:
         """Walk until every episode has ended."""
         while len(self.walking):
             seen = self.sight.on_the_way(self.env.state, self.seeds, self.tally.steps)
             decisions, self.memory = self.agent.act(seen, self.memory)
-            _check_decisions(decisions, len(self.walking))
-            _check_state(self.memory, len(self.walking))
+            check_decisions(decisions, len(self.walking))
+            check_state(self.memory, len(self.walking))
+            self.tells_arrivals = tells_arrivals(decisions, self.tells_arrivals)
             action = torch.from_numpy(decisions.action.astype(np.int64)).to(self.world.device)
             happened = self.env.step(action)
             self.tally = self.tally.plus_step(happened)
@@ -202,14 +202,13 @@ class _Walk:
     def _note_arrivals(self, held: np.ndarray, reached: np.ndarray) -> None:
         """Count what an agent held (B,) bool before the step, nobody being at the target, and ask who is there now."""
         episode = self.walking.cpu().numpy()
-        self.tells_arrivals = True
         self.false_arrivals[episode] += held
         if reached.any():
             here = torch.from_numpy(np.flatnonzero(reached)).to(self.world.device)
             seen = self.sight.on_the_way(self.env.state[here], self.seeds[here], self.tally.steps[here])
             decisions, _ = self.agent.act(seen, rows(self.memory, reached))
-            assert decisions.arrived is not None, "it told so before"
-            self.told_arrival[episode[reached]] = decisions.arrived
+            check_decisions(decisions, len(here))
+            self.told_arrival[episode[reached]] = arrivals_of(decisions)
 
     def _drop_ended(self, happened: Transition) -> None:
         ended = happened.reached | (self.tally.steps >= self.step_limit)
@@ -241,50 +240,6 @@ class _Walk:
             false_arrivals=self.false_arrivals if self.tells_arrivals else None,
             told_arrival=self.told_arrival if self.tells_arrivals else None,
         )
-
-
-def _check_state(state: object, count: int) -> None:
-    """Raise AgentError where this is no state of so many episodes."""
-    if not isinstance(state, Mapping):
-        problem = f"the agent gave {type(state).__name__} as its state, expected arrays by name"
-        raise AgentError(f"{problem}. Give {{}} where it remembers nothing")
-    for name, values in state.items():
-        if not isinstance(values, np.ndarray):
-            problem = f"the agent's state has {name!r:.40}, {type(values).__name__}, expected an array ({count}, ...)"
-            raise AgentError(f"{problem}. Give a row for each episode")
-        if values.shape[:1] != (count,):
-            problem = f"the agent's state has {name!r:.40} of shape {values.shape}, expected ({count}, ...)"
-            raise AgentError(f"{problem}. Give a row for each episode")
-
-
-def _check_decisions(decisions: object, count: int) -> None:
-    """Raise AgentError where these are no decisions of so many episodes."""
-    if not isinstance(decisions, Decisions):
-        raise AgentError(f"the agent gave {type(decisions).__name__}, expected Decisions. Give clearway.Decisions(...)")
-    action, told = decisions.action, decisions.probabilities
-    _check_array("actions", action, "int64", (count,))
-    if told is not None:
-        _check_array("probabilities", told, "float32", (count, ACTION_COUNT))
-    if decisions.certain is not None:
-        _check_array("certain", decisions.certain, "bool", (count,))
-    if action.min() < 0 or action.max() >= ACTION_COUNT:
-        wrong = int(action[(action < 0) | (action >= ACTION_COUNT)][0])
-        raise AgentError(f"the agent gave action {wrong}, expected 0 to {ACTION_COUNT - 1}, see scenes.actions.Action")
-    if told is not None:
-        total = told.astype(np.float64).sum(1)
-        if not ((total > 0) & np.isfinite(total)).all():
-            raise AgentError("the agent gave probabilities that are not finite or all zero. Give finite ones")
-
-
-def _check_array(name: str, given: object, expected: str, shape: tuple[int, ...]) -> None:
-    """Raise AgentError where it is no array of this shape and kind; its numbers may be longer or shorter."""
-    if isinstance(given, np.ndarray):
-        if given.shape == shape and given.dtype.kind == np.dtype(expected).kind:
-            return
-        found = f"{given.dtype} {given.shape}"
-    else:
-        found = type(given).__name__
-    raise AgentError(f"the agent gave {name} {found}, expected {expected} {shape}. Give a row for each episode")
 
 
 def _array(tensor: Tensor) -> np.ndarray:

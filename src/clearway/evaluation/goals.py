@@ -18,7 +18,7 @@ from clearway.choices import GOAL_STEPS, GOALS
 from clearway.errors import AgentError, SceneError
 from clearway.evaluation import metrics
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
-from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH
+from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH, check_names
 from clearway.evaluation.takes import Takes
 from clearway.evaluation.tours import Touring, walk_tour
 from clearway.scenes.scene import Scene
@@ -116,8 +116,9 @@ def evaluate_goals(
 
     Raises:
         SceneError: a scene has fewer such poses than goals.
-        AgentError: an agent cannot walk here; it is named.
+        AgentError: an agent cannot walk here; it is named. It has the name of a yardstick.
     """
+    check_names(list(agents))
     places = among or {}
     wanted = {scene.name: drawn_goals(scene, goals, seed, places.get(scene.name)) for scene in scenes}
     world = make_world(scenes, wanted)

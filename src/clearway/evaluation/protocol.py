@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import get_args
 
@@ -49,8 +50,9 @@ def evaluate_agents(
         show_progress: tell how far it has come.
 
     Raises:
-        AgentError: an agent cannot walk here; it is named.
+        AgentError: an agent cannot walk here; it is named. Two have one name.
     """
+    check_names([*agents, *(references or {})])
     rows = [(name, selection, agent) for name, agent in agents.items() for selection in selections]
     rows += [(name, "sampled", agent) for name, agent in (references or {}).items()]
     rows += [(RANDOM, "sampled", RandomWalk()), (SHORTEST_PATH, "sampled", shortest_paths(world))]
@@ -73,3 +75,10 @@ def evaluate_agents(
             evaluations.append(summarise(world, table, name, encoder, protocol))
             show_done(len(evaluations))
     return evaluations
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Raise AgentError where a table would have two agents of one name: of those given and its yardsticks."""
+    for name, count in Counter((*names, RANDOM, SHORTEST_PATH)).items():
+        if count > 1:
+            raise AgentError(f"{name!r:.80}: the name of two agents in the table. Give the function or class another")

@@ -12,6 +12,7 @@ from clearway.agents.agent import FEATURES, POSE, Agent, Observation
 from clearway.errors import AgentError
 from clearway.evaluation.takes import Takes, never_again, take_at
 from clearway.scenes.scene import Observations, Scene
+from clearway.scenes.sensors import RGB
 from clearway.world.world import World
 
 MOST_KEPT_BYTES = 512 * 2**20  # pictures of all scenes; where they are more, files are read at every step
@@ -90,7 +91,8 @@ def _those_seen(takes: Takes, agent: Agent) -> Takes | None:
     """
     seen = [name for name in agent.sees if name != POSE]
     if missing := [name for name in seen if name not in takes.seen]:
-        problem = f"the agent sees {missing[0]}, and there are perturbed takes of {', '.join(takes.seen)} alone"
+        told = ", ".join(takes.seen) or f"{RGB} and {FEATURES}"
+        problem = f"the agent sees {missing[0]}, and there are perturbed takes of {told} alone"
         raise AgentError(f"{problem}. Leave the perturbation out")
     flat = {name: [taken.reshape(-1, *taken.shape[2:]) for taken in takes.seen[name]] for name in seen}
     return replace(takes, seen=flat) if seen else None

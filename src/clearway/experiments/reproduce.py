@@ -104,9 +104,9 @@ def reproduce(
         KeyboardInterrupt: the user interrupted; the same command goes on.
     """
     setting = _setting(request, show_progress)
+    jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
     with written_whole(request.out / REQUEST_FILE) as part:
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
-    jobs = planned(setting, request.names)
     left = [job for job in jobs if not is_done(request.out, job)]
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
     if tell is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.scene_files import SCENE_SUFFIXES
 from clearway.scenes.thor_v1 import read_scene
+from clearway.scenes.validate import SceneWarning
 from clearway.world.world import World, make_world, scene_tables
 
 TOLD_SCENES = 10  # names in a refusal, at most
@@ -164,13 +166,18 @@ def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -
 
     Raises:
         RunError: a scene is missing or is not the one the run was trained on.
+
+    Warns:
+        SceneWarning: the run was not trained in some of what is given, and they are left out.
     """
     if given:
         loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given]
-        found = [_among(loaded, wanted) for wanted in record.scenes]
+        places = [_place_among(loaded, wanted) for wanted in record.scenes]
+        found = [_called(loaded[place], wanted.name) for place, wanted in zip(places, record.scenes, strict=True)]
+        _warn_of_others([scene.name for place, scene in enumerate(loaded) if place not in places])
     else:
-        places = _places(record)
-        found = [_in_file(wanted.name, places.get(wanted.path or "", wanted.path)) for wanted in record.scenes]
+        paths = _places(record)
+        found = [_in_file(wanted.name, paths.get(wanted.path or "", wanted.path)) for wanted in record.scenes]
     for scene, wanted in zip(found, record.scenes, strict=True):
         if scene_digest(scene) != wanted.digest:
             raise RunError(
@@ -199,17 +206,31 @@ def _places(record: RunRecord) -> dict[str, str]:
     return dict(zip(addresses, map(str, fetched(addresses, SCENE_SUFFIXES, may_pass=True)), strict=True))
 
 
-def _among(given: Sequence[Scene], wanted: SceneRecord) -> Scene:
-    """The scene of a run among some: by its name, else by what it holds."""
-    by_name = {scene.name: scene for scene in given}
-    if wanted.name in by_name:
-        return by_name[wanted.name]
-    for scene in given:
+def _place_among(given: Sequence[Scene], wanted: SceneRecord) -> int:
+    """Where the scene of a run stands among some: by its name, else by what it holds."""
+    names = [scene.name for scene in given]
+    if wanted.name in names:
+        return names.index(wanted.name)
+    for place, scene in enumerate(given):
         if scene_digest(scene) == wanted.digest:
-            return replace(scene, name=wanted.name)
-    others = ", ".join(list(by_name)[:TOLD_SCENES]) + ",..." * (len(by_name) > TOLD_SCENES)
+            return place
+    others = _listed(names)
     problem = f"scene {wanted.name} of the run is not among the files given ({others}), by name or by what they hold"
     raise RunError(f"{problem}. Add it to --scenes; an agent walks where it was trained, and {GENERALIST} anywhere")
+
+
+def _called(scene: Scene, name: str) -> Scene:
+    return scene if scene.name == name else replace(scene, name=name)
+
+
+def _warn_of_others(names: Sequence[str]) -> None:
+    if names:
+        told = f"{_listed(names)}: left out, as the run was not trained there"
+        warnings.warn(f"{told}. In any scene walks {GENERALIST}", SceneWarning, stacklevel=3)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:TOLD_SCENES]) + ",..." * (len(names) > TOLD_SCENES)
 
 
 def _in_file(name: str, path: str | None) -> Scene:

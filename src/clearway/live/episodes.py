@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from clearway.agents.agent import FEATURES, Agent, Observation, State, rows
+from clearway.agents.answers import arrivals_of, check_decisions, check_state, tells_arrivals
 from clearway.agents.selection import Argmax
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import episode_seeds
@@ -124,7 +125,7 @@ def run_live_episodes(
         show_steps: called after every step with the number of episodes still walking.
 
     Raises:
-        AgentError: the agent sees something else than colour pictures.
+        AgentError: the agent sees something else than colour pictures, or answers what no agent may.
         SceneError: perturbations move what cannot be moved in the room.
     """
     _check_sight(agent)
@@ -140,8 +141,13 @@ def run_live_episodes(
     agent = Argmax(agent) if protocol.selection == "argmax" else agent
     walking = np.arange(len(walkers))
     memory = agent.reset(_wanted(live, world, target), seeds.numpy())
+    check_state(memory, len(walkers))
+    tells: bool | None = None
     for _ in range(protocol.step_limit):
         decisions, memory = agent.act(shown(agent, [walkers[episode] for episode in walking], camera), memory)
+        check_decisions(decisions, len(walking))
+        check_state(memory, len(walking))
+        tells = tells_arrivals(decisions, tells)
         for episode, action in zip(walking, decisions.action.tolist(), strict=True):
             walkers[episode].act(Action(action))
         still = np.array([not walkers[episode].reached for episode in walking])
@@ -153,7 +159,7 @@ def run_live_episodes(
         if not len(walking):
             break
     distance = world.distance_table()[target, env.state].numpy()
-    return _table(walkers, target.numpy(), distance, tells_arrivals=decisions.arrived is not None)
+    return _table(walkers, target.numpy(), distance, tells_arrivals=bool(tells))
 
 
 class Walking:
@@ -225,8 +231,8 @@ def _note_arrivals(agent: Agent, walkers: Sequence[Walking], camera: Camera, mem
     if len(there):
         arrived = [walkers[index] for index in there.tolist()]
         decisions, _ = agent.act(shown(agent, arrived, camera), rows(memory, there))
-        assert decisions.arrived is not None, "it told so before"
-        for walker, told in zip(arrived, decisions.arrived.tolist(), strict=True):
+        check_decisions(decisions, len(there))
+        for walker, told in zip(arrived, arrivals_of(decisions).tolist(), strict=True):
             walker.told_arrival = told
 
 

@@ -21,7 +21,7 @@ from clearway.rooms.detail import taken_fast
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import RGB
-from clearway.world.world import make_world
+from clearway.world.world import check_distinct, make_world
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,12 @@ def walk_to_goals(
         show: is told what goes on.
 
     Raises:
-        SceneError: a scene has no pictures, fewer poses than goals, or no room that can be built again; or nothing can
-            be moved in it.
+        SceneError: two scenes have one name; one has no pictures, fewer poses than goals, or no room that can be built
+            again; or nothing can be moved in it.
         AgentError: the agent sees something else than colour pictures.
     """
     wanted = {}
+    check_distinct([scene.name for scene in scenes])
     for scene in scenes:  # before what takes long
         check_is_room(scene)
         for setting in settings:

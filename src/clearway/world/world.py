@@ -214,7 +214,7 @@ def make_world(
         RunError: there is no room for the features.
     """
     names = tuple(scene.name for scene in scenes)
-    _check_distinct(names)
+    check_distinct(names)
     largest = [int(np.count_nonzero(scene.components == 0)) for scene in scenes]
     offset = np.concatenate([[0], np.cumsum([scene.state_count for scene in scenes])]).astype(np.int64)
     graph = np.concatenate([_shifted(scene.graph, first) for scene, first in zip(scenes, offset, strict=False)])
@@ -262,7 +262,8 @@ def _shifted(graph: np.ndarray, first: int) -> np.ndarray:
     return np.where(graph == BLOCKED, BLOCKED, graph.astype(np.int64) + first)
 
 
-def _check_distinct(names: Sequence[str]) -> None:
+def check_distinct(names: Sequence[str]) -> None:
+    """Raise SceneError where two scenes have one name."""
     for name, count in Counter(names).items():
         if count > 1:
             raise SceneError(name, "two scenes have this name", "Rename one of the files")
