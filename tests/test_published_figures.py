@@ -16,7 +16,6 @@ from clearway.experiments.convergence import mark_steps, settled_row
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from clearway.learn.run_folder import RunFolder
-from clearway.learn.run_folder import RunFolder
 from helpers.published import DOCS, assert_written, numbers
 
 RESULTS = (DOCS / "results.md").read_text(encoding="utf-8")

@@ -13,7 +13,8 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from clearway.errors import ArgumentError, RunError
+from clearway.api.pretraining import pretrain as pretrained
+from clearway.errors import ArgumentError, ClearwayError, RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_training
 from clearway.perception.encode import find_record
 from clearway.perception.eyes import find_record as find_eyes
@@ -82,6 +83,13 @@ def test_the_folder_is_an_encoder_that_says_how_it_was_trained(tmp_path: Path, v
     trained = read_card(tmp_path / "eyes").trained
     assert trained["pictures"] == 96 and trained["seed"] == 0
     assert trained["views"]["rooms"] == 3 and trained["views"]["pictures"] == 60
+
+
+def test_one_file_of_views_need_not_stand_in_a_list(tmp_path: Path):
+    for name in ("views", "try_on"):
+        given = {"views": str(tmp_path / "none"), name: str(tmp_path / "none")}
+        with pytest.raises(ClearwayError, match="none: no such"):
+            pretrained(out=tmp_path / "eyes", **given)
 
 
 def test_another_seed_gives_other_eyes(views: Views):
