@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 
 import clearway
+from clearway.agents.named import agent_maker
 from clearway.cli.imports.command import ImportScenes
 from clearway.cli.imports.plugin import ImportPlugin
 from clearway.cli.main import main
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_run_in_scene
-from clearway.errors import EncoderError, PluginError
+from clearway.errors import AgentError, EncoderError, PluginError
 from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.presets import PRESETS
 from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record, eyes
-from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, plugin_of, plugins
-from clearway.reward import REWARDS, Arrival, Reward, Time, reward_named
+from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, offered, plugin_of, plugins
+from clearway.reward import REWARDS, Arrival, Reward, RewardError, Time, reward_named
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import corridor_scene, grid_scene
 from helpers.plugin_package import MODULE, clearway_with, write_package
@@ -119,6 +120,16 @@ def test_rewards_agents_and_algorithms_are_found_by_name(here) -> None:
     assert find_plugin("rewards", "cheap") is None
     with pytest.raises(PluginError, match=r"reward cheap: no installed package offers one .* use one of these: dear"):
         plugin_of("rewards", "cheap")
+
+
+def test_unknown_names_are_answered_with_those_of_other_packages_too(here) -> None:
+    with pytest.raises(
+        AgentError, match=r"'stil': unknown\. Did you mean still\? Use one of random, shortest path, still"
+    ):
+        agent_maker("stil")
+    with pytest.raises(RewardError, match=r"'deer' is unknown\. Did you mean dear\? .*'clearance', 'dear', a Reward"):
+        reward_named("deer")
+    assert [offered(kind) for kind in KINDS] == [["mean-colour"], ["dear"], ["still"], ["pair"], ["hasty"]]
 
 
 @pytest.mark.slow

@@ -67,6 +67,11 @@ def plugins(kind: Kind) -> list[Plugin]:
     return sorted(found, key=lambda plugin: (plugin.name, plugin.package))
 
 
+def offered(kind: Kind) -> list[str]:
+    """Names that installed packages offer of a kind, without our own."""
+    return sorted({plugin.name for plugin in plugins(kind)}.difference(BUILT_IN[kind]))
+
+
 def problem(plugin: Plugin, all_of_kind: list[Plugin]) -> str:
     """Why a plugin cannot be asked for by its name, with the remedy; empty where it can."""
     if plugin.name in BUILT_IN[plugin.kind]:
@@ -85,9 +90,9 @@ def find_plugin(kind: Kind, name: str) -> Plugin | None:
     """
     if name in BUILT_IN[kind]:
         return None
-    offered = plugins(kind)
-    plugin = next((plugin for plugin in offered if plugin.name == name), None)
-    if plugin is not None and (fault := problem(plugin, offered)):
+    found = plugins(kind)
+    plugin = next((plugin for plugin in found if plugin.name == name), None)
+    if plugin is not None and (fault := problem(plugin, found)):
         raise PluginError(fault)
     return plugin
 
@@ -116,9 +121,9 @@ def plugin_of(kind: Kind, name: str) -> Plugin:
     """
     plugin = find_plugin(kind, name)
     if plugin is None:
-        offered = ", ".join(found.name for found in plugins(kind)) or "none"
+        names = ", ".join(offered(kind)) or "none"
         fault = f"{kind.removesuffix('s')} {name}: no installed package offers one of this name"
-        raise PluginError(f"{fault}. Install one that does, or use one of these: {offered}")
+        raise PluginError(f"{fault}. Install one that does, or use one of these: {names}")
     return plugin
 
 

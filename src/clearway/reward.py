@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from clearway.errors import ClearwayError, PluginError
-from clearway.plugins import find_plugin, imported, load_plugin
+from clearway.plugins import find_plugin, imported, load_plugin, offered
 from clearway.spelling import did_you_mean
 
 if TYPE_CHECKING:
@@ -364,9 +364,9 @@ def reward_named(name: str | Reward) -> Reward:
     if isinstance(name, str) and (plugin := find_plugin("rewards", name)):
         return _made(str(plugin), load_plugin(plugin))
     if not isinstance(name, str) or ":" not in name:
-        choices = ", ".join(map(repr, REWARDS))
-        told = f"reward={name!r:.80} is unknown.{did_you_mean(name, REWARDS)}"
-        raise RewardError(f"{told} Use one of {choices}, a Reward, or package.module:name")
+        names = (*REWARDS, *offered("rewards"))
+        told = f"reward={name!r:.80} is unknown.{did_you_mean(name, names)}"
+        raise RewardError(f"{told} Use one of {', '.join(map(repr, names))}, a Reward, or package.module:name")
     try:
         found = imported(name)
     except PluginError as fault:

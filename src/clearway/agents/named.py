@@ -15,7 +15,7 @@ import numpy as np
 from clearway.agents.agent import Agent, Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.errors import AgentError, PluginError
-from clearway.plugins import find_plugin, imported, load_plugin
+from clearway.plugins import find_plugin, imported, load_plugin, offered
 from clearway.spelling import did_you_mean
 from clearway.world.world import World
 
@@ -36,8 +36,9 @@ def agent_maker(name: str) -> AgentMaker:
     if plugin := find_plugin("agents", name):
         return named_maker(str(plugin), load_plugin(plugin))
     if ":" not in name:
-        told = f"agent {name!r:.80}: unknown.{did_you_mean(name, AGENTS)}"
-        raise AgentError(f"{told} Use one of {', '.join(AGENTS)}, or package.module:name")
+        names = (*AGENTS, *offered("agents"))
+        told = f"agent {name!r:.80}: unknown.{did_you_mean(name, names)}"
+        raise AgentError(f"{told} Use one of {', '.join(names)}, or package.module:name")
     try:
         return named_maker(f"agent {name}", imported(name))
     except PluginError as fault:
