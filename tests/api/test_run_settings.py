@@ -13,6 +13,8 @@ from clearway.live.conditions import Perturbations
 from clearway.reward import BUMP, REWARDS, Arrival, Reward, Term, Time
 from clearway.scenes.thor_v1 import write_scene
 from clearway.settings_file import read_settings
+from helpers.own_algorithm import SMALL as SMALL_TABLE
+from helpers.own_algorithm import offer_algorithm, with_body
 from helpers.small_runs import small_scenes
 
 SMALL = {"envs": 20, "rollout_steps": 8, "width": 16, "frames": 320}
@@ -71,3 +73,12 @@ def test_a_lengthened_run_s_settings_say_so(tmp_path):
     told = [line for line in (out / "run.yaml").read_text().splitlines() if "it was lengthened" in line]
     assert told == ["# But it was lengthened from 320 frames: a run of 640 frames at once differs"]
     assert read_settings(out / "run.yaml")["frames"] == 640
+
+
+def test_another_package_s_setting_that_is_called_as_an_option_of_ours_stands_among_its_settings(tmp_path, monkeypatch):
+    offer_algorithm(tmp_path, monkeypatch, with_body("goals: int = 3\nnote: str | None = None"))
+    write_scene(small_scenes()[0], tmp_path / "a.h5")
+    train(tmp_path / "a.h5", algorithm="odd", out=tmp_path / "run", **SMALL_TABLE)
+    settings = read_settings(tmp_path / "run" / "run.yaml")
+    assert "goals" not in settings and settings["frames"] == 400
+    assert (settings["set"]["goals"], settings["set"]["note"]) == (3, None)

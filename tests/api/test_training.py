@@ -111,7 +111,7 @@ def test_a3c_by_name() -> None:
         ({"learning_rate": 3}, "learning_rate: no such setting. Use one of frames, centre_features"),
         ({"envs": 2.5}, r"envs=2\.5: expected a whole number"),
         ({"envs": True}, "envs=True: expected a whole number"),
-        ({"discount": "0.9"}, r"discount='0\.9': expected a number"),
+        ({"discount": "0.9"}, r"discount='0\.9': expected a finite number"),
         ({"hindsight": 1}, "hindsight=1: expected True or False"),
         ({"optimiser": "sgd"}, "optimiser='sgd': expected one of 'adam', 'rmsprop'"),
         ({"frames": "many"}, "frames='many': expected a whole number"),

@@ -12,6 +12,7 @@ from clearway.cli.main import Command
 from clearway.cli.train import Train
 from clearway.learn.run_folder import RunFolder
 from clearway.settings_file import read_settings
+from helpers.own_algorithm import offer_algorithm, with_body
 
 from .test_reading import LEAVES
 
@@ -52,6 +53,7 @@ def test_every_command_tells_of_it_and_takes_all_its_options(clearway, words):
         ("targets: [26, 37]", "x.h5 --targets 4", "x.h5 --targets 4"),
         ("set: {envs: 200, hindsight: true}", "x.h5 --set envs=100", "x.h5 --set envs=200 hindsight=true envs=100"),
         ("frames:\nset: {lr_end: 1.0e-05}", "x.h5", "x.h5 --set lr_end=1e-05"),
+        ("set: {note: null, limit: 3}", "x.h5", "x.h5 --set note=null limit=3"),
     ],
 )
 def test_the_file_s_options_become_words_and_the_command_line_s_go_before(config, text, words, expected):
@@ -132,6 +134,18 @@ def test_a_run_is_repeated_by_its_settings(clearway, trained, small, tmp_path):
     record = RunFolder(third).read_record()
     assert (record.seed, record.learner.width, record.learner.optimiser) == (4, 8, "rmsprop")
     assert not same(one, third)
+
+
+@pytest.mark.parametrize("words", [(), ("--set", "note=x", "goals=4", "temperature=0.5")])
+def test_a_run_of_another_package_s_algorithm_is_repeated_by_its_settings(
+    clearway, trained, tmp_path, monkeypatch, words
+):
+    offer_algorithm(tmp_path, monkeypatch, with_body("goals: int = 3\nnote: str | None = None\ntemperature: float = 1"))
+    one, other, small = tmp_path / "one", tmp_path / "other", ("--frames", 400, "--algorithm", "odd")
+    assert clearway("train", trained.scene, "--out", one, *small, *words).code == 0
+    assert clearway("train", "--config", one / "run.yaml", "--out", other).code == 0
+    assert RunFolder(one).read_record().same_experiment(RunFolder(other).read_record())
+    assert RunFolder(one).read_record().learner.note == ("x" if words else None)
 
 
 REWARD = "from clearway.reward import Reward, Time, Arrival\nMINE = Reward('mine', (Time(-0.03), Arrival(5.0)))\n"

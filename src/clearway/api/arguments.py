@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from contextlib import suppress
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin
 
 from clearway.errors import ArgumentError
+from clearway.learn.kinds import UNIONS, called, field_types
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.spelling import did_you_mean
+
+ACCEPTED: dict[Any, Any] = {int: Integral, float: Real, str: str}
+"""What will do for a setting of a type, and becomes one."""
 
 
 def as_path(name: str, value: object) -> Path:
@@ -89,13 +93,13 @@ def as_settings(kind: type, given: Mapping[str, object]) -> dict[str, Any]:
     """Settings of a config class, as plain values of its fields' types: a whole number will do for any number.
 
     Args:
-        kind: a dataclass whose fields are numbers, truth values, words, or choices of words.
+        kind: a dataclass whose fields are numbers, truth values, words, choices of words, or None beside them.
         given: some of its fields by name.
 
     Raises:
         ArgumentError: there is no such setting, or its value is of another type.
     """
-    types = {field.name: get_type_hints(kind)[field.name] for field in fields(kind)}
+    types = field_types(kind)
     unknown = [name for name in given if name not in types]
     if unknown:
         raise ArgumentError(
@@ -105,21 +109,19 @@ def as_settings(kind: type, given: Mapping[str, object]) -> dict[str, Any]:
 
 
 def _as(name: str, value: object, wanted: Any) -> object:
-    """The value as a bool, int, float, str or choice of words."""
-    if get_origin(wanted) is Literal:
+    """The value as a bool, int, float, str, choice of words, None, or one of several of these."""
+    if get_origin(wanted) in UNIONS:
+        for one in get_args(wanted):
+            with suppress(ArgumentError):
+                return _as(name, value, one)
+    elif get_origin(wanted) is Literal:
         return as_choice(name, value, get_args(wanted))
-    accepted: dict[type, tuple[type, str]] = {
-        int: (Integral, "a whole number"),
-        float: (Real, "a number"),
-        str: (str, "a word"),
-    }
-    if wanted in accepted:
-        base, called = accepted[wanted]
-        if isinstance(value, base) and not isinstance(value, bool):
+    elif wanted in ACCEPTED:
+        if isinstance(value, ACCEPTED[wanted]) and not isinstance(value, bool):
             return wanted(value)
-    else:
-        assert wanted is bool, f"{name} is of the type {wanted}"
-        called = "True or False"
+    elif wanted is bool:
         if isinstance(value, bool) or type(value).__name__ == "bool":  # NumPy's, too
             return bool(value)
-    raise ArgumentError(f"{name}={value!r:.80}: expected {called}. Correct it")
+    elif value is None:
+        return None
+    raise ArgumentError(f"{name}={value!r:.80}: expected {called(wanted)}. Correct it")

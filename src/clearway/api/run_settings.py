@@ -12,13 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from clearway.errors import ClearwayError
+from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.run_folder import SETTINGS_FILE, RunFolder
 from clearway.learn.run_record import RunRecord
 from clearway.regular_files import read_text
 from clearway.reward import REWARDS, Reward
 from clearway.settings_file import MAX_BYTES, read_settings, write_settings
 
-OPTIONS = ("frames", "feature_basis", "goals")  # settings of algorithms that have options of their own
+OPTION = "frames"  # the setting of every algorithm that is an option of its own
+OWN_OPTIONS = ("feature_basis", "goals")  # those of our algorithms; another's of these names is another setting
 HEAD = "The settings of this run. To repeat it: clearway train --config run.yaml --out ANOTHER_FOLDER"
 
 LENGTHENED = "But it was lengthened from"
@@ -73,12 +75,13 @@ def _lengthened(path: Path, frames: int) -> list[str]:
 
 def _of_record(record: RunRecord) -> dict[str, Any]:
     """What a run's record says, as options."""
-    learner = asdict(record.learner)
-    own = {name: learner.pop(name) for name in OPTIONS if name in learner}
+    learner, name = asdict(record.learner), record.learner.algorithm
+    options = (OPTION, *OWN_OPTIONS) if name in ALGORITHMS else (OPTION,)
+    own = {option: learner.pop(option) for option in options if option in learner}
     return {
         "files": [scene.path for scene in record.scenes],
         "targets": {scene.name: list(scene.targets) for scene in record.scenes},
-        "algorithm": record.learner.algorithm,
+        "algorithm": name,
         **own,
         "set": learner,
         "seed": record.seed,

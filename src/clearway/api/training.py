@@ -25,6 +25,7 @@ from clearway.evaluation.takes import Takes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
+from clearway.learn.plugged import faults_of
 from clearway.learn.presets import PRESETS
 from clearway.learn.run_record import RunRecord
 from clearway.learn.seeds import SEED_LIMIT
@@ -34,7 +35,7 @@ from clearway.learn.train import train as train_alone
 from clearway.learn.workers import train_by_workers
 from clearway.live.conditions import Perturbations
 from clearway.markdown import table_lines
-from clearway.plugins import find_plugin
+from clearway.plugins import find_plugin, offered
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
@@ -255,11 +256,13 @@ def chosen_learner(
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
         learner = algorithm(wanted)()
     else:
-        names = (*ALGORITHMS, *PRESETS)
+        names = (*ALGORITHMS, *PRESETS, *offered("algorithms"))
         told = f"algorithm={wanted!r:.80}: no such algorithm.{did_you_mean(wanted, names)}"
         raise ArgumentError(f"{told} Use one of {', '.join(names)}")
     given = settings if frames is None else {**settings, "frames": frames}
-    return replace(learner, **as_settings(type(learner), given))
+    changes = as_settings(type(learner), given)
+    with faults_of(learner, "settings"):
+        return replace(learner, **changes)
 
 
 def _takes(

@@ -201,6 +201,8 @@ def _named_values(inner: Any, value: Mapping[Any, object]) -> Iterator[str]:
 
 
 def _bare(value: object) -> str:
+    if value is None:
+        return "null"
     return str(value).lower() if isinstance(value, bool) else _word(str, value)
 
 

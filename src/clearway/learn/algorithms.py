@@ -1,6 +1,6 @@
 """The algorithms by name. Another one is a file with a config class, see `learner`, and a line here.
 
-That of another package needs no line: it is a class derived from `Learner` under an entry point, see `plugins`.
+That of another package needs no line: it is a class derived from `Learner` under an entry point, see `plugged`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from clearway.learn.a3c.config import A3C
 from clearway.learn.adapt import Adapt
 from clearway.learn.bc import BC
 from clearway.learn.learner import Learner, setting_names
+from clearway.learn.plugged import plugged_algorithm
 from clearway.learn.ppo import PPO
 from clearway.learn.q_learning import QLearning
 from clearway.learn.recurrent import Recurrent
-from clearway.plugins import find_plugin, load_plugin
+from clearway.plugins import find_plugin, offered
 
 OURS = (PPO, A2C, A3C, BC, QLearning, Recurrent, Adapt)
 ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in OURS}
@@ -28,17 +29,15 @@ def algorithm(name: str) -> type[Learner]:
 
     Raises:
         RunError: there is none.
-        PluginError: two packages offer one of this name, or it cannot be imported.
+        PluginError: two packages offer one of this name, or it cannot be used.
     """
     if name in ALGORITHMS:
         return ALGORITHMS[name]
     plugin = find_plugin("algorithms", name)
     if plugin is None:
-        raise RunError(f"algorithm {name!r:.40}: expected one of {', '.join(ALGORITHMS)}. Name one of these")
-    kind = load_plugin(plugin)
-    if not isinstance(kind, type) or not issubclass(kind, Learner) or kind.algorithm != name:
-        raise RunError(f"{plugin}: expected a class derived from Learner with algorithm {name!r}. Ask its authors")
-    return kind
+        told = f"algorithm {name!r:.40}: expected one of {', '.join((*ALGORITHMS, *offered('algorithms')))}"
+        raise RunError(f"{told}. Name one of these, or install the package that offers it")
+    return plugged_algorithm(plugin)
 
 
 def carried_over(learner: Learner, kind: type[Kind]) -> Kind:

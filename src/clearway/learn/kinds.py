@@ -39,7 +39,9 @@ def field_types(kind: type) -> dict[str, Any]:
 def _is_kept(wanted: Any) -> bool:
     if get_origin(wanted) in UNIONS:
         return all(map(_is_kept, get_args(wanted)))
-    return get_origin(wanted) is Literal or wanted in (*CALLED, type(None))
+    if get_origin(wanted) is Literal:
+        return all(isinstance(choice, str) for choice in get_args(wanted))
+    return wanted in (*CALLED, type(None))
 
 
 def fits(value: object, wanted: Any) -> bool:

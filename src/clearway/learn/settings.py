@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, TypeVar, get_args, get_origin
 
 from clearway.errors import RunError
+from clearway.learn.kinds import UNIONS, field_types
 from clearway.learn.learner import Learner
+from clearway.learn.plugged import faults_of
 from clearway.spelling import did_you_mean, whole_number
 
 Kind = TypeVar("Kind", bound=Learner)
@@ -20,31 +23,46 @@ def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
         RunError: a word is not name=value or names no setting, its value has the wrong type, or the settings cannot
             work together.
     """
-    known, types = asdict(learner), get_type_hints(type(learner))
+    types = field_types(type(learner))
     changes: dict[str, Any] = {}
     for word in words:
         name, equals, text = word.partition("=")
-        if not equals or name not in known:
-            names = f"a name among {learner.algorithm}'s settings: {', '.join(known)}"
-            raise RunError(f"--set {word}: expected name=value with {names}.{did_you_mean(name, known)} Correct it")
-        choices = get_args(types[name]) if get_origin(types[name]) is Literal else ()
-        changes[name] = _parsed(word, text, known[name], choices)
-    return replace(learner, **changes)
+        if not equals or name not in types:
+            names = f"a name among {learner.algorithm}'s settings: {', '.join(types)}"
+            raise RunError(f"--set {word}: expected name=value with {names}.{did_you_mean(name, types)} Correct it")
+        try:
+            changes[name] = _parsed(text, types[name])
+        except ValueError as fault:
+            raise RunError(f"--set {word}: expected {_expected(types[name])}. Correct it") from fault
+    with faults_of(learner, "settings"):
+        return replace(learner, **changes)
 
 
-def _parsed(word: str, text: str, example: object, choices: tuple[str, ...]) -> object:
-    """The value that `text` means for a setting with a value like `example`; `choices` are all there are, if any."""
-    if isinstance(example, bool):
-        choices = ("true", "false")
-    if choices and text not in choices:
-        raise RunError(f"--set {word}: expected {' or '.join(choices)}. Correct it")
-    if isinstance(example, bool):
-        return text == "true"
-    if isinstance(example, str):
+def _parsed(text: str, wanted: Any) -> object:
+    """The value that a text means for a setting of that type. Raises ValueError where it means none."""
+    if get_origin(wanted) in UNIONS:
+        for one in sorted(get_args(wanted), key=lambda one: one is str):  # last, as any text is one
+            with suppress(ValueError):
+                return _parsed(text, one)
+        raise ValueError(text)
+    if wanted is str:
         return text
-    assert isinstance(example, int | float)
-    try:
-        return whole_number(text) if isinstance(example, int) else float(text)
-    except ValueError as error:
-        kind = "a whole number" if isinstance(example, int) else "a number"
-        raise RunError(f"--set {word}: expected {kind}. Correct it") from error
+    if wanted in (int, float):
+        return whole_number(text) if wanted is int else float(text)
+    words = _words(wanted)
+    if text not in words:
+        raise ValueError(text)
+    return words[text]
+
+
+def _words(wanted: Any) -> dict[str, object]:
+    """The words of a type that has no others, with what they mean."""
+    known: dict[Any, dict[str, object]] = {bool: {"true": True, "false": False}, type(None): {"null": None}}
+    return known.get(wanted) or {choice: choice for choice in get_args(wanted)}
+
+
+def _expected(wanted: Any) -> str:
+    """A type in words, for errors."""
+    if get_origin(wanted) in UNIONS:
+        return " or ".join(map(_expected, get_args(wanted)))
+    return {int: "a whole number", float: "a number", str: "a text"}.get(wanted) or " or ".join(_words(wanted))
