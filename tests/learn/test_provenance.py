@@ -5,7 +5,14 @@ from pathlib import Path
 
 import pytest
 
+import clearway
+from clearway.errors import RunError
 from clearway.learn import provenance
+from clearway.learn.run_folder import RunFolder
+from clearway.reward import BUMP, Arrival, Reward, Term
+from helpers.made import corridor_scene
+from helpers.own_algorithm import CLASS, SMALL, forget_algorithm, offer_algorithm
+from helpers.plugin_package import write_package
 
 IDENTITY = ("-c", "user.name=a", "-c", "user.email=a@b.c")
 
@@ -48,3 +55,28 @@ def test_a_package_installed_in_another_s_repository_has_no_commit(
 ) -> None:
     monkeypatch.setattr(provenance, "__file__", str(checkout / where / "clearway" / "learn" / "x.py"))
     assert "commit" not in provenance.package_versions()
+
+
+class Own(Term):
+    """A term that stands in this module."""
+
+
+def test_packages_of_an_algorithm_and_of_a_reward_s_own_terms_are_named(tmp_path, monkeypatch) -> None:
+    top = __name__.partition(".")[0]
+    offers = f"[clearway.rewards]\nmine = {top}.rewards:MINE\n[clearway.algorithms]\nodd = others:Odd\n"
+    monkeypatch.syspath_prepend(str(write_package(tmp_path, package="others", entry_points=offers)))
+    own = Reward("mine", (Own(), Arrival()))
+    assert provenance.plugin_versions("odd", own) == {"algorithm": "others 1.2", "reward": "others 1.2"}
+    assert provenance.plugin_versions("ppo", BUMP) == {}
+
+
+def test_a_run_says_whose_algorithm_it_needs(tmp_path, monkeypatch) -> None:
+    site = offer_algorithm(tmp_path, monkeypatch, CLASS)
+    scene = corridor_scene(5, feature_count=12)
+    clearway.train(scene, algorithm="odd", out=tmp_path / "run", **SMALL)
+    folder = RunFolder(tmp_path / "run")
+    assert folder.read_record().versions["algorithm"] == "odd-learner 1.2"
+    forget_algorithm(site, monkeypatch)
+    told = r"run\.json: algorithm 'odd': the package odd-learner 1\.2 that offers it is not installed\. Install it$"
+    with pytest.raises(RunError, match=told):
+        clearway.load_agent(tmp_path / "run")

@@ -10,6 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from clearway.plugins import Plugin, find_plugin, plugins
+from clearway.reward import Reward
 from clearway.version import __version__
 
 PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
@@ -24,6 +26,25 @@ def package_versions() -> dict[str, str]:
     if sources.name == "src" and (commit := _commit(sources.parent)) is not None:
         found["commit"] = commit
     return found | {name: _installed_version(name) for name in PACKAGES}
+
+
+def plugin_versions(algorithm: str, reward: Reward) -> dict[str, str]:
+    """Package and version of an algorithm, and of a reward with terms of its own, where packages offer them."""
+    found = {"algorithm": find_plugin("algorithms", algorithm), "reward": _reward_plugin(reward)}
+    return {kind: f"{plugin.package} {plugin.version}" for kind, plugin in found.items() if plugin is not None}
+
+
+def _reward_plugin(reward: Reward) -> Plugin | None:
+    """What offers a reward, by where the code of its terms stands; one of our terms alone is all in the record."""
+    packages = {_top(type(term).__module__) for term in reward.terms} - {"clearway"}
+    return (
+        next((plugin for plugin in plugins("rewards") if _top(plugin.target) in packages), None) if packages else None
+    )
+
+
+def _top(module: str) -> str:
+    """The outermost package of a module."""
+    return module.partition(":")[0].partition(".")[0]
 
 
 @cache

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from clearway.choices import GENERALIST
-from clearway.errors import ClearwayError, RunError, reason_of
+from clearway.errors import ClearwayError, PluginError, RunError, reason_of
 from clearway.files import parse_json, read_json, written_whole
 from clearway.learn.checkpoint import newest_checkpoint, read_progress
 from clearway.learn.kinds import fits
@@ -191,6 +191,8 @@ class RunFolder:
             raise RunError(f"{path}: written by a newer clearway (format {found}). Upgrade clearway")
         try:
             return record_from(content, found)
+        except PluginError as error:
+            raise RunError(f"{path}: {error}") from error
         except (KeyError, TypeError, AttributeError, OverflowError, ClearwayError) as error:
             reason, remedy = str(error).rstrip(".")[:300], "Restore it or train again"
             by = maker(content)

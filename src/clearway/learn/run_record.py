@@ -9,13 +9,15 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from clearway.choices import ZoneLevel
-from clearway.errors import RunError
-from clearway.learn.algorithms import algorithm
+from clearway.errors import PluginError, RunError
+from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.kinds import field_types, fits
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import clipped_once, own_settings, with_later
-from clearway.learn.provenance import hardware, package_versions
+from clearway.learn.plugged import faults_of
+from clearway.learn.provenance import hardware, package_versions, plugin_versions
 from clearway.learn.reward_record import reward_from_json
+from clearway.plugins import find_plugin
 from clearway.remote.address import addresses_without_secrets
 from clearway.remote.records import origin
 from clearway.reward import Reward
@@ -28,7 +30,8 @@ from clearway.version import __version__
 if TYPE_CHECKING:
     from clearway.learn.train import RunRequest
 
-SHAPES_BITS = ("torch", "threads", "bfloat16", "device", "gpu", "feature_store")  # of a run's versions and hardware
+SHAPES_BITS = ("torch", "algorithm", "reward", "threads", "bfloat16", "device", "gpu", "feature_store")
+"""Of a run's versions and hardware."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ def record_of(request: RunRequest) -> RunRecord:
             )
             for scene, digest in zip(request.scenes, digests, strict=True)
         ),
-        versions=package_versions(),
+        versions=package_versions() | plugin_versions(request.learner.algorithm, request.reward),
         hardware=hardware(request.device) | {"feature_store": request.feature_store},
         command=tuple(map(addresses_without_secrets, sys.argv)),
         takes=request.takes_made,
@@ -139,12 +142,14 @@ def record_from(content: Mapping[str, Any], version: int) -> RunRecord:
     Raises:
         KeyError, TypeError, AttributeError, OverflowError, ClearwayError: a setting is missing, unknown or of a wrong
             kind.
+        PluginError: the algorithm is another package's, and cannot be used.
     """
     wanted = {"seed": int, "zone_level": ZoneLevel, "versions": dict, "hardware": dict, "command": list}
     given = {name: content[name] for name in wanted} | {"begun": content.get("begun")}
     for name, kind in (wanted | {"begun": str | None}).items():
         if not fits(given[name], kind):
             raise TypeError(f"{name} is {given[name]!r:.40}")
+    _check_installed(content["learner"]["algorithm"], content["versions"])
     learner, reward = clipped_once(_learner(content["learner"], version), reward_from_json(content["reward"]))
     return RunRecord(
         learner=learner,
@@ -158,6 +163,14 @@ def record_from(content: Mapping[str, Any], version: int) -> RunRecord:
         takes=content.get("takes"),
         begun=given["begun"],
     )
+
+
+def _check_installed(name: str, versions: Mapping[str, Any]) -> None:
+    """Raise PluginError where another package's algorithm is not there any more."""
+    package = versions.get("algorithm")
+    if package is not None and name not in ALGORITHMS and find_plugin("algorithms", name) is None:
+        problem = f"algorithm {name!r:.40}: the package {package!s:.60} that offers it is not installed"
+        raise PluginError(f"{problem}. Install it")
 
 
 def _learner(content: Mapping[str, Any], version: int) -> Learner:
@@ -181,7 +194,8 @@ def _settings(kind: type[Learner], content: Mapping[str, Any]) -> Learner:
     for name in expected:
         if not fits(content[name], types[name]):
             raise TypeError(f"{name} is {content[name]!r:.40}")
-    return kind(**content)
+    with faults_of(kind, "settings"):
+        return kind(**content)
 
 
 def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
