@@ -16,6 +16,7 @@ from clearway.choices import GENERALIST
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
 from clearway.learn.described import described
+from clearway.learn.foreign_agent import made_agent
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder
@@ -117,6 +118,7 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> TrainedAgent:
 
     Raises:
         RunError: there is no such run, the checkpoint is damaged or lies in another folder.
+        PluginError: the algorithm is another package's, and gives no agent.
     """
     run = RunFolder(folder)
     record = run.read_record()
@@ -128,7 +130,7 @@ def load_agent(folder: Path, checkpoint: Path | None = None) -> TrainedAgent:
     if broken:
         raise RunError(f"{path}: its {broken[0]} holds NaN or Inf. Use another checkpoint")
     try:
-        return record.learner.agent(record, tensors, frames)
+        return made_agent(record, tensors, frames)
     except (LookupError, RuntimeError, ValueError) as error:
         reason = " ".join(str(error).split())[:300]
         raise RunError(f"{path}: does not fit its run ({reason}). Use another checkpoint") from error

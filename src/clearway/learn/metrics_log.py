@@ -13,14 +13,27 @@ from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS, Epis
 from clearway.learn.tracking import Tracker
 
 Row = dict[str, float]
+OWN_FIGURES = (
+    *("frames", "updates", "seconds", "episodes", "success", "steps", "collisions", "solved_targets"),
+    *("slowest_worker", "slowest_factor"),
+)
+"""Names of figures that rows have of every algorithm, and that none of an algorithm's own can have."""
 
 
 class Counting(Protocol):
     """What a row needs of a trainer."""
 
-    frames: int
-    updates: int
-    statistics: EpisodeStatistics
+    @property
+    def frames(self) -> int:
+        """Used so far."""
+
+    @property
+    def updates(self) -> int:
+        """Made so far."""
+
+    @property
+    def statistics(self) -> EpisodeStatistics:
+        """Of its episodes."""
 
 
 def metrics_row(trainer: Counting, figures: Mapping[str, float], seconds: float) -> Row:

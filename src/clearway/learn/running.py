@@ -33,10 +33,21 @@ ROWS_A_RUN = 200  # rows of metrics.jsonl, about
 class Learning(Protocol):
     """What a run needs of a trainer, whatever the algorithm."""
 
-    world: World
-    statistics: EpisodeStatistics
-    frames: int
-    updates: int
+    @property
+    def world(self) -> World:
+        """It learns in."""
+
+    @property
+    def statistics(self) -> EpisodeStatistics:
+        """Of its episodes."""
+
+    @property
+    def frames(self) -> int:
+        """Used so far."""
+
+    @property
+    def updates(self) -> int:
+        """Made so far."""
 
     @property
     def learner(self) -> Learner:
@@ -184,7 +195,7 @@ def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
     tensors = trainer.tensors()
     training = {key: value for key, value in tensors.items() if not _acts(trainer, key)}
     progress = Progress(trainer.frames, trainer.updates, seconds)
-    write_checkpoint(folder.checkpoints, _agent(trainer, tensors), training, progress)
+    write_checkpoint(folder.checkpoints, acting_tensors(trainer, tensors), training, progress)
 
 
 def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
@@ -193,10 +204,10 @@ def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
     if folder.exists():
         shutil.rmtree(folder)
     progress = Progress(trainer.frames, trainer.updates, seconds)
-    write_checkpoint(folder, _agent(trainer, tensors), {}, progress)
+    write_checkpoint(folder, acting_tensors(trainer, tensors), {}, progress)
 
 
-def _agent(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def acting_tensors(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """What is needed to act: of a network the parameters, and the map that prepares features.
 
     Raises:

@@ -15,6 +15,7 @@ import torch
 from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress, read_training
+from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.peers import ALONE, Peers
@@ -97,13 +98,14 @@ class RunRequest:
 
         Raises:
             RunError: the learner, its settings or the scenes are not for so many workers.
+            PluginError: the algorithm is another package's, and gives no trainer.
         """
         device, reward = usable_device(self.device), self.paid  # before the scenes, which may take long
         if peers.count == 1:
-            return self.learner.trainer(self._world(slice(None)).to(device), reward, self.seed)
+            return made_trainer(self.learner, self._world(slice(None)).to(device), reward, self.seed)
         sizes = [scene.state_count for scene in self.scenes], [len(self.targets[scene.name]) for scene in self.scenes]
         share = Share.of(*sizes, peers)
-        return self.learner.part_trainer(self._world(share.own).to(device), reward, self.seed, share)
+        return made_trainer(self.learner, self._world(share.own).to(device), reward, self.seed, share)
 
     def _world(self, part: slice) -> World:
         """The tables of a part of the scenes."""
@@ -143,13 +145,16 @@ def train(
 
     Raises:
         RunError: `out` holds a run already (and resume is off) or another experiment, is in use, or training failed.
+        PluginError: the algorithm is another package's, and fails.
         KeyboardInterrupt: the user interrupted; the run can be resumed.
     """
     check_tracker(track)
     folder = RunFolder(out)
     with features_read_once(request) as read:
-        trainer = read.trainer()  # what cannot be trained leaves no folder
-        copy, record = opened_copy(copy_to, folder, resume), record_of(read)
+        trainer, record = read.trainer(), record_of(read)  # what cannot be trained leaves no folder
+        if isinstance(trainer, ForeignTrainer):
+            trainer.try_agent(record, trainer.tensors())  # nor what could not act after all its frames
+        copy = opened_copy(copy_to, folder, resume)
     with folder.held(), folder.begun(record, resume) as other_bits:
         if on_begin is not None:
             on_begin(out)
@@ -220,6 +225,10 @@ def train_part(
         problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
         raise RunError(f"{problem}. Give a folder that all machines share as --out")
     peers.ready()
+    if isinstance(trainer, ForeignTrainer):
+        tensors = trainer.tensors()  # of all workers
+        if peers.leads:
+            trainer.try_agent(folder.read_record(), tensors)
     with (
         progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
         interruption(of_several=True) as interrupted,

@@ -1,0 +1,149 @@
+"""Trainers and agents of other packages: every fault in one line, and no folder of a run that could not act."""
+
+from pathlib import Path
+
+import pytest
+
+import clearway
+from clearway.errors import AgentError, PluginError, RunError
+from clearway.learn.foreign import ForeignTrainer, made_trainer
+from clearway.learn.foreign_agent import ForeignTrained
+from clearway.learn.metrics_log import OWN_FIGURES, metrics_row
+from clearway.learn.q_learning import TableTrainer
+from clearway.reward import COLLISION_AWARE
+from helpers.made import corridor_scene
+from helpers.own_algorithm import CLASS, SMALL, SOURCE, offer_algorithm, with_body, with_trainer
+from helpers.small_runs import CORRIDOR_TARGETS, corridor_world
+
+SCENE = corridor_scene(5, feature_count=12)
+FIGURES = "def update(self): return super().update() and {}"
+TENSORS = "def tensors(self): return {}"
+AGENT = "def agent(self, record, tensors, frames): {}"
+OWN_AGENT = """
+class Learnt:
+    extra = 7
+
+    def __init__(self, record, frames):
+        self.record, self.frames = record, frames
+
+    def on_poses(self, world):
+        return {}
+"""
+
+
+def trained(out: Path | None = None, **settings):
+    return clearway.train(SCENE, list(CORRIDOR_TARGETS), algorithm="odd", out=out, **{**SMALL, **settings})
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        (with_body("def trainer(self, world): return None"), r"trainer failed \(TypeError: .* were given\)"),
+        (with_body("def trainer(self, world, reward, seed): return world.no"), r"trainer failed \(AttributeError"),
+        (with_body("def trainer(self, world, reward, seed): return None"), "trainer gives None, which lacks world, "),
+        (
+            with_trainer("statistics = property(lambda s: 3, lambda s, v: None)"),
+            "its trainer's statistics are 3, expected",
+        ),
+        (with_trainer("def update(self): 1 / 0"), r"update failed \(ZeroDivisionError: division by zero\)"),
+        (with_trainer("def update(self): return {}"), "update used no frames, and leaves them at 0"),
+        (with_trainer(FIGURES.format("None")), "update gives None, expected figures by name"),
+        (with_trainer(FIGURES.format("{'loss': float('nan')}")), "its figure loss is nan, expected a finite number"),
+        (with_trainer(FIGURES.format("{'loss': 'big'}")), "its figure loss is 'big', expected a finite number"),
+        (with_trainer(FIGURES.format("{'loss': torch.ones(2)}")), r"its figure loss failed \(RuntimeError"),
+        (with_trainer(FIGURES.format("{'frames': 5.0}")), "its figure 'frames' has a name that is no text, or one of"),
+        (with_trainer(FIGURES.format("{5: 5.0}")), "its figure 5 has a name that is no text"),
+        (with_trainer(TENSORS.format("None")), "tensors gives None, expected tensors by name"),
+        (with_trainer(TENSORS.format("{'table.values': [1]}")), r"tensors gives \[1\] by the name 'table.values'"),
+        (with_trainer(TENSORS.format("{'net.values': self.values}")), "agent failed .*no tensors, by acts_on 'table'"),
+        (with_trainer("def fixed_tensors(self): return 1 / 0"), r"fixed_tensors failed \(ZeroDivisionError"),
+        (with_trainer("finished = property(lambda self: 1 / 0)"), r"trainer failed \(ZeroDivisionError"),
+        (with_body("agent = clearway.Learner.agent"), r"agent failed \(KeyError: 'mean'\), given table.values"),
+        (with_body(AGENT.format("return None")), "agent gives None, which lacks record, frames, on_poses"),
+        (with_body(AGENT.format("return len(5)")), r"agent failed \(TypeError"),
+    ],
+)
+def test_a_fault_is_one_line_that_says_whose_it_is_and_leaves_no_folder(tmp_path, monkeypatch, source, told) -> None:
+    offer_algorithm(tmp_path, monkeypatch, source)
+    with pytest.raises(PluginError, match=f"^{SOURCE}: {told}") as caught:
+        trained(tmp_path / "run")
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_agent_that_cannot_be_made_is_told_of_before_the_first_frame(tmp_path, monkeypatch) -> None:
+    def never(self):
+        raise AssertionError("trained")
+
+    monkeypatch.setattr(TableTrainer, "update", never)
+    offer_algorithm(tmp_path, monkeypatch, with_body(AGENT.format("return tensors['policy']")))
+    with pytest.raises(PluginError, match=r"agent failed \(KeyError: 'policy'\)"):
+        trained()
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("raise AttributeError('none')", rf"{SOURCE}: load_tensors failed \(AttributeError: none\)"),
+        ("pass", f"{SOURCE}: load_tensors leaves 0 frames and 0 updates, expected 400 and 5"),
+        ("raise KeyError('table.other')", r"does not fit its run \('table\.other'\)"),
+    ],
+)
+def test_a_fault_in_going_on_is_one_line_too(tmp_path, monkeypatch, body, told) -> None:
+    offer_algorithm(tmp_path, monkeypatch, with_trainer(f"def load_tensors(self, tensors, frames, updates): {body}"))
+    trained(tmp_path / "run")
+    with pytest.raises((PluginError, RunError), match=told), pytest.warns(UserWarning):
+        trained(tmp_path / "run", resume=True, frames=800)
+
+
+def test_figures_that_are_pytorch_s_and_tensors_of_one_memory_are_kept(tmp_path, monkeypatch) -> None:
+    figures = FIGURES.format("{'loss': torch.tensor(1.5)}")
+    tensors = "def tensors(self): return super().tensors() | {'table.same': self.values, 'x.y': torch.zeros(3, 4).t()}"
+    offer_algorithm(tmp_path, monkeypatch, with_trainer(f"{figures}\n{tensors}"))
+    run = trained(tmp_path / "run")
+    assert run.figures["loss"] == 1.5
+    assert trained(tmp_path / "run", resume=True).metrics == run.metrics
+
+
+def test_interruptions_pass_and_faults_of_ours_keep_their_traceback(tmp_path, monkeypatch) -> None:
+    offer_algorithm(tmp_path, monkeypatch, with_trainer("def update(self): raise KeyboardInterrupt"))
+    with pytest.raises(KeyboardInterrupt):
+        trained()
+    monkeypatch.setattr(TableTrainer, "update", lambda self: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        clearway.train(SCENE, algorithm="q-learning", **SMALL)
+
+
+@pytest.mark.parametrize(
+    ("gives", "told"),
+    [
+        ("1 / 0", rf"{SOURCE}: on_poses failed \(ZeroDivisionError: division by zero\)\. Ask its authors"),
+        ("None", f"{SOURCE}: gives None, expected an object with sees, reset and act"),
+        (
+            "clearway.agents.by_pose.PoseAgent(world, lambda history, target: 1 / 0)",
+            rf"{SOURCE}: failed \(ZeroDivision",
+        ),
+    ],
+)
+def test_an_agent_s_faults_in_walking_are_told_as_its_package_s(tmp_path, monkeypatch, gives, told) -> None:
+    body = with_body(AGENT.format("return Learnt(record, frames)"))
+    offer_algorithm(tmp_path, monkeypatch, "import clearway.agents.by_pose\n" + OWN_AGENT.format(gives) + body)
+    run = trained()
+    assert isinstance(run.agent, ForeignTrained) and run.agent.extra == 7 and run.agent.frames == 400
+    with pytest.raises((PluginError, AgentError), match=told):
+        clearway.evaluate(run, episodes=1, step_limit=5)
+    with pytest.raises((PluginError, AgentError), match=told):
+        clearway.evaluate_goals(run.agent, SCENE, goals=1, step_limit=5)
+
+
+def test_what_is_ours_stands_behind_no_guard(tmp_path, monkeypatch) -> None:
+    offer_algorithm(tmp_path, monkeypatch, CLASS)
+    assert type(trained().agent).__name__ == "TrainedTable"
+    world, learner = corridor_world(), clearway.QLearning(**SMALL)
+    assert isinstance(made_trainer(learner, world, COLLISION_AWARE, 0), TableTrainer)
+    assert isinstance(made_trainer(trained().record.learner, world, COLLISION_AWARE, 0), ForeignTrainer)
+
+
+def test_rows_have_no_other_names_than_those_that_are_refused() -> None:
+    trainer = clearway.QLearning(**SMALL).trainer(corridor_world(), COLLISION_AWARE, 0)
+    assert set(metrics_row(trainer, {}, 0.0)) == set(OWN_FIGURES) - {"slowest_worker", "slowest_factor"}
