@@ -1,26 +1,41 @@
 """Every block of docs/python.md, from top to bottom in one namespace."""
 
+import sys
 import warnings
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+import torch
 
 from clearway.perception import encode
 from clearway.perception.random_resnet import ResNetShape
+from clearway.reward import COLLISION_AWARE
 from clearway.rooms import library
+from clearway.world.world import make_world
 from helpers.documents import ROOT, Block, code_blocks, shortened
 from helpers.made import grid_scene
+from helpers.plugin_package import write_package
 
 PAGE = ROOT / "docs/python.md"
-FEWER = {"frames=600_000": "frames=4_000", "frames=200_000": "frames=4_000", "episodes=100": "episodes=2"}
+FEWER = {
+    "frames=600_000": "frames=4_000",
+    "frames: int = 200_000": "frames: int = 4_000",
+    "frames=200_000": "frames=4_000",
+    "episodes=100": "episodes=2",
+}
 SMALLER = {**FEWER, "episodes=100": "episodes=1", "episodes=20": "episodes=1, step_limit=100"}
+OFFERS = "[clearway.algorithms]\nreinforce = page:Reinforce\n"
 TWICE = {"step_limit=100, step_limit=500": "step_limit=100"}
 
 
-def run_page(changes: dict[str, str]) -> dict[str, object]:
-    """Run the blocks; what they leave in their namespace."""
-    found: dict[str, object] = {"__name__": "page"}
+def run_page(changes: dict[str, str], site: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+    """Run the blocks, as a module that a package offers an algorithm of; what they leave in their namespace."""
+    module = ModuleType("page")
+    monkeypatch.setitem(sys.modules, "page", module)
+    monkeypatch.syspath_prepend(str(write_package(site, package="my-package", entry_points=OFFERS)))
+    found = vars(module)
     for block in python_blocks():
         here = {old: new for old, new in changes.items() if old in block.text}
         text = shortened(block.text, here)
@@ -51,7 +66,7 @@ def test_the_blocks_run_on_a_small_room(tmp_path: Path, monkeypatch, capsys) -> 
     monkeypatch.setattr(encode, "find_record", partial(encode.find_record, shape=small))
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    left = run_page(SMALLER)
+    left = run_page(SMALLER, tmp_path / "site", monkeypatch)
     said = capsys.readouterr().out
     assert "learning_rate: no such setting" in said
     assert "quarters" in said and "beta -0.05" in said and "few-turns" in said
@@ -63,6 +78,24 @@ def test_the_blocks_run_on_a_small_room(tmp_path: Path, monkeypatch, capsys) -> 
     graph_steps = left["scene"].distances_to([left["target"]])[0]
     assert max(left["lengths"]) <= graph_steps.max()  # the page's Q-learning has found the shortest paths
     assert [left["run"].record.reward.name, left["short"].record.learner.algorithm] == ["collision-aware", "a2c"]
+    check_reinforce(left["Reinforce"])
+
+
+def check_reinforce(kind) -> None:
+    """It learns the shortest paths of a small room, and goes on where it was stopped as if it had not been."""
+    scene = grid_scene(3, width=4, depth=3)
+    world, learner = make_world([scene], {scene.name: [5]}), kind(frames=60_000)
+    trainer = learner.trainer(world, COLLISION_AWARE, 1)
+    trainer.update()
+    kept = {name: tensor.clone() for name, tensor in trainer.tensors().items()}
+    trainer.update()
+    other = learner.trainer(world, COLLISION_AWARE, 1)
+    other.load_tensors(kept, 2_000, 1)
+    other.update()
+    assert torch.equal(other.scores, trainer.scores) and other.frames == trainer.frames == 4_000
+    while not trainer.finished:
+        trainer.update()
+    assert trainer.statistics.all_solved
 
 
 @pytest.mark.slow
@@ -70,5 +103,5 @@ def test_the_blocks_run_on_the_room_itself(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("default")
-        left = run_page(FEWER)
+        left = run_page(FEWER, tmp_path / "site", monkeypatch)
     assert left["room"].cell_count == 45
