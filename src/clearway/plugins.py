@@ -10,6 +10,7 @@ Looking names up imports none of them. What each kind has to be: `docs/python.md
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -128,7 +129,7 @@ def plugin_of(kind: Kind, name: str) -> Plugin:
 
 
 def imported(path: str) -> object:
-    """What a user names as `package.module:name`.
+    """What a user names as `package.module:name`; a module may lie in the current folder, as for python -m.
 
     Raises:
         PluginError: it is no such path, or cannot be imported, whatever the module raises.
@@ -138,6 +139,8 @@ def imported(path: str) -> object:
     module, colon, name = path.partition(":")
     if not colon or not module or not name:
         raise PluginError(f"{path!r:.80}: expected package.module:name. Name one so")
+    if "" not in sys.path:
+        sys.path.insert(0, "")
     try:
         return getattr(import_module(module), name)
     except Exception as fault:  # another's code: anything can come of it

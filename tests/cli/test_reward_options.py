@@ -1,10 +1,6 @@
 """Every parameter of every term is an option of the commands that take a reward."""
 
-import json
-import subprocess
-import sys
 from dataclasses import asdict, fields
-from pathlib import Path
 
 import pytest
 
@@ -13,8 +9,6 @@ from clearway.cli.reward import RewardParameters, chosen_reward
 from clearway.cli.train import Train
 from clearway.errors import ClearwayError
 from clearway.reward import COLLISION_AWARE, TERM_OF
-from clearway.scenes.thor_v1 import write_scene
-from helpers.made import corridor_scene
 
 
 def test_every_parameter_of_every_term_is_an_option_that_says_what_it_means() -> None:
@@ -45,16 +39,3 @@ def test_options_change_the_reward_of_a_name() -> None:
 def test_rewards_that_cannot_be(name: str, parameters: dict[str, float], message: str) -> None:
     with pytest.raises(ClearwayError, match=message):
         chosen_reward(name, RewardParameters(**parameters))
-
-
-@pytest.mark.slow
-def test_a_reward_of_the_current_folder(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(
-        "from clearway.reward import Arrival, Reward, Time\ndear = Reward('dear', (Time(-0.5), Arrival()))\n"
-    )
-    command = [sys.executable, "-P", "-c", "from clearway.cli.main import main; main()"]
-    write_scene(corridor_scene(), tmp_path / "corridor.h5")
-    words = ("oracle", "corridor.h5", "--targets", "16", "--reward", "mine:dear", "--json")
-    done = subprocess.run([*command, *words], cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert json.loads(done.stdout)[0]["target"] == 16

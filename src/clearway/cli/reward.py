@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict, field, fields, make_dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -43,8 +42,6 @@ def chosen_reward(name: str, parameters: RewardParameters, clip: bool | None = N
     Raises:
         RewardError: there is no such reward, or a value is NaN or infinite.
     """
-    if ":" in name and "" not in sys.path:
-        sys.path.insert(0, "")  # a module in the current folder, as for python -m
     return reward_named(name).with_changes(clip=clip, **given_parameters(parameters))
 
 
