@@ -197,6 +197,27 @@ def test_a_parameter_comes_back_from_a_file_as_it_was_written() -> None:
     assert json.loads(json.dumps(kept)) == kept
     with pytest.raises(RewardError, match="no JSON value"):
         Reward("odd", (Listed((1j,)), Arrival())).to_json()
+    numbers = Reward("numbers", (Time(np.float32(-0.5)), Listed((np.float32(0.5), np.int64(2))), Arrival()))
+    assert numbers.to_json() == Reward("numbers", (Time(-0.5), Listed((0.5, 2)), Arrival())).to_json()
+
+
+def test_a_term_whose_parameters_would_not_be_told_is_refused() -> None:
+    class Dear(Term):
+        def __init__(self, cost: float) -> None:
+            self.cost = cost
+
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned - self.cost
+
+    class Bare(Term):
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned - 1
+
+    with pytest.raises(RewardError, match=r"the term Dear keeps .* Decorate it with @dataclass.frozen=True.") as caught:
+        Reward("dear", (Time(), Dear(0.5), Arrival()))
+    assert "\n" not in str(caught.value)
+    own = Reward("bare", (Bare(), Arrival())).to_json()["terms"]
+    assert list(own.values()) == [{}]
 
 
 def test_a_term_of_one_s_own() -> None:

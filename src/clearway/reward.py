@@ -16,6 +16,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from clearway.errors import ClearwayError, PluginError
@@ -56,7 +57,7 @@ def parameter(default: float | None, meaning: str) -> Any:
 
 @dataclass(frozen=True)
 class Term:
-    """A part of a reward. One of your own is a frozen dataclass whose fields are its parameters."""
+    """A part of a reward. One of your own is a frozen dataclass whose fields, numbers or texts, are its parameters."""
 
     def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
         """What every action earns with this term, (S, A) float64, from what it earned before it."""
@@ -197,6 +198,11 @@ class Reward:
         for term in self.terms:
             if not isinstance(term, Term) or not is_dataclass(term):
                 raise RewardError(f"reward {self.name}: {term!r:.60} is no term. Give dataclasses derived from Term")
+            if "__dataclass_params__" not in vars(type(term)) and set(vars(term)) - {own.name for own in fields(term)}:
+                problem = (
+                    f"the term {type(term).__name__} keeps parameters that are no fields, and would be told without"
+                )
+                raise RewardError(f"reward {self.name}: {problem}. Decorate it with @dataclass(frozen=True)")
         kinds = [type(term) for term in self.terms if not isinstance(term, UnknownTerm)]
         if len(set(kinds)) < len(kinds):
             raise RewardError(f"reward {self.name}: a term occurs twice. Give every kind of term once")
@@ -208,7 +214,7 @@ class Reward:
         if sum(isinstance(term, Arrival) for term in self.terms) != 1:
             raise RewardError(f"reward {self.name}: expected one term Arrival, for the target. Give one")
         for name, value in self.parameters.items():
-            if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < math.inf:
+            if not _is_number(value):
                 raise RewardError(f"reward {self.name}: {name} is {value!r:.40}, expected a finite number. Correct it")
 
     @property
@@ -286,7 +292,7 @@ class Reward:
                 raise RewardError(
                     f"reward: no parameter {name}.{did_you_mean(name, TERM_OF)} Choose among {', '.join(TERM_OF)}"
                 )
-            if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < math.inf:
+            if not _is_number(value):
                 raise RewardError(f"--{name.replace('_', '-')} is {value!r}, expected a finite number. Correct it")
             kind = TERM_OF[name]
             terms[kind] = replace(terms.get(kind, kind()), **{name: float(value)})
@@ -306,7 +312,11 @@ class Reward:
         return ", ".join(parts), told
 
     def to_json(self) -> dict[str, object]:
-        """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands."""
+        """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands.
+
+        Raises:
+            RewardError: a parameter of such a term is no JSON value, nor a number of NumPy's.
+        """
         others = {}
         for term in self.terms:
             if isinstance(term, UnknownTerm):
@@ -316,7 +326,7 @@ class Reward:
                 others[path] = {own.name: getattr(term, own.name) for own in fields(term)}
         told = {"name": self.name, **self.parameters, self.CLIPPED: self.clip, **({"terms": others} if others else {})}
         try:
-            return dict(json.loads(json.dumps(told)))  # as it comes back from a file
+            return dict(json.loads(json.dumps(told, default=_as_plain)))  # as it comes back from a file
         except TypeError as fault:
             problem = f"reward {self.name}: a parameter is no JSON value ({fault})"
             raise RewardError(f"{problem}. Use plain numbers") from fault
@@ -327,6 +337,20 @@ class Reward:
         others = [term for term in self.terms if type(term) not in TERMS.values()]
         told += [term.called if isinstance(term, UnknownTerm) else type(term).__name__ for term in others]
         return ", ".join(told) + (", clipped to [-1, 1]" if self.clip else "")
+
+
+def _is_number(value: object) -> bool:
+    """A finite number, Python's or NumPy's."""
+    return isinstance(value, Real) and not isinstance(value, bool) and abs(value) < math.inf
+
+
+def _as_plain(value: object) -> int | float:
+    """A number that JSON does not know, such as NumPy's, as one of Python's. Raises TypeError where it is none."""
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return float(value)
+    raise TypeError(f"a {type(value).__name__}")
 
 
 def in_order(terms: Mapping[type[Term], Term]) -> tuple[Term, ...]:

@@ -1,4 +1,4 @@
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from clearway.errors import ArgumentError, ClearwayError
 from clearway.learn.presets import DEFAULT, PAPER_A3C
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
-from clearway.reward import SHORTEST
+from clearway.reward import SHORTEST, Arrival, Moves, Reward, RewardError, Term, Time
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
@@ -158,6 +158,20 @@ def test_what_is_wrong_is_told_before_pictures_are_taken(corridor, monkeypatch) 
     ):
         with pytest.raises(ClearwayError, match=part):
             clearway.train(corridor, perturb="all", **wrong, **SMALL)
+
+
+def test_a_reward_that_no_record_can_hold_leaves_no_folder(corridor, tmp_path) -> None:
+    @dataclass(frozen=True)
+    class Weighed(Term):
+        weights: object
+
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned
+
+    odd = Reward("odd", (Time(), Weighed(np.zeros(3)), Arrival()))
+    with pytest.raises(RewardError, match=r"reward odd: a parameter is no JSON value .*ndarray") as caught:
+        clearway.train(corridor, reward=odd, out=tmp_path / "run", **SMALL)
+    assert "\n" not in str(caught.value) and not (tmp_path / "run").exists()
 
 
 def test_a_reward_that_clips_needs_settings_that_do(corridor) -> None:

@@ -55,6 +55,7 @@ class RunRequest:
 
     Raises:
         RunError: the seed is out of range, or the algorithm learns from no takes.
+        RewardError: a run's record cannot hold the reward.
     """
 
     scenes: Sequence[Scene]
@@ -72,6 +73,7 @@ class RunRequest:
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
+        self.reward.to_json()
         if self.takes is not None:
             self.learner.check_sees_takes()
             if self.feature_store == "mapped":
