@@ -53,7 +53,8 @@ def test_what_needs_a_network_says_that_a_table_has_none(clearway, trained, tmp_
     run = tmp_path / "run"
     assert clearway("train", trained.scene, "--out", run, "--algorithm", "q-learning", *SETTINGS).code == 0
     out = () if command in ("view", "serve") else ("--out", tmp_path / "out.onnx")
-    assert clearway(command, run, *out).refusal("an agent of q-learning has none")
+    ways = f"Walk with it by clearway evaluate {run} or clearway video {run};"  # both are walked in this file
+    assert clearway(command, run, *out).refusal("an agent of q-learning has none", ways)
 
 
 def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):

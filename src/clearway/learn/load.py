@@ -107,8 +107,9 @@ def load_network(folder: Path, checkpoint: Path | None = None) -> TrainedNetwork
     if not isinstance(agent, TrainedNetwork):
         name = agent.record.learner.algorithm
         raise RunError(
-            f"{folder}: this needs the siamese network, and an agent of {name} has none. Walk with it by "
-            "clearway evaluate --goals 20, with --live too where it knows any room, or train another algorithm"
+            f"{folder}: this needs the siamese network, and an agent of {name} has none. Walk with it by clearway "
+            f"evaluate {folder} or clearway video {folder}; off the grid walk those of ppo, a2c, a3c and bc, "
+            "and recurrent ones to goals (--goals 20 --live)"
         )
     return agent
 
