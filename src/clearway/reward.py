@@ -199,9 +199,7 @@ class Reward:
             if not isinstance(term, Term) or not is_dataclass(term):
                 raise RewardError(f"reward {self.name}: {term!r:.60} is no term. Give dataclasses derived from Term")
             if "__dataclass_params__" not in vars(type(term)) and set(vars(term)) - {own.name for own in fields(term)}:
-                problem = (
-                    f"the term {type(term).__name__} keeps what is no field of it, so that no record holds it"
-                )
+                problem = f"the term {type(term).__name__} keeps what is no field of it, so that no record holds it"
                 raise RewardError(f"reward {self.name}: {problem}. Decorate it with @dataclass(frozen=True)")
         kinds = [type(term) for term in self.terms if not isinstance(term, UnknownTerm)]
         if len(set(kinds)) < len(kinds):

@@ -14,7 +14,7 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import METRIC_NAMES
 from clearway.evaluation.protocol import evaluate_agents
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
-from clearway.evaluation.tables import MARK, markdown_table, rich_tables, table_text
+from clearway.evaluation.tables import MARK, main_rows, markdown_table, rich_tables, table_text
 from clearway.world.world import make_world
 from helpers.made import corridor_scene, grid_scene
 
@@ -187,7 +187,16 @@ def test_of_several_agents_the_main_rows_show_each_once(evaluations):
     shown = printed(evaluations, ["average"])
     names = [line.split("  ")[0].strip() for line in shown.splitlines() if re.match(r" [a-z].*/5", line)]
     assert names == ["first", "second", "random", "shortest path"]
-    assert "4 more rows, of other ways of acting and exact optima: elsewhere." in shown
+    assert "4 more rows, of other ways of acting: elsewhere." in shown
+
+
+def test_what_is_not_shown_is_named_as_what_it_is(evaluations):
+    first, *_, random, shortest = evaluations
+    optimum = replace(first, agent="optimum (shortest)")
+    assert "1 more row, of exact optima: elsewhere." in printed([first, optimum, random, shortest], ["average"])
+    both = "5 more rows, of other ways of acting and exact optima: elsewhere."
+    assert both in printed([*evaluations, optimum], ["average"])
+    assert "more row" not in printed(main_rows(evaluations), ["average"])
 
 
 def test_ranges_are_explained_only_where_they_are_shown(evaluations):

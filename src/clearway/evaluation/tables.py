@@ -140,19 +140,26 @@ def rich_tables(
     with_ranges = [_level(evaluations, level) == "average" for level in levels]
     contents = [table_text(shown, level, width="terminal", ranges=any(with_ranges)) for level in levels]
     *tables, last = (_rich(content, ranges) for content, ranges in zip(contents, with_ranges, strict=True))
-    left = len(evaluations) - len(shown)
-    more = [f"{left} more row{'s' * (left > 1)}, of other ways of acting and exact optima: {rest}."] if left else []
-    return Group(*tables, noted(last, [*contents[-1].notes, *more]))
+    left = [f"{told}: {rest}."] if (told := _left_out(evaluations, shown)) else []
+    return Group(*tables, noted(last, [*contents[-1].notes, *left]))
 
 
 def main_rows(evaluations: Sequence[Evaluation]) -> list[Evaluation]:
     """Each agent by its first way of acting, without the exact optima."""
     way = evaluations[0].protocol.action_selection
-    return [
-        one
-        for one in evaluations
-        if one.protocol.action_selection == way and not one.agent.startswith(tuple(f"{name} (" for name in REFERENCES))
-    ]
+    return [one for one in evaluations if one.protocol.action_selection == way and not _is_exact(one)]
+
+
+def _is_exact(evaluation: Evaluation) -> bool:
+    return evaluation.agent.startswith(tuple(f"{name} (" for name in REFERENCES))
+
+
+def _left_out(evaluations: Sequence[Evaluation], shown: Sequence[Evaluation]) -> str:
+    """How many rows are not shown, and of what; empty where all are."""
+    count = len(evaluations) - len(shown)
+    exact = sum(map(_is_exact, evaluations))
+    kinds = ["other ways of acting"] * (count > exact) + ["exact optima"] * (exact > 0)
+    return f"{count} more row{'s' * (count > 1)}, of {' and '.join(kinds)}" if count else ""
 
 
 def _rich(content: TableText, intervals: bool) -> Table:
