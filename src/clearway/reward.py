@@ -339,7 +339,10 @@ class Reward:
 
 def _is_number(value: object) -> bool:
     """A finite number, Python's or NumPy's."""
-    return isinstance(value, Real) and not isinstance(value, bool) and abs(value) < math.inf
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    size: Any = abs(value)
+    return bool(size < math.inf)
 
 
 def _as_plain(value: object) -> int | float:

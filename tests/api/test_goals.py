@@ -78,6 +78,14 @@ def test_an_agent_of_one_s_own_and_its_maker(run):
         assert own.scenes == random.scenes
 
 
+def test_agents_of_one_s_own_cannot_tour():
+    for agent in (RandomWalk, RandomWalk()):
+        with pytest.raises(ArgumentError, match=r"tour=10: RandomWalk is an agent of your own, and none .* can tour"):
+            evaluate_goals(agent, [corridor_scene(5)], tour=10)
+        with pytest.raises(ArgumentError, match=r"tour=10: RandomWalk is an agent of your own, and none .* can tour"):
+            clearway.evaluate_live(agent, [corridor_scene(5)], tour=10)
+
+
 def test_an_agent_called_as_a_yardstick_is_refused(run):
     def random(world):
         return RandomWalk()
@@ -243,7 +251,7 @@ def stretched(scene: Scene, by: float) -> Scene:
 
 
 def test_a_tour_is_nothing_for_an_agent_without_a_map(run):
-    with pytest.raises(ArgumentError, match="tour=40: recurrent keeps no map, and"):
+    with pytest.raises(ArgumentError, match=r"tour=40: recurrent keeps no map\. Leave it out"):
         evaluate_goals(run / "run", [corridor_scene(5)], goals=4, tour=40)
 
 

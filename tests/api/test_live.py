@@ -2,16 +2,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import clearway
 from clearway import evaluate_live
+from clearway.agents.by_pose import RandomWalk
 from clearway.agents.generalist import Generalist
-from clearway.errors import ArgumentError, RunError, SceneError
+from clearway.errors import AgentError, ArgumentError, RunError, SceneError
 from clearway.live import goals
 from clearway.live.conditions import REFERENCE, Perturbations
 from clearway.perception import eyes
 from clearway.perception.eyes import write_eyes
+from clearway.scenes.actions import Action
 from clearway.scenes.aspect import AspectWarning
 from clearway.scenes.scene import Provenance
 from helpers.made import corridor_scene, grid_scene
@@ -79,8 +82,9 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
         evaluate_live("generalist", built, goals=2)
     with pytest.raises(RunError, match=r"runs/x: "):
         evaluate_live("runs/x", corridor_scene(5))
-    with pytest.raises(ArgumentError, match=r"bound to its rooms, and off the grid goals are drawn anew"):
-        evaluate_live(object(), corridor_scene(5))
+    trained = clearway.train(corridor_scene(5), frames=80, envs=10, rollout_steps=8, width=16).agent
+    with pytest.raises(ArgumentError, match=r"ppo: bound to its rooms, and off the grid goals are drawn anew"):
+        evaluate_live(trained, corridor_scene(5))
     with pytest.raises(ArgumentError, match="sweep sets the perturbations itself"):
         evaluate_live("generalist", corridor_scene(5), perturb="all", sweep=(1.0,))
     for sweep in (0.5, None, "1.0"):
@@ -89,3 +93,52 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
     for sweep in ((-1.0,), ("x",), (1.0, float("inf")), (1e6,)):
         with pytest.raises(ArgumentError, match="expected shares of the full strengths above 0"):
             evaluate_live("generalist", corridor_scene(5), sweep=sweep)
+
+
+class Bumper:
+    """Walks ahead until the picture stays the same, then turns."""
+
+    sees = ("rgb",)
+
+    def __init__(self, world: object) -> None:
+        pass
+
+    def reset(self, target, seed):
+        return {"before": np.zeros_like(target["rgb"])}
+
+    def act(self, observation, state):
+        stuck = (observation["rgb"] == state["before"]).all((1, 2, 3))
+        action = np.where(stuck, Action.TURN_RIGHT, Action.MOVE_FORWARD)
+        return clearway.Decisions(action), {"before": observation["rgb"]}
+
+
+def test_an_agent_of_one_s_own_walks_off_the_grid_by_what_a_camera_gives(walkable):
+    settings = {"goals": 3, "step_limit": 6}
+    (told,) = evaluate_live(Bumper, walkable, **settings)
+    assert told.agent == "Bumper" and told.average.episodes == 3 and told.average.collisions > 0
+    for agent in (Bumper(None), lambda world: Bumper(world)):
+        (again,) = evaluate_live(agent, walkable, **settings)
+        assert again.scenes == told.scenes
+    (random,) = evaluate_live(RandomWalk(), walkable, **settings)
+    assert random.scenes != told.scenes
+
+
+@pytest.mark.parametrize(
+    ("agent", "words"),
+    [
+        (
+            type("Deep", (Bumper,), {"sees": ("rgb", "depth")}),
+            r"Deep: the agent sees depth, and live walks take colour",
+        ),
+        (type("Sure", (Bumper,), {"act": lambda *_: 1 / 0}), r"Sure: agent: failed .ZeroDivisionError"),
+        (type("Shy", (Bumper,), {"act": lambda *_: (3, {})}), r"Shy: the agent gave int, expected Decisions"),
+        (type("Late", (Bumper,), {"__init__": lambda self: None}), r"Late: agent: cannot be made .TypeError"),
+        (abs, r"abs: agent: cannot be made .TypeError"),
+        (lambda world: 3, r"agent: gives 3, expected an object with sees, reset and act"),
+        (object(), r"agent: is <object.*, expected a class or function that takes a World"),
+    ],
+)
+def test_what_is_no_agent_off_the_grid_is_one_line(walkable, agent, words):
+    with pytest.raises(AgentError, match=words) as caught:
+        evaluate_live(agent, walkable, goals=3, step_limit=6)
+    assert "\n" not in str(caught.value)

@@ -56,7 +56,7 @@ def evaluate_goals(
             "geometry", names such as "light", or "light=0.2", as of `take_views`; or `Perturbations`. Each step shows
             one of several takes of its pose, which are kept in the user's cache folder once they are rendered.
         takes: of each pose, each perturbed in its own way.
-        tour: steps in which an agent that keeps a map may look around in each scene before the episodes.
+        tour: steps in which the generalist may look around in each scene before the episodes; no other agent can.
         show_progress: draw a progress bar while rendering, if standard error is a terminal.
 
     Raises:
@@ -94,7 +94,7 @@ def evaluate_goals(
     elif isinstance(agent, TrainedAgent):
         found = load.run_scenes(agent.record, found)
     make: AgentMaker | Touring
-    name, make = _named(agent)
+    name, make = named_agent(agent)
     if tour_steps and isinstance(agent, Generalist):
         make = Touring(agent.explorer, agent.after, tour_steps)
     with torch_threads(1):
@@ -131,15 +131,14 @@ def goal_agent(path: Path, checkpoint: Path | None = None) -> TrainedAgent | Gen
 def check_can_tour(agent: object, steps: int) -> None:
     """Raise ArgumentError where an agent that keeps no map is given steps to look around."""
     from clearway.agents.generalist import Generalist
+    from clearway.learn.load import TrainedAgent
 
     if steps and not isinstance(agent, Generalist):
-        problem = f"tour={steps}: {agent_name(agent)} keeps no map, and would have nothing of a tour"
-        raise ArgumentError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
-
-
-def agent_name(agent: object) -> str:
-    """What an agent is called in tables."""
-    return _named(agent)[0]
+        name, _ = named_agent(agent)
+        why = (
+            "keeps no map" if isinstance(agent, TrainedAgent) else "is an agent of your own, and none of these can tour"
+        )
+        raise ArgumentError(f"tour={steps}: {name} {why}. Leave it out, or evaluate {GENERALIST}")
 
 
 def _check_sees(agent: object) -> None:
@@ -168,8 +167,8 @@ def _takes(
     return takes_seen(scenes, perturbations, sees, encoder, takes=takes, seed=seed, show_progress=show_progress)
 
 
-def _named(agent: object) -> tuple[str, AgentMaker]:
-    """What an agent is called, and what makes it for a world."""
+def named_agent(agent: object) -> tuple[str, AgentMaker]:
+    """What an agent is called in tables, and what makes it for a world. Raises AgentError where it is none."""
     from clearway.agents.generalist import Generalist
     from clearway.agents.named import named_maker
     from clearway.learn.load import TrainedAgent

@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING
 
 from clearway.api.arguments import as_path, as_seed, as_whole
-from clearway.api.goals import MOST_TOUR_STEPS, agent_name, check_can_tour, goal_agent
+from clearway.api.goals import MOST_TOUR_STEPS, check_can_tour, goal_agent, named_agent
 from clearway.api.scenes import Scenes, load_scenes
 from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.choices import GOAL_STEPS, GOALS
@@ -20,12 +20,13 @@ from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_
 if TYPE_CHECKING:
     from clearway.agents.agent import Agent
     from clearway.agents.generalist import Generalist
+    from clearway.agents.named import AgentMaker
     from clearway.evaluation.goals import GoalEvaluation
     from clearway.learn.load import TrainedAgent
 
 
 def evaluate_live(
-    agent: str | os.PathLike[str] | Generalist | TrainedAgent,
+    agent: str | os.PathLike[str] | Generalist | TrainedAgent | Agent | AgentMaker,
     scenes: Scenes,
     *,
     goals: int = GOALS,
@@ -43,7 +44,7 @@ def evaluate_live(
 
     Args:
         agent: "generalist", which comes with clearway, or a `Generalist`; a run folder of the algorithm "recurrent", or
-            what `load_agent` gave of it.
+            what `load_agent` gave of it; or an agent of your own that sees "rgb" alone, as of `evaluate`.
         scenes: files, folders of them, or scenes, with pictures, of rooms that can be built again.
         goals: of each scene, distinct poses of its largest part.
         step_limit: steps after which an episode has failed.
@@ -61,7 +62,7 @@ def evaluate_live(
     Raises:
         ArgumentError: an argument is of the wrong kind or out of range.
         ClearwayError: a scene has no room that can be built again, no pictures, too few poses, or other steps and turns
-            than the agent.
+            than the agent; or the agent cannot be made, or walk there.
     """
     from clearway.agents.generalist import Generalist
     from clearway.learn.load import TrainedAgent
@@ -89,7 +90,8 @@ def evaluate_live(
     if isinstance(agent, str | os.PathLike):
         agent = goal_agent(as_path("agent", agent))
     found = load_scenes(scenes)
-    walker: Agent | LiveTouring
+    check_can_tour(agent, steps)
+    walker: Agent | AgentMaker | LiveTouring
     if isinstance(agent, Generalist):
         agent = agent.stepping(found)
         agent.warn_of_aspect(found)
@@ -97,16 +99,18 @@ def evaluate_live(
         if steps:
             walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
     elif isinstance(agent, TrainedRecurrent):
-        check_can_tour(agent, steps)
         agent.warn_of_aspect(found)
         walker = agent.behind_camera()
-    else:
-        called = agent.record.learner.algorithm if isinstance(agent, TrainedAgent) else str(agent)
-        problem = f"{called:.80}: bound to its rooms, and off the grid goals are drawn anew in any"
+    elif isinstance(agent, TrainedAgent):
+        problem = (
+            f"{agent.record.learner.algorithm:.80}: bound to its rooms, and off the grid goals are drawn anew in any"
+        )
         raise ArgumentError(f"{problem}. Evaluate it at its targets: clearway evaluate RUN --live, without --goals")
+    else:
+        walker = named_agent(agent)[1]
     settings = [Condition(label_of(perturbations), perturbations)]
     if sweep:
         fixed = any(scene.made_by.source == MODEL_SOURCE for scene in found)
         settings = sweep_settings(tuple(sweep), as_it_was_built(REFERENCE) if fixed else REFERENCE)
     with torch_threads(1):
-        return walk_to_goals(agent_name(agent), walker, found, settings, **asked, show=show)
+        return walk_to_goals(named_agent(agent)[0], walker, found, settings, **asked, show=show)

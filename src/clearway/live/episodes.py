@@ -128,7 +128,7 @@ def run_live_episodes(
         AgentError: the agent sees something else than colour pictures, or answers what no agent may.
         SceneError: perturbations move what cannot be moved in the room.
     """
-    _check_sight(agent)
+    check_sight(agent)
     live.check_can_be_rearranged(perturbations)
     target = torch.arange(world.target_count).repeat_interleave(protocol.episodes_per_target)
     seeds = episode_seeds(world, protocol.episodes_per_target, protocol.seed)
@@ -200,7 +200,8 @@ class Walking:
         return first_person_shot(*self.walker.pose, height_m=height_m, pitch_deg=pitch_deg, moved_m=moved_m)
 
 
-def _check_sight(agent: Agent) -> None:
+def check_sight(agent: Agent) -> None:
+    """Raise AgentError where an agent sees something else than colour pictures."""
     if others := set(agent.sees) - {RGB}:
         problem = f"the agent sees {', '.join(sorted(others))}, and live walks take colour pictures"
         raise AgentError(f"{problem}. Evaluate on the grid: clearway evaluate")

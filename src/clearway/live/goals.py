@@ -5,23 +5,26 @@ Goals and starts are those of `evaluation.goals`, an episode to each; a goal is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from clearway.agents.agent import Agent, State
+from clearway.agents.named import AgentMaker
+from clearway.errors import AgentError
 from clearway.evaluation.goals import GoalEvaluation, GoalFigures, drawn_goals
 from clearway.evaluation.metrics import SC_DETOUR
 from clearway.live.conditions import Condition
-from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
+from clearway.live.episodes import LiveProtocol, LiveTable, check_sight, run_live_episodes
 from clearway.live.live_room import MODEL_SOURCE, LiveRoom, check_is_room, check_movable, live_room
 from clearway.live.tours import walk_live_tour
 from clearway.rooms.detail import taken_fast
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import RGB
-from clearway.world.world import check_distinct, make_world
+from clearway.world.world import World, check_distinct, make_world
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class LiveTouring:
 
 def walk_to_goals(
     name: str,
-    agent: Agent | LiveTouring,
+    agent: Agent | AgentMaker | LiveTouring,
     scenes: Sequence[Scene],
     settings: Sequence[Condition],
     *,
@@ -54,7 +57,8 @@ def walk_to_goals(
 
     Args:
         name: of the agent.
-        agent: who walks, by colour pictures; or how it is made in each scene and setting, by a tour of its own.
+        agent: who walks, by colour pictures; or what makes one for the world of each scene; or how it is made in each
+            scene and setting, by a tour of its own.
         scenes: with colour pictures, of rooms that can be built again; distinct names.
         settings: what is changed.
         goals: of each scene.
@@ -65,7 +69,7 @@ def walk_to_goals(
     Raises:
         SceneError: two scenes have one name; one has no pictures, fewer poses than goals, or no room that can be built
             again; or nothing can be moved in it.
-        AgentError: the agent sees something else than colour pictures.
+        AgentError: the agent, which is named, sees something else than colour pictures, or answers what no agent may.
     """
     wanted = {}
     check_distinct([scene.name for scene in scenes])
@@ -79,22 +83,24 @@ def walk_to_goals(
     tours: list[list[int]] = [[] for _ in settings]
     protocol = LiveProtocol(1, step_limit, seed, "sampled")
     for scene in scenes:
+        world = make_world([replace(scene, features=None, encoder=None)], {scene.name: wanted[scene.name]})
+        with _naming(name):
+            here = _made(agent, world)
         show(f"building {scene.name}")
         live = live_room(scene)
-        world = make_world([replace(scene, features=None, encoder=None)], {scene.name: wanted[scene.name]})
         height_px, width_px = scene.seen_by(RGB).shape[1:3]
         lens = live.lens(height_px, width_px, fast=taken_fast(scene.made_by.notes))
-        with studio(live.model, lens) as camera:
+        with studio(live.model, lens) as camera, _naming(name):
             for number, setting in enumerate(settings):
-                here = f"{setting.label}: {name} in {scene.name}"
-                show(here)
-                walker = agent
+                told = f"{setting.label}: {name} in {scene.name}"
+                show(told)
+                walker = here
                 if isinstance(walker, LiveTouring):
                     walker, contacts = _toured(walker, live, camera, setting, seed)
                     tours[number].append(contacts)
 
-                def walking(count: int, here: str = here) -> None:
-                    show(f"{here}, {count} episodes walking")
+                def walking(count: int, told: str = told) -> None:
+                    show(f"{told}, {count} episodes walking")
 
                 table = run_live_episodes(live, world, walker, camera, setting.perturbations, protocol, walking)
                 figures[number][scene.name] = _figures(table)
@@ -107,6 +113,24 @@ def walk_to_goals(
         )
         for number, setting in enumerate(settings)
     ]
+
+
+def _made(agent: Agent | AgentMaker | LiveTouring, world: World) -> Agent | LiveTouring:
+    """Who walks in a world, or how it is made by a tour. Raises AgentError where it sees more than a camera does."""
+    if isinstance(agent, LiveTouring):
+        return agent
+    walker = agent if isinstance(agent, Agent) else agent(world)
+    check_sight(walker)
+    return walker
+
+
+@contextmanager
+def _naming(name: str) -> Iterator[None]:
+    """Say of what an agent does wrong that it was this one."""
+    try:
+        yield
+    except AgentError as fault:
+        raise AgentError(f"{name}: {fault}") from fault
 
 
 def _toured(touring: LiveTouring, live: LiveRoom, camera: Camera, setting: Condition, seed: int) -> tuple[Agent, int]:
