@@ -1,6 +1,7 @@
 """Plugins: what is listed, what is refused, and one of each kind from a package of its own."""
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -39,6 +40,16 @@ def here(package, monkeypatch, tmp_path):
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     yield package
     sys.modules.pop("tiny_plugins", None)
+
+
+MADE = """
+from dataclasses import replace
+from clearway.scenes.scene import Provenance
+from helpers.made import corridor_scene
+class Dark:
+    shape = (20, 8, 8, 3)
+    def __getitem__(self, index): raise OSError("lens cap")
+"""
 
 
 def offer(folder: Path, group: str, lines: str, module: str = "", package: str = "others") -> Path:
@@ -194,6 +205,7 @@ def test_a_broken_encoder_is_named_with_its_package_and_the_remedy(tmp_path, mon
         ("numpy.zeros((len(pictures), 3))", r"float64 \(\d+, 3\), expected floats \(\d+, 2\)"),
         ("numpy.zeros((len(pictures), 2), complex)", "complex128"),
         ("numpy.full((len(pictures), 2), numpy.nan)", "NaN or Inf"),
+        ("numpy.full((len(pictures), 2), 1e300)", "NaN or Inf of a picture, in float32"),
     ],
 )
 def test_features_that_cannot_be_used_are_refused(tmp_path, monkeypatch, returned, part) -> None:
@@ -215,6 +227,10 @@ def test_features_that_cannot_be_used_are_refused(tmp_path, monkeypatch, returne
         ("def read(path): return 3", "returned 3, expected scenes"),
         ("def read(path): return [3]", "returned 3, expected scenes"),
         ("def read(path): return 1 / 0", r"failed \(ZeroDivisionError: division by zero\)"),
+        (
+            f"{MADE}def read(path): return replace(corridor_scene(), observations=Dark())",
+            r"failed \(OSError: lens cap\)",
+        ),
     ],
 )
 def test_a_broken_importer_is_named(tmp_path, monkeypatch, module, part) -> None:
@@ -222,6 +238,32 @@ def test_a_broken_importer_is_named(tmp_path, monkeypatch, module, part) -> None
     sys.modules.pop("others", None)
     with pytest.raises(PluginError, match=rf"importer odd of the package others 1\.2 {part}"):
         plugged_scenes("odd", [tmp_path])
+    sys.modules.pop("others", None)
+
+
+@pytest.mark.parametrize(
+    ("returned", "part"),
+    [
+        ("[]", r"file\.txt: the importer odd of the package others 1\.2 found no scene in it\. Give another file"),
+        ("replace(corridor_scene(), graph=[[0]])", r"file\.txt: graph is of type list, expected a NumPy array"),
+        ("replace(corridor_scene(), name=7)", r"file\.txt: 7 cannot be a scene's name"),
+        ("replace(corridor_scene(), encoder='mine')", r"file\.txt: encoder is 'mine', expected an EncoderRecord"),
+        (
+            "replace(corridor_scene(), made_by=Provenance('x', notes={'a': {1}}))",
+            r"file\.txt: made_by\.notes is no JSON",
+        ),
+    ],
+)
+def test_an_importer_s_scenes_that_cannot_be_written_are_refused(tmp_path, monkeypatch, capsys, returned, part) -> None:
+    module = f"{MADE}def read(path): return {returned}"
+    monkeypatch.syspath_prepend(str(offer(tmp_path / "site", "importers", "odd = others:read", module)))
+    sys.modules.pop("others", None)
+    (tmp_path / "file.txt").touch()
+    with pytest.raises(SystemExit) as leaving:
+        main(["scenes", "import", "plugin", "odd", str(tmp_path / "file.txt"), "--out", str(tmp_path / "out")])
+    (line,) = capsys.readouterr().err.splitlines()
+    assert leaving.value.code == 2 and re.search(part, line)
+    assert not (tmp_path / "out").exists()
     sys.modules.pop("others", None)
 
 

@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import pytest
 from PIL import Image
 
 
@@ -46,8 +47,9 @@ def test_a_missing_photograph_is_named_and_nothing_is_written(clearway, tmp_path
     assert not (tmp_path / "scenes").exists()
 
 
-def test_a_name_that_leads_out_of_the_folder_is_refused(clearway, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["../office", "..", "a\nb"])
+def test_a_name_that_no_file_can_have_is_refused(clearway, tmp_path: Path, name: str) -> None:
     table = photographed(tmp_path)
-    words = ("scenes", "import", "images", table, "--out", tmp_path / "scenes", "--name", "../office")
-    assert clearway(*words).refusal("../office", "without slashes")
-    assert not (tmp_path / "office.h5").exists()
+    words = ("scenes", "import", "images", table, "--out", tmp_path / "scenes", "--name", name)
+    assert clearway(*words).refusal("cannot be a scene's name", "without slashes")
+    assert not (tmp_path / "office.h5").exists() and not (tmp_path / "scenes").exists()

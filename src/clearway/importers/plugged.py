@@ -11,7 +11,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from clearway.errors import ClearwayError, PluginError
-from clearway.plugins import BUILT_IN, load_plugin, plugin_of
+from clearway.plugins import BUILT_IN, Plugin, load_plugin, plugin_of
+from clearway.scenes.parts import check_records
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import check_scene
 
@@ -22,6 +23,7 @@ def plugged_scenes(name: str, files: Sequence[Path]) -> list[Scene]:
     Raises:
         PluginError: there is no such importer, it cannot be imported, it fails, or returns something else.
         SceneError: a scene of it is unsound.
+        ClearwayError: there is no such file, or no scene in it.
     """
     if name in BUILT_IN["importers"]:
         raise PluginError(f"importer {name}: is no plugin. Use clearway scenes import {name}")
@@ -34,14 +36,24 @@ def plugged_scenes(name: str, files: Sequence[Path]) -> list[Scene]:
         try:
             found = read(file)  # type: ignore[operator]
             given = [found] if isinstance(found, Scene) else list(found) if isinstance(found, Iterable) else [found]
+            for scene in given:
+                _check(scene, plugin, file)
         except ClearwayError:
             raise
         except Exception as fault:  # another's code, as in load_plugin
             reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
             raise PluginError(f"{file}: the {plugin} failed ({reason}). Check the file, or ask its authors") from fault
-        for scene in given:
-            if not isinstance(scene, Scene):
-                raise PluginError(f"the {plugin} returned {scene!r:.40}, expected scenes. Ask its authors")
-            check_scene(scene, file)
+        if not given:
+            raise ClearwayError(f"{file}: the {plugin} found no scene in it. Give another file")
         scenes += given
     return scenes
+
+
+def _check(scene: object, plugin: Plugin, file: Path) -> None:
+    """Raise PluginError or SceneError where it is no sound scene, of which a file can be written."""
+    if not isinstance(scene, Scene):
+        raise PluginError(f"the {plugin} returned {scene!r:.40}, expected scenes. Ask its authors")
+    check_scene(scene, file)
+    check_records(scene, file)
+    if scene.observations is not None:
+        scene.observations[:1]  # of what is read on demand, whether it can be

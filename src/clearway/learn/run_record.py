@@ -23,6 +23,7 @@ from clearway.remote.records import origin
 from clearway.reward import Reward
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.features import FileFeatures
+from clearway.scenes.parts import is_name
 from clearway.scenes.scene import Scene
 from clearway.spread.many import of_each
 from clearway.version import __version__
@@ -203,6 +204,6 @@ def _scene_record(content: Mapping[str, Any]) -> SceneRecord:
     texts = all(fits(text, str) for text in (scene.name, scene.digest, scene.encoder))
     if not texts or not fits(scene.path, str | None) or not all(fits(target, int) for target in scene.targets):
         raise TypeError(f"scene {scene.name!r:.40}")
-    if scene.name in ("", ".", "..") or any(letter in scene.name for letter in "/\\\0"):
+    if not is_name(scene.name):
         raise RunError(f"scene {scene.name!r:.40} cannot be part of a file's name")
     return scene

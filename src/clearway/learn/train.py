@@ -29,6 +29,7 @@ from clearway.learn.share import Share, check_scenes
 from clearway.learn.tracking import check_tracker
 from clearway.reward import Reward
 from clearway.scenes.features import FileFeatures
+from clearway.scenes.parts import check_name
 from clearway.scenes.scene import Scene
 from clearway.torch_device import usable_device
 from clearway.world.mapped_scenes import mapped_scenes
@@ -56,6 +57,7 @@ class RunRequest:
     Raises:
         RunError: the seed is out of range, or the algorithm learns from no takes.
         RewardError: a run's record cannot hold the reward.
+        SceneError: a scene's name cannot be part of a file's.
     """
 
     scenes: Sequence[Scene]
@@ -74,6 +76,8 @@ class RunRequest:
     def __post_init__(self) -> None:
         check_seed(self.seed)
         self.reward.to_json()
+        for scene in self.scenes:
+            check_name(scene.name, "scenes")
         if self.takes is not None:
             self.learner.check_sees_takes()
             if self.feature_store == "mapped":

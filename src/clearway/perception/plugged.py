@@ -50,7 +50,7 @@ class CheckedEncoder:
         """Features (B, F) float32 of its sensor's pictures (B, ...), for example (B, height, width, 3) uint8.
 
         Raises:
-            EncoderError: it fails, or what it returned is of another shape or type, or holds NaN or Inf.
+            EncoderError: it fails, or what it returned is of another shape or type, or holds NaN or Inf, in float32.
         """
         try:
             features = np.asarray(self.made.encode(pictures))
@@ -61,9 +61,12 @@ class CheckedEncoder:
         if features.shape != expected or features.dtype.kind not in "fiu":
             found = f"{features.dtype} {features.shape}, expected floats {expected}"
             raise EncoderError(f"encoder {self.record.name}: returned {found}. Mend it, or use another encoder")
-        if not np.isfinite(features).all():
-            raise EncoderError(f"encoder {self.record.name} made NaN or Inf of a picture. Use another encoder")
-        return np.ascontiguousarray(features, dtype=np.float32)
+        with np.errstate(over="ignore"):
+            kept = np.ascontiguousarray(features, dtype=np.float32)
+        if not np.isfinite(kept).all():
+            problem = f"encoder {self.record.name} made NaN or Inf of a picture, in float32"
+            raise EncoderError(f"{problem}. Use another encoder")
+        return kept
 
 
 def make_encoder(plugin: Plugin) -> CheckedEncoder:

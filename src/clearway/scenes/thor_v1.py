@@ -21,6 +21,7 @@ from clearway.scenes.actions import ACTION_COUNT, BLOCKED, Action
 from clearway.scenes.features import DATASET as FEATURES
 from clearway.scenes.features import FileFeatures, find_features, read_features
 from clearway.scenes.file_pictures import BLOCK_PICTURES, FilePictures, file_stamp
+from clearway.scenes.parts import check_records
 from clearway.scenes.records import (
     read_encoder,
     read_provenance,
@@ -100,6 +101,7 @@ def write_scene(scene: Scene, path: str | Path) -> None:
     """Write a scene as a `thor_v1` file, whole or not at all. Raises SceneError for a scene that is unsound."""
     path = Path(path)
     check_scene(scene, path)
+    check_records(scene, path)
     with hdf5.written(path) as file:
         _write_all(file, scene, path)
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.actions import ACTION_COUNT, BLOCKED, MOVES, TURNS, Action
+from clearway.scenes.parts import check_parts
 from clearway.scenes.scene import Observations, Scene, TopView
 from clearway.scenes.sensors import RGB, STEPS_DTYPE, Readings, Sensor
 
@@ -36,7 +37,8 @@ class SceneWarning(UserWarning):
 
 def check_scene(scene: Scene, source: str | Path | None = None) -> None:
     """Check every part of a scene. Raises SceneError; `source` is the file it names, else the scene's name."""
-    source = scene.name if source is None else source
+    source = str(scene.name) if source is None else source
+    check_parts(scene, source)
     check_graph(scene.graph, source)
     check_turns(scene.graph, source)
     check_headings(scene.cells, source)

@@ -119,6 +119,6 @@ class ImportImages:
         from clearway.importers.images import read_images
 
         check_at_least(1, height=self.height)
-        name = self.name or place_name(self.table)
+        name = place_name(self.table, self.name)
         scene = read_images(self.table, step_m=self.step, blocked=self.blocked, name=name, height_px=self.height)
         encode_and_write([scene], self.out, self.encoding)

@@ -108,7 +108,7 @@ class ImportMjcf:
                 self.file,
                 FloorChoice(self.floor_height, self.camera_height, self.spawn, self.extent, self.all_geoms),
                 AgentShape(self.agent_radius, self.agent_height, self.step),
-                name=self.name or place_name(self.file),
+                name=place_name(self.file, self.name),
                 height_px=self.height,
                 width_px=self.width,
                 sensors=self.sensors,

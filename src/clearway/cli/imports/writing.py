@@ -90,20 +90,29 @@ def replaces(path: Path) -> str:
     return ", replaces the scene that was there" if path.exists() else ""
 
 
-def place_name(file: Path) -> str:
-    """Name of the place that a file describes: the file's stem, or its folder's name where all such files are alike."""
+def place_name(file: Path, given: str | None = None) -> str:
+    """Name of the place that a file describes: as given, else the file's stem; its folder's where all files have that.
+
+    Raises:
+        SceneError: no scene may be called so.
+    """
+    from clearway.scenes.parts import check_name
+
     folder = file.resolve().parent.name if file.stem in COMMON_STEMS else ""
-    return folder or file.stem
+    name = given or folder or file.stem
+    check_name(name, file)
+    return name
 
 
 def _paths(scenes: Sequence[Scene], out: Path, files: Sequence[Path]) -> list[Path]:
     """Where the scenes are to be written, once it is seen that nothing is lost by it and all stay in the folder."""
+    from clearway.scenes.parts import check_name
+
     names = [scene.name for scene in scenes]
     read = {file.resolve() for file in files}
     paths = [out / f"{name}.h5" for name in names]
     for source, name, path in zip(files or names, names, paths, strict=True):
-        if Path(name).name != name:
-            raise ClearwayError(f"{name}: a scene's name becomes a file's. Give one without slashes")
+        check_name(name, str(source))
         if path.resolve() in read:
             raise ClearwayError(f"{path}: would be written over a file to be imported. Give another folder with --out")
         if names.count(name) > 1:

@@ -1,0 +1,83 @@
+"""Parts of a scene that are of another kind than they have to be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clearway
+from clearway.errors import SceneError
+from clearway.scenes.parts import check_parts
+from clearway.scenes.scene import EncoderRecord, Provenance, TopView
+from clearway.scenes.thor_v1 import read_scene, write_scene
+from helpers.made import corridor_scene, grid_scene
+
+SCENE = grid_scene(1, width=4, depth=3, picture_size=(10, 10), feature_count=8)
+WRONG = {
+    "graph": [(SCENE.graph.tolist(), "graph is of type list"), (SCENE.graph.astype(object), "an array of object")],
+    "locations_m": [(SCENE.locations_m.tolist(), "locations_m is of type list, expected a NumPy array")],
+    "headings_deg": [(None, "headings_deg is None")],
+    "observations": [
+        (SCENE.observations.tolist(), "observations is of type list"),
+        (SCENE.observations / 255, r"an array of float64, expected a NumPy array \(S, height, width, 3\) uint8"),
+    ],
+    "features": [(np.asarray(SCENE.features).tolist(), "features is of type list")],
+    "cell_size_m": [("0.5", "cell_size_m is '0.5', expected a number"), (True, "cell_size_m is True")],
+    "made_by": [
+        ({"source": "x"}, "made_by is of type dict, expected a Provenance"),
+        (Provenance(3), "made_by.source is 3, expected a text"),
+        (Provenance("x", seed="1"), "made_by.seed is '1'"),
+        (Provenance("x", notes=["a"]), "made_by.notes is of type list, expected a dict"),
+    ],
+    "encoder": [
+        ("mine", "encoder is 'mine', expected an EncoderRecord"),
+        (EncoderRecord("mine", 1), "encoder.identity is 1, expected a text"),
+        (EncoderRecord("mine", "1", arrays={"a": [1]}), "encoder.arrays is of type dict, expected a dict of NumPy"),
+    ],
+    "top_view": [
+        ("above.png", "top_view is 'above.png'"),
+        (TopView(np.zeros((2, 2, 3), np.uint8), 0, 1, 0, "1"), "top_view's extent"),
+    ],
+    "further": [(["depth"], "further is of type list, expected a tuple of Readings")],
+    "name": [(name, "cannot be a scene's name") for name in (7, None, "", ".", "..", "a/b", "a\\b", "a\nb", "a" * 201)],
+}
+
+
+def test_sound_parts_pass() -> None:
+    check_parts(SCENE, "some.h5")
+    check_parts(replace(SCENE, name="Küche 1.5", features=None, encoder=None, observations=None), "some.h5")
+
+
+@pytest.mark.parametrize("part", WRONG)
+def test_a_part_of_another_kind_is_named_and_no_folder_is_made(part: str, tmp_path: Path) -> None:
+    for value, problem in WRONG[part]:
+        with pytest.raises(SceneError, match=problem) as caught:
+            write_scene(replace(SCENE, **{part: value}), tmp_path / "out" / "some.h5")
+        assert "some.h5: " in str(caught.value) and "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"made_by": Provenance("x", notes={"a": np.zeros(3)})}, "made_by.notes is no JSON"),
+        ({"made_by": Provenance("x", versions={"a": object()})}, "made_by.versions is no JSON"),
+        ({"encoder": EncoderRecord("mine", "1", {"a": {1}})}, "encoder.settings is no JSON"),
+    ],
+)
+def test_what_no_file_can_keep_is_refused_before_a_folder_is_made(changes: dict, problem: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=problem):
+        write_scene(replace(SCENE, **changes), tmp_path / "out" / "some.h5")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_or_a_training_whose_scene_has_no_name_for_files_is_refused(tmp_path: Path) -> None:
+    write_scene(SCENE, tmp_path / "some.h5")
+    with pytest.raises(SceneError, match=r"\.\.\.h5: '\.\.' cannot be a scene's name"):
+        read_scene((tmp_path / "some.h5").rename(tmp_path / "...h5"))
+    with pytest.raises(SceneError, match=r"scenes: '\.\.' cannot be a scene's name"):
+        clearway.train(replace(corridor_scene(), name=".."), frames=80, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
