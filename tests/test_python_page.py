@@ -1,4 +1,4 @@
-"""Every block of docs/python.md, from top to bottom in one namespace."""
+"""Every block of docs/python.md, and of docs/reproduction.md in Python, from top to bottom in one namespace."""
 
 import sys
 import warnings
@@ -6,19 +6,24 @@ from functools import partial
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 import torch
 
+from clearway.errors import RunError
+from clearway.experiments import catalogue, reproduce
 from clearway.perception import encode
 from clearway.perception.random_resnet import ResNetShape
 from clearway.reward import COLLISION_AWARE
 from clearway.rooms import library
+from clearway.scenes.thor_v1 import write_scene
 from clearway.world.world import make_world
 from helpers.documents import ROOT, Block, code_blocks, shortened
 from helpers.made import grid_scene
 from helpers.plugin_package import write_package
+from helpers.small_setting import do_here
 
-PAGE = ROOT / "docs/python.md"
+PAGE, EXPERIMENTS = ROOT / "docs/python.md", ROOT / "docs/reproduction.md"
 FEWER = {
     "frames=600_000": "frames=4_000",
     "frames: int = 200_000": "frames: int = 4_000",
@@ -30,24 +35,28 @@ OFFERS = "[clearway.algorithms]\nreinforce = page:Reinforce\n"
 TWICE = {"step_limit=100, step_limit=500": "step_limit=100"}
 
 
-def run_page(changes: dict[str, str], site: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
-    """Run the blocks, as a module that a package offers an algorithm of; what they leave in their namespace."""
+def run_package(changes: dict[str, str], site: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
+    """Run the blocks of docs/python.md, as a module that a package offers an algorithm of; what they leave."""
     module = ModuleType("page")
     monkeypatch.setitem(sys.modules, "page", module)
     monkeypatch.syspath_prepend(str(write_package(site, package="my-package", entry_points=OFFERS)))
-    found = vars(module)
-    for block in python_blocks():
+    return run_page(changes, PAGE, vars(module))
+
+
+def run_page(changes: dict[str, str], page: Path, found: dict[str, object]) -> dict[str, object]:
+    """Run the blocks of a page in a namespace; what they leave in it."""
+    for block in python_blocks(page):
         here = {old: new for old, new in changes.items() if old in block.text}
         text = shortened(block.text, here)
         for old, new in TWICE.items():
             text = text.replace(old, new)
-        exec(compile(text, str(PAGE), "exec"), found)
+        exec(compile(text, str(page), "exec"), found)
     return found
 
 
-def python_blocks() -> list[Block]:
-    blocks = code_blocks(PAGE)
-    assert {block.language for block in blocks} == {"python", "toml"}
+def python_blocks(page: Path = PAGE) -> list[Block]:
+    blocks = code_blocks(page)
+    assert {block.language for block in blocks} <= {"python", "toml", "sh"}
     return [block for block in blocks if block.language == "python"]
 
 
@@ -66,10 +75,11 @@ def test_the_blocks_run_on_a_small_room(tmp_path: Path, monkeypatch, capsys) -> 
     monkeypatch.setattr(encode, "find_record", partial(encode.find_record, shape=small))
     monkeypatch.setenv("CLEARWAY_CACHE", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    left = run_page(SMALLER, tmp_path / "site", monkeypatch)
+    left = run_package(SMALLER, tmp_path / "site", monkeypatch)
     said = capsys.readouterr().out
     assert "learning_rate: no such setting" in said
     assert "quarters" in said and "beta -0.05" in said and "few-turns" in said
+    assert np.array_equal(left["office"].graph, left["scene"].graph)
     assert left["run"].folder is None
     assert {path.name for path in (tmp_path / "runs/bathroom").glob("evaluation.*")} == {
         "evaluation.json",
@@ -103,5 +113,25 @@ def test_the_blocks_run_on_the_room_itself(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("default")
-        left = run_page(FEWER, tmp_path / "site", monkeypatch)
+        left = run_package(FEWER, tmp_path / "site", monkeypatch)
     assert left["room"].cell_count == 45
+
+
+@pytest.mark.slow
+def test_runs_and_experiments_of_one_s_own(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(reproduce, "run_jobs", do_here)
+    monkeypatch.setattr(reproduce, "EXPERIMENTS", dict(reproduce.EXPERIMENTS))
+    monkeypatch.setattr(catalogue, "EXPERIMENTS", reproduce.EXPERIMENTS)
+    scene = grid_scene(3, width=6, depth=5, obstacle_share=0.1, feature_count=12, name="bathroom")
+    write_scene(scene, Path("scenes/bathroom.h5"))
+    fewer = {"frames=600_000": "frames=2_000, envs=10, width=16", "episodes=100": "episodes=1"}
+    left = run_page({**fewer, '"paper", dumps': '"smoke", dumps, frames=400'}, EXPERIMENTS, {"__name__": "__main__"})
+    assert "probability of improvement" in capsys.readouterr().out
+    (claim,) = left["found"].sections[0].claims
+    assert claim.p is not None and not left["found"].sections[0].missing
+    assert claim.text in Path("mine/report.md").read_text()
+    assert len(list(Path("mine/runs").iterdir())) == 8
+    monkeypatch.undo()
+    with pytest.raises(RunError, match=r"'mine' is none of table1, .* known to the program alone that adds them"):
+        reproduce.gather(tmp_path / "mine")

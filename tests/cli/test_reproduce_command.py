@@ -1,6 +1,6 @@
 import json
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,6 @@ from clearway.errors import SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
-from clearway.experiments.job import do
 from clearway.experiments.plan import Job
 from clearway.experiments.reproduce import ReproduceRequest
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
@@ -23,7 +22,7 @@ from clearway.learn.run_folder import RunFolder
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
 from helpers.small_runs import small_learner
-from helpers.small_setting import BUDGET, small_rooms
+from helpers.small_setting import BUDGET, do_here, small_rooms
 
 
 @contextmanager
@@ -33,12 +32,6 @@ def small_experiments() -> Iterator[None]:
         patch.setitem(BUDGETS, "smoke", BUDGET)
         patch.setattr(setting, "_budgeted", lambda name, budget: small_learner(setting.LEARNERS[name]))
         yield
-
-
-def do_here(out: Path, jobs: Sequence[Job], *, threads: int, **_: object) -> None:
-    """What `run_jobs` does, without processes of its own."""
-    for job in jobs:
-        do(out, job, threads)
 
 
 @pytest.fixture

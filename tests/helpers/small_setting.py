@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from clearway.experiments.budget import SMOKE
-from clearway.experiments.plan import SceneFile
+from clearway.experiments.job import do
+from clearway.experiments.plan import Job, SceneFile
 from clearway.experiments.setting import Setting
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.scenes.digest import scene_digest
@@ -46,3 +48,9 @@ def small_setting(out: Path, seeds: int = 2) -> Setting:
         seeds=tuple(range(seeds)),
         learners={name: small_learner(preset, frames=FRAMES) for name, preset in PRESETS.items()},
     )
+
+
+def do_here(out: Path, jobs: Sequence[Job], *, threads: int, **_: object) -> None:
+    """What `run_jobs` does, without processes of its own."""
+    for job in jobs:
+        do(out, job, threads)

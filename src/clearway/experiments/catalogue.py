@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from clearway.choices import ExperimentName
 from clearway.experiments import (
     ablations,
     analysis,
@@ -27,7 +26,7 @@ from clearway.experiments.setting import Setting
 
 @dataclass(frozen=True)
 class Experiment:
-    """One table or figure of the paper.
+    """One table or figure of the paper, or an experiment of one's own.
 
     Attributes:
         jobs: what must be trained and tried.
@@ -38,7 +37,7 @@ class Experiment:
     section: Callable[[Setting], Section]
 
 
-EXPERIMENTS: dict[ExperimentName, Experiment] = {
+EXPERIMENTS: dict[str, Experiment] = {
     "table1": Experiment(table1.jobs, table1.section),
     "fig3": Experiment(fig3.jobs, fig3.section),
     "fig4": Experiment(fig4.jobs, fig4.section),
@@ -53,3 +52,4 @@ EXPERIMENTS: dict[ExperimentName, Experiment] = {
     "ablations": Experiment(ablations.jobs, ablations.section),
     "off-grid": Experiment(off_grid.jobs, off_grid.section),
 }
+"""Those of the command line (`choices.ExperimentName`). A program may add its own, which it alone knows then."""

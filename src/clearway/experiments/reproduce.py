@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
-from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
+from clearway.choices import BudgetName, LearnerName, RoomName
 from clearway.errors import RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
@@ -46,7 +46,7 @@ class ReproduceRequest:
         ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
     """
 
-    names: Sequence[ExperimentName]
+    names: Sequence[str]
     out: Path
     budget: BudgetName
     dumps: Sequence[Path] = ()
@@ -144,16 +144,16 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
     Raises:
         ValueError: a name is unknown, or a number is none.
     """
-    choices: tuple[tuple[Sequence[str], Any], ...] = (
-        (request.names, ExperimentName),
-        ([request.budget], BudgetName),
-        (request.rooms or (), RoomName),
-        (request.learners, LearnerName),
+    choices: tuple[tuple[Sequence[str], Sequence[str], str], ...] = (
+        (request.names, tuple(EXPERIMENTS), "; others are known to the program alone that adds them"),
+        ([request.budget], get_args(BudgetName), ""),
+        (request.rooms or (), get_args(RoomName), ""),
+        (request.learners, get_args(LearnerName), ""),
     )
-    for given, kind in choices:
-        unknown = [name for name in given if name not in get_args(kind)]
+    for given, known, told in choices:
+        unknown = [name for name in given if name not in known]
         if unknown:
-            raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(get_args(kind))}")
+            raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(known)}{told}")
     for count, least in ((request.frames, 1), (request.seeds, 1), (request.first_seed, 0)):
         if count is not None and (type(count) is not int or count < least):
             raise ValueError(f"{count!r:.40} where a number of at least {least} is expected")
@@ -218,6 +218,6 @@ def _request_json(request: ReproduceRequest) -> dict[str, object]:
     return {**content, "dumps": [str(dump.resolve()) for dump in request.dumps]}
 
 
-def planned(setting: Setting, names: Sequence[ExperimentName]) -> list[Job]:
+def planned(setting: Setting, names: Sequence[str]) -> list[Job]:
     """All jobs of some experiments, each run once with all that it is to be tried on."""
     return merged(job for name in names for job in EXPERIMENTS[name].jobs(setting))
