@@ -31,7 +31,8 @@ def judged_less(text: str, what: str, first: np.ndarray, second: np.ndarray, tar
     Args:
         text: the claim.
         what: is compared, for example "collisions".
-        first, second: (R, M) scores.
+        first: (R, M) scores.
+        second: (R', M) scores.
         target_scene: (M,) int.
     """
     return _judged(text, what, first, second, target_scene)
@@ -55,7 +56,8 @@ def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray, *, lost: 
 
     Args:
         claim: of two kinds of agents.
-        first, second: (R, M) their success, 1 where every episode reached the target.
+        first: (R, M) success, 1 where every episode reached the target.
+        second: (R', M) success.
         lost: share of episodes by which one kind may arrive less often and still be told better.
     """
     if not first.size or not second.size:
