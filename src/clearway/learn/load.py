@@ -162,7 +162,9 @@ def _network(record: RunRecord, input_count: int, parameters: Mapping[str, Tenso
     return network
 
 
-def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -> list[Scene]:
+def run_scenes(
+    record: RunRecord, given: Sequence[Path | Scene] | None = None, *, tells_others: bool = True
+) -> list[Scene]:
     """The scenes of a run, in its order, from the files it names or from what is given: files, or scenes themselves.
 
     What is given may have another name, as a renamed file has; it gets the run's.
@@ -171,13 +173,15 @@ def run_scenes(record: RunRecord, given: Sequence[Path | Scene] | None = None) -
         RunError: a scene is missing or is not the one the run was trained on.
 
     Warns:
-        SceneWarning: the run was not trained in some of what is given, and they are left out.
+        SceneWarning: the run was not trained in some of what is given, and they are left out; unless `tells_others` is
+            False.
     """
     if given:
         loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given]
         places = [_place_among(loaded, wanted) for wanted in record.scenes]
         found = [_called(loaded[place], wanted.name) for place, wanted in zip(places, record.scenes, strict=True)]
-        _warn_of_others([scene.name for place, scene in enumerate(loaded) if place not in places])
+        if tells_others:
+            _warn_of_others([scene.name for place, scene in enumerate(loaded) if place not in places])
     else:
         paths = _places(record)
         found = [_in_file(wanted.name, paths.get(wanted.path or "", wanted.path)) for wanted in record.scenes]

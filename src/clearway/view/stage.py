@@ -195,7 +195,7 @@ def run_stage(folders: Sequence[Path], given: Sequence[Path | Scene] | None = No
     agents = []
     for folder, name in zip(folders, _names(folders), strict=True):
         trained = load_network(folder)
-        agents.append(StageRun(name, trained, tuple(run_scenes(trained.record, given))))
+        agents.append(StageRun(name, trained, tuple(run_scenes(trained.record, given, tells_others=False))))
         agents[-1].make_ready()
     first, *others = agents
     scenes = tuple(scene for scene in first.scenes if all(_has(other, scene) for other in others))
