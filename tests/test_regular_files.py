@@ -211,6 +211,7 @@ def test_a_way_past_the_door_would_be_noticed(source: str) -> None:
     assert openings(source, "module.py")
 
 
+@pytest.mark.slow
 def test_what_may_pass_beside_the_door_is_there() -> None:
     there = {(path.name, ast.unparse(node)) for path in PACKAGE.rglob("*.py") for node in _calls(path)}
     there |= {(path.name, ast.unparse(node.func)) for path in PACKAGE.rglob("*.py") for node in _calls(path)}

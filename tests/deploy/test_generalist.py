@@ -102,7 +102,7 @@ def test_the_file_makes_the_same_map_of_pictures_that_do_not_repeat(one_file) ->
     assert (maps[1].shut == maps[0].shut).all()
 
 
-@pytest.mark.parametrize("made", ["torch", "onnx"])
+@pytest.mark.parametrize("made", ["torch", pytest.param("onnx", marks=pytest.mark.slow)])
 def test_it_keeps_the_protocol(one_file, made) -> None:
     rng = np.random.default_rng(0)
     observations = [{RGB: PICTURES[rng.integers(len(PICTURES), size=3)]} for _ in range(4)]

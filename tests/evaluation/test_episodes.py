@@ -45,6 +45,7 @@ def test_random_walk_on_one_cell_takes_20_thirds_steps():
     assert np.array_equal(table.zone_steps[:, Zone.COLLISION], table.steps - table.reached)
 
 
+@pytest.mark.slow
 def test_random_walk_agrees_with_the_solved_hitting_time(world):
     episodes = 1000
     table = run_episodes(world, RandomWalk(), episodes_per_target=episodes, step_limit=100_000)

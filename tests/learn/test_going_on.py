@@ -79,6 +79,7 @@ def test_a_run_stops_once_every_target_is_solved(tmp_path: Path, monkeypatch: py
     assert frames_of(folder) == 560
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", [QLearning(), BC()], ids=["q-learning", "bc"])
 def test_whoever_solves_every_target_stops(algorithm: Learner, tmp_path: Path) -> None:
     scene = corridor_scene(5, feature_count=FEATURES)
