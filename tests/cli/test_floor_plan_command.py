@@ -3,6 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.rooms import library
+
 
 @pytest.fixture
 def plans(tmp_path: Path) -> Path:
@@ -55,6 +57,14 @@ def test_flags_of_encoding_are_refused_before_anything_is_rendered(clearway, pla
     answer = clearway("scenes", "import", "floor-plan", plans, *words, "--out", tmp_path / "scenes")
     assert answer.refusal(f"{words[0]} is {words[1]}")
     assert not (tmp_path / "scenes").exists() and not (tmp_path / "cache" / "scenes").exists()
+
+
+def test_an_encoder_that_cannot_be_had_is_told_before_anything_is_rendered(clearway, plans, tmp_path, monkeypatch):
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    monkeypatch.setattr(library, "cached_plan_scene", lambda *_, **__: pytest.fail("rendered"))
+    answer = clearway("scenes", "import", "floor-plan", plans, "--encoder", "nowhere/none", "--out", tmp_path / "out")
+    assert answer.code == 2 and "encoder 'nowhere/none': is not in the cache" in answer.err
+    assert not (tmp_path / "out").exists()
 
 
 def test_every_plan_becomes_a_scene_that_can_be_trained(clearway, plans, tmp_path, small):

@@ -55,7 +55,7 @@ def generate(
     """
     from clearway.generation.cached import cached_requests
     from clearway.generation.files import NO_ENCODER, Seen, generate_scenes, scene_path
-    from clearway.perception.encode import check_sees
+    from clearway.perception.encode import check_encoder
     from clearway.progress import work_progress
     from clearway.ray_cluster import kept_connected
 
@@ -71,7 +71,7 @@ def generate(
     seen.check()
     name = as_word("encoder", encoder)
     if name != NO_ENCODER:
-        check_sees(name, sensors)
+        check_encoder(name, sensors)
     crew = None if workers is None else as_whole("workers", workers, 1)
     as_whole("encoder_seed", encoder_seed, 0, MAX_SEED)
     requests = [Request(chosen_kind, chosen_split, chosen_seed, number) for number in range(wanted)]

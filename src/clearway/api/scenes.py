@@ -188,7 +188,7 @@ def build_room(
         ArgumentError: there is no such room, or a number or path is none.
         ClearwayError: there is no such sensor, rendering is not possible here, or the encoder cannot be had.
     """
-    from clearway.perception.encode import check_sees
+    from clearway.perception.encode import check_encoder
     from clearway.rooms.library import cached_room_scene
 
     room, room_seed = as_choice("name", name, ROOM_NAMES), as_seed("seed", seed)
@@ -199,7 +199,7 @@ def build_room(
     as_seed("encoder_seed", encoder_seed)  # before the minute that building takes
     check_names(sensors)
     if isinstance(encoder, str):
-        check_sees(encoder, sensors)
+        check_encoder(encoder, sensors)
     else:
         own_encoder(encoder)
     scene = cached_room_scene(room, room_seed, sensors=tuple(sensors), workers=count, progress=show_progress)

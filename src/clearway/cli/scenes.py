@@ -44,7 +44,7 @@ class Build:
 
     def run(self) -> None:
         """Build and write."""
-        from clearway.perception import check_sees, encode_scenes
+        from clearway.perception import check_encoder, encode_scenes
         from clearway.rooms import ROOM_NAMES
         from clearway.rooms.library import cached_room_scene
         from clearway.scenes.sensors import check_names
@@ -52,7 +52,7 @@ class Build:
         check_seeds(seed=self.seed, encoder_seed=self.encoder_seed)
         check_at_least(1, workers=self.workers)
         check_names(self.sensors)
-        check_sees(self.encoder, self.sensors)
+        check_encoder(self.encoder, self.sensors)
         in_folder = self.out.is_dir() or self.out.suffix.lower() not in SCENE_SUFFIXES
         if self.room == "all" and not in_folder:
             raise ClearwayError(f"{self.out}: --room all makes four files. Give a folder with --out")

@@ -65,10 +65,16 @@ def find_record(
     return plugged.make_encoder(plugin).record if plugin else pretrained.find_record(name)
 
 
-def check_sees(encoder: str, sensors: Sequence[str]) -> None:
-    """Check that an encoder's sensor is among those that are to be rendered. Raises EncoderError."""
+def check_encoder(encoder: str, sensors: Sequence[str]) -> None:
+    """Check, before what takes long, that an encoder can be had, and its sensor is among those to be rendered.
+
+    Raises:
+        EncoderError, PluginError: as of `find_record`; or its sensor is not rendered.
+    """
     if encoder == depth_grid.NAME and DEPTH not in sensors:
         raise EncoderError(f"encoder {encoder} sees depth, and it is not rendered. Add --sensors {RGB} {DEPTH}")
+    if encoder != RANDOM:
+        find_record(encoder, ())
 
 
 def encoder_from_record(record: EncoderRecord) -> Encoder:

@@ -72,14 +72,14 @@ class ImportFloorPlan:
 
     def _render(self, plans: Sequence[FloorPlan]) -> None:
         """Make rooms, encode their pictures and write."""
-        from clearway.perception import check_sees
+        from clearway.perception import check_encoder
         from clearway.rooms.library import cached_plan_scene
         from clearway.rooms.plans.buildable import check_can_be_rendered
         from clearway.scenes.sensors import check_names
 
         self.encoding.check()
         check_names(self.sensors)
-        check_sees(self.encoding.encoder, self.sensors)
+        check_encoder(self.encoding.encoder, self.sensors)
         for plan in plans:  # all of them before anything that takes minutes
             check_can_be_rendered(plan, self.seed)
         say_begun(f"{self.file}: rendering and encoding {', '.join(plan.name for plan in plans[:TOLD_PLANS])}")

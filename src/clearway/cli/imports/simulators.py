@@ -90,13 +90,13 @@ class ImportMjcf:
 
     def run(self) -> None:
         """Compile, find the free cells, render, encode and write."""
-        from clearway.perception import check_sees
+        from clearway.perception import check_encoder
         from clearway.rooms.build import check_mujoco
 
         check_positive(step=self.step, agent_radius=self.agent_radius, agent_height=self.agent_height)
         check_finite(floor_height=self.floor_height, camera_height=self.camera_height)
         self.encoding.check()
-        check_sees(self.encoding.encoder, self.sensors)
+        check_encoder(self.encoding.encoder, self.sensors)
         check_mujoco()
         from clearway.importers.mjcf import read_mjcf
         from clearway.importers.mjcf_floor import FloorChoice
