@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.bootstrap import RESAMPLES, intervals
+from clearway.experiments.correction import LEVEL, holm
 from clearway.perception.encode import find_record
 from clearway.perception.eyes import NAME
 from helpers.published import DOCS, assert_written, numbers, words_of
@@ -18,13 +19,34 @@ ARRIVALS = ("false_arrivals", "missed_arrivals")
 SHARES = ("success", "success_4x", "spl")
 THIRD, FOURTH, FIFTH, SIXTH = (f"generalist-test-{number}.json" for number in ("third", "fourth", "fifth", "sixth"))
 TOURS, WALKERS, AGAIN = "generalist-tours.json", "walkers-test.json", "off-grid-again.json"
+FROZEN, ELSEWHERE = "generalist-frozen.json", "walkers-elsewhere.json"
+NO_MEMORY, NO_CELLS, NEAREST = "without memory", "without the map's cells", "nearest picture of the tour"
 EARLIER_WALKERS = "recurrent-test.json"
 THEIRS = ("RecurrentPPO, 16 x 128", "RecurrentPPO, 96 x 32")
 KINDS = ("collision-aware", "shortest", "bump", "clearance")
 ROWS = [
-    (FIFTH, "rooms", "generalist", "| rooms | 100 % | 93.8"),
+    (FROZEN, "rooms", "generalist", "| rooms | 100 % | 93.8 % (92.7-94.8)"),
+    (FROZEN, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing | 100 % | 92.8 % (91.7-94.0)"),
+    (FROZEN, "rooms", "random", "| rooms, random walk | 75.2 % (71.8-78.7) | 8.2 % (7.0-9.5)"),
+    (FROZEN, "flats", "generalist", "| flats | 89.6 % (86.3-92.5) | 43.2 % (39.2-47.5)"),
+    (FROZEN, "flats", "random", "| flats, random walk | 18.9 % (16.5-21.4) | 1.8 % (0.9-2.7)"),
+    (FROZEN, "rooms-tour", "generalist", "| rooms, after a tour |"),
+    (FROZEN, "flats-tour", "generalist", "| flats, after a tour |"),
+    (FROZEN, "rooms-perturbed-tour", "generalist", "| toured, perturbed |"),
+    (FROZEN, "held-out-perturbed-tour", "generalist", "| toured, perturbed, targets held out |"),
+    (FROZEN, "without", "generalist", "| not toured, all of it |"),
+    (FROZEN, "without", NO_MEMORY, "| not toured, without memory |"),
+    (FROZEN, "without-tour", "generalist", "| after a tour, all of it |"),
+    (FROZEN, "without-tour", NO_MEMORY, "| after a tour, without memory |"),
+    (FROZEN, "without-tour", NO_CELLS, "| after a tour, without the map's cells |"),
+    (FROZEN, "without-tour", NEAREST, "| after a tour, nearest picture |"),
+    (FROZEN, "without-perturbed-tour", "generalist", "| after a tour, perturbed, all of it |"),
+    (FROZEN, "without-perturbed-tour", NO_MEMORY, "| after a tour, perturbed, without memory |"),
+    (FROZEN, "without-perturbed-tour", NO_CELLS, "| after a tour, perturbed, without the map's cells |"),
+    (FROZEN, "without-perturbed-tour", NEAREST, "| after a tour, perturbed, nearest picture |"),
+    (FIFTH, "rooms", "generalist", "| rooms | 100 % | 93.8 % (92.7-94.9)"),
     (FIFTH, "rooms", "collisions cost nothing", "| rooms, collisions cost nothing | 100 % | 93.2"),
-    (FIFTH, "rooms", "random", "| rooms, random walk |"),
+    (FIFTH, "rooms", "random", "| rooms, random walk | 72.9"),
     (FIFTH, "rooms-eyes-1", "generalist", "| rooms, eyes of seed 1 | 100 % (99.8-100) | 94.0"),
     (FIFTH, "rooms-eyes-2", "generalist", "| rooms, eyes of seed 2 | 100 % | 93.7"),
     (FIFTH, "flats", "generalist", "| flats | 91.5"),
@@ -110,15 +132,15 @@ def test_a_row_of_the_page_is_what_the_record_comes_to(record: str, part: str, a
             for written, value in zip(interval, ends(values), strict=bool(interval)):
                 assert_written(written, value, f"interval of {name} in {row}")
         for name, written in zip(ARRIVALS, numbers("".join(cells[len(COLUMNS) :])), strict=False):
-            told = np.array([scene[name] for scene in scenes], float)  # NaN where no episode ended at a target
+            told = np.array([scene.get(name) for scene in scenes], float)  # NaN where no episode ended at a target
             assert_written(written, 100 * float(np.nanmean(told)), f"{name} in {row}")
 
 
 def test_success_with_a_word_of_it_is_what_the_records_come_to() -> None:
-    lines = PAGE.partition("| no tour | after a tour, by an earlier version")[2].partition("\n\n")[0].splitlines()[2:]
+    lines = PAGE.partition("but in the last row | no tour | after a tour |")[2].partition("\n\n")[0].splitlines()[2:]
     rows = {
-        "rooms": ((FIFTH, "rooms"), (THIRD, "rooms-tour")),
-        "flats": ((FIFTH, "flats"), (THIRD, "flats-tour")),
+        "rooms": ((FROZEN, "rooms"), (FROZEN, "rooms-tour")),
+        "flats": ((FROZEN, "flats"), (FROZEN, "flats-tour")),
         "real plans": ((SIXTH, "real"), (THIRD, "real-tour")),
         "off the grid, everything perturbed": ((AGAIN, "live: all, strength 1"),),
     }
@@ -134,16 +156,20 @@ def test_success_with_a_word_of_it_is_what_the_records_come_to() -> None:
 
 
 def test_tours_come_to_as_many_poses_and_collisions_as_is_said() -> None:
-    said = words_of(
+    pattern = (
         r"come to (\d+) % of the poses of rooms, (\d+) % of flats, (\d+) % of real plans, "
-        r"and have (\d+), (\d+) and (\d+) collisions themselves",
-        PAGE,
+        r"and have (\d+), (\d+) and (\d+) collisions themselves"
     )
-    record = json.loads((DOCS / "figures" / THIRD).read_text(encoding="utf-8"))
-    tours = [record[part]["generalist"]["tour"] for part in ("rooms-tour", "flats-tour", "real-tour")]
-    found = [100 * tour["poses"] for tour in tours] + [tour["collisions"] for tour in tours]
-    for written, value in zip(said.groups(), found, strict=True):
-        assert_written(written, value, said[0])
+    frozen = (
+        r"come to (\d+) % of the poses of rooms and (\d+) % of flats, and have (\d+) and (\d+) collisions themselves"
+    )
+    parts = ["rooms-tour", "flats-tour", "real-tour"]
+    for said, name, asked in ((words_of(frozen, PAGE), FROZEN, parts[:2]), (words_of(pattern, PAGE), THIRD, parts)):
+        record = json.loads((DOCS / "figures" / name).read_text(encoding="utf-8"))
+        tours = [record[part]["generalist"]["tour"] for part in asked]
+        found = [100 * tour["poses"] for tour in tours] + [tour["collisions"] for tour in tours]
+        for written, value in zip(said.groups(), found, strict=True):
+            assert_written(written, value, said[0])
 
 
 def test_who_finds_poses_together_beats_the_nearest_picture_by_as_much_as_is_said() -> None:
@@ -163,7 +189,7 @@ def mean(record: str, part: str | None, agents: tuple[str, ...], name: str) -> f
 
 
 THE = ("generalist",)
-THREE = ("success", "spl", "collisions")
+THREE, TOURED = ("success", "spl", "collisions"), ("success_4x", "spl", "collisions")
 MOVES, TURNS = "live: move ± 0.05 m", "live: turn ± 5°"
 ALONE = (
     MOVES,
@@ -180,7 +206,7 @@ UNPERTURBED, OBSTACLE, ALL = "live: none", "live: new obstacle", "live: all, str
 @pytest.mark.parametrize(
     ("begins", "figures"),
     [
-        ("| rooms, no tour:", [(FIFTH, "rooms", THE, name) for name in THREE]),
+        ("| rooms, no tour:", [(FROZEN, "rooms", THE, name) for name in THREE]),
         (
             "| the same by the eyes",
             [(FIFTH, f"rooms-eyes-{seed}", THE, name) for seed in (1, 2) for name in THREE],
@@ -189,19 +215,14 @@ UNPERTURBED, OBSTACLE, ALL = "live: none", "live: new obstacle", "live: all, str
             "| agents that learn to walk",
             [(WALKERS, None, tuple(f"collision-aware-{seed}" for seed in range(3)), name) for name in THREE],
         ),
-        (
-            "| rooms after a tour:",
-            [(TOURS, "rooms-perturbed-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
-        ),
-        ("| known rooms after", [(TOURS, "held-out-perturbed-tour", THE, name) for name in ("success_4x", "spl")]),
-        ("| flats, no tour:", [(FIFTH, "flats", THE, name) for name in ("success", "spl")]),
-        ("| flats after a tour,", [(THIRD, "flats-tour", THE, name) for name in ("success", "spl")]),
+        ("| rooms after a tour:", [(FROZEN, "rooms-tour", THE, name) for name in TOURED]),
+        ("| rooms after a tour, everything", [(FROZEN, "rooms-perturbed-tour", THE, name) for name in TOURED]),
+        ("| known rooms after", [(FROZEN, "held-out-perturbed-tour", THE, name) for name in TOURED[:2]]),
+        ("| flats, no tour:", [(FROZEN, "flats", THE, name) for name in ("success", "spl")]),
+        ("| flats after a tour:", [(FROZEN, "flats-tour", THE, name) for name in ("success", "spl")]),
         ("| off the grid, a new obstacle:", [(SIXTH, OBSTACLE, THE, "success")]),
         ("| real plans, moves of", [(SIXTH, "real", THE, name) for name in THREE]),
-        (
-            "| twelve of 48 real plans",
-            [(THIRD, "real-tour", THE, name) for name in ("success_4x", "spl", "collisions")],
-        ),
+        ("| twelve of 48 real plans", [(THIRD, "real-tour", THE, name) for name in TOURED]),
     ],
 )
 def test_the_summary_says_what_the_records_say(
@@ -271,14 +292,51 @@ def test_walkers_and_the_generalist_are_compared_in_the_same_rooms() -> None:
         assert_written(written, float(value), said[0])
 
 
-def test_anticipation_spares_as_many_collisions_as_is_said() -> None:
-    careless, careful = (
-        np.array([scene["collisions"] for scene in scenes_of(FIFTH, "rooms", agent)])
-        for agent in ("collisions cost nothing", "generalist")
-    )
-    said = words_of(r"spares (\S+) collisions an\s+episode \((\S+) to ([\d.]+)\)", PAGE)
-    for written, value in zip(said.groups(), ((careless - careful).mean(), *ends(careless - careful)), strict=True):
+@pytest.mark.parametrize(
+    ("record", "pattern"),
+    [
+        (FROZEN, r"spares (\S+) collisions an episode \((\S+) to (\S+)\), and costs (\S+) points of SPL \((\S+) to"),
+        (FIFTH, r"spares (\S+) collisions an\s+episode \((\S+) to (\S+)\), and costs (\S+) points of SPL\. Its rival"),
+    ],
+)
+def test_anticipation_spares_as_many_collisions_as_is_said(record: str, pattern: str) -> None:
+    said = words_of(pattern, PAGE)
+    apart = {}
+    for name, scale in (("collisions", 1), ("spl", 100)):
+        careless, careful = (
+            scale * np.array([scene[name] for scene in scenes_of(record, "rooms", agent)])
+            for agent in ("collisions cost nothing", "generalist")
+        )
+        apart[name] = careless - careful
+    told = [apart["collisions"].mean(), *ends(apart["collisions"]), apart["spl"].mean(), ends(apart["spl"])[0]]
+    for written, value in zip(said.groups(), told, strict=False):
         assert_written(written, float(value), said[0])
+
+
+def test_what_memory_and_map_bring_is_judged_from_the_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    benchmarks = DOCS.parent / "benchmarks"
+    monkeypatch.syspath_prepend(benchmarks)
+    p_of_mean = runpy.run_path(str(benchmarks / "by_scene.py"))["p_of_mean"]
+    page = PAGE.partition("#### What memory and map bring")[2].partition("\n### ")[0]
+    judged = {
+        "without": {"memory": NO_MEMORY},
+        "without-tour": {"memory": NO_MEMORY, "cells": NO_CELLS, "picture": NEAREST},
+        "without-perturbed-tour": {"memory": NO_MEMORY, "cells": NO_CELLS, "picture": NEAREST},
+    }
+    begins = ("| no tour |", "| a tour |", "| a tour, perturbed |")
+    lines = [line for line in page.splitlines() if line.startswith(begins)]
+    assert len(lines) == sum(map(len, judged.values()))
+    for part, taken in judged.items():
+        own = np.array([scene["spl"] for scene in scenes_of(FROZEN, part, "generalist")])
+        apart = [own - np.array([scene["spl"] for scene in scenes_of(FROZEN, part, agent)]) for agent in taken.values()]
+        for difference, p in zip(apart, holm([p_of_mean(values) for values in apart]), strict=True):
+            _, what, points, written, verdict = lines.pop(0).strip("| ").split(" | ")
+            assert what.split()[-1] in taken
+            figures = (difference.mean(), *ends(difference))
+            for told, value in zip(re.findall(r"-?[\d.]+", points), figures, strict=True):
+                assert_written(told, 100 * float(value), points)
+            assert_written(written, p, points)
+            assert verdict == ("yes" if p <= LEVEL and difference.mean() > 0 else "undecided")
 
 
 def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -451,3 +509,56 @@ def test_the_shipped_eyes_see_as_their_record_says() -> None:
     scales = {"place_m": 1, "turn_deg": 1, "poses": 100, "free_ahead": 100, "free_ahead_constant": 100}
     for written, (name, scale) in zip(said.groups(), scales.items(), strict=True):
         assert_written(written, scale * float(np.mean(told[name])), name)
+
+
+@pytest.mark.parametrize(
+    ("part", "begins"),
+    [
+        ("rooms", "| frozen rooms 0 to 49 |"),
+        ("rooms-perturbed", "| the same, everything perturbed |"),
+        ("flats", "| the 50 frozen flats |"),
+    ],
+)
+def test_walkers_walk_elsewhere_as_their_record_says(part: str, begins: str) -> None:
+    (line,) = [line for line in PAGE.splitlines() if line.startswith(begins)]
+    runs = [scenes_of(ELSEWHERE, part, f"aware-{seed}") for seed in range(3)]
+    *cells, arrivals = line.strip("| ").split(" | ")[1:]
+    for name, cell in zip(COLUMNS, cells, strict=True):
+        of_seeds = [np.mean([scene[name] for scene in run]) * (100 if name in SHARES else 1) for run in runs]
+        for written, value in zip(numbers(cell), (np.mean(of_seeds), min(of_seeds), max(of_seeds)), strict=True):
+            assert_written(written, float(value), f"{name} in {line}")
+    for name, written in zip(ARRIVALS, numbers(arrivals), strict=True):
+        of_seeds = [np.nanmean([np.nan if scene.get(name) is None else scene[name] for scene in run]) for run in runs]
+        assert_written(written, 100 * float(np.mean(of_seeds)), f"{name} in {line}")
+
+
+def test_walkers_keep_as_much_of_their_success_under_perturbations_as_is_said() -> None:
+    agents = tuple(f"aware-{seed}" for seed in range(3))
+    perturbed, plain = (mean(ELSEWHERE, part, agents, "success_4x") for part in ("rooms-perturbed", "rooms"))
+    said = words_of(r"within 4 x is (\d+) % of what it is with nothing perturbed", PAGE)
+    assert_written(said[1], 100 * perturbed / plain, said[0])
+
+
+def test_walkers_grow_as_their_record_says() -> None:
+    page = PAGE.partition("### How walkers grow")[2].partition("\n## ")[0]
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if re.match(r"\| \d+ \| \d M", line)]
+    runs = {f"rooms{count}-0": (count, 4) for count in (20, 40, 80)}
+    runs |= {"aware-0": (160, 4), "frames2-0": (160, 2), "frames1-0": (160, 1)}
+    asked = [("curve-rooms", name) for name in THREE] + [("curve-flats", name) for name in THREE[:2]]
+    means = {}
+    for (run, (rooms, frames)), (told_rooms, told_frames, *cells) in zip(runs.items(), lines, strict=True):
+        assert (int(told_rooms), told_frames) == (rooms, f"{frames} M")
+        for (part, name), cell in zip(asked, cells, strict=True):
+            values = np.array([scene[name] for scene in scenes_of(ELSEWHERE, part, run)])
+            values = values * (100 if name in SHARES else 1)
+            means[run, part, name] = values.mean()
+            for written, value in zip(numbers(cell), (values.mean(), *ends(values)), strict=True):
+                assert_written(written, float(value), f"{name} of {run}")
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ten times as many")]
+    which = [("rooms", 0, [*runs][:4]), ("frames", 1, [*runs][3:])]
+    for (what, place, chosen), (label, *cells) in zip(which, lines, strict=True):
+        assert label == f"ten times as many {what}"
+        for (part, name), cell in zip(asked, cells, strict=True):
+            x = np.log10([runs[run][place] for run in chosen])
+            slope = float(np.polyfit(x, [means[run, part, name] for run in chosen], 1)[0])
+            assert_written(cell.strip("+").split()[0], slope, f"{name} with {label}")
