@@ -167,7 +167,9 @@ def test_resume_begins_where_there_is_no_run_or_no_checkpoint_yet(tmp_path: Path
     folder.write_record(replace(record, versions={"torch": "0.1"}, hardware={"threads": 7}, command=("elsewhere",)))
     folder.metrics_path.write_text('{"frames": 80, "seconds": 1, "loss": 1}\n')
     train.train(request, folder.path, resume=True)
-    assert folder.read_record() == record  # all of it was made here
+    found = folder.read_record()
+    assert found.begun is not None and found.begun >= record.begun
+    assert replace(found, begun=record.begun) == record  # all of it was made here
     new = train.train(request, tmp_path / "new", resume=True)
     assert without_seconds(folder) == without_seconds(new)
     assert len(new.metrics()) == 2
