@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from operator import index
+from typing import Any
 
 from torch import Tensor
 
@@ -106,10 +107,10 @@ class ForeignTrainer:
         if not isinstance(name, str) or name in OWN_FIGURES:
             raise self._fault(f"its figure {name!r:.40} has a name that is no text, or one of clearway's own")
         with faults_of(self.learner, f"its figure {name:.40}"):
-            number = value.item() if hasattr(value, "item") else value  # a number of NumPy's or PyTorch's
+            number: Any = value.item() if hasattr(value, "item") else value  # a number of NumPy's or PyTorch's
         if not fits(number, float):
             raise self._fault(f"its figure {name:.40} is {number!r:.40}, expected a finite number")
-        return number  # type: ignore[return-value]
+        return float(number)
 
     def tensors(self) -> dict[str, Tensor]:
         """See `Learning`; no two share memory, so that all can be written."""
