@@ -17,6 +17,7 @@ from clearway.cli.main import main
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import load_run_in_scene
 from clearway.errors import AgentError, EncoderError, PluginError
+from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.presets import PRESETS
@@ -63,6 +64,7 @@ def test_the_built_in_names_are_those_that_there_are() -> None:
     assert BUILT_IN["importers"] == tuple(importers)
     assert set(BUILT_IN["rewards"]) == set(REWARDS)
     assert BUILT_IN["algorithms"] == (*ALGORITHMS, *PRESETS)
+    assert BUILT_IN["experiments"] == (*EXPERIMENTS, "all")
     assert set(BUILT_IN) == set(KINDS)
 
 
@@ -78,6 +80,7 @@ def test_one_of_each_kind_is_listed_after_our_own(package, tmp_path) -> None:
         ("agents", "still"),
         ("importers", "pair"),
         ("algorithms", "hasty"),
+        ("experiments", "twice"),
     }
     assert {row["version"] for row in rows if row["package"] == "tiny-plugins"} == {"1.2"}
     assert not any(row["problem"] for row in rows)
@@ -140,7 +143,7 @@ def test_unknown_names_are_answered_with_those_of_other_packages_too(here) -> No
         agent_maker("stil")
     with pytest.raises(RewardError, match=r"'deer' is unknown\. Did you mean dear\? .*'clearance', 'dear', a Reward"):
         reward_named("deer")
-    assert [offered(kind) for kind in KINDS] == [["mean-colour"], ["dear"], ["still"], ["pair"], ["hasty"]]
+    assert [offered(kind) for kind in KINDS] == [["mean-colour"], ["dear"], ["still"], ["pair"], ["hasty"], ["twice"]]
 
 
 @pytest.mark.slow

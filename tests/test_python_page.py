@@ -121,8 +121,7 @@ def test_the_blocks_run_on_the_room_itself(tmp_path: Path, monkeypatch) -> None:
 def test_runs_and_experiments_of_one_s_own(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(reproduce, "run_jobs", do_here)
-    monkeypatch.setattr(reproduce, "EXPERIMENTS", dict(reproduce.EXPERIMENTS))
-    monkeypatch.setattr(catalogue, "EXPERIMENTS", reproduce.EXPERIMENTS)
+    monkeypatch.setattr(catalogue, "EXPERIMENTS", dict(catalogue.EXPERIMENTS))
     scene = grid_scene(3, width=6, depth=5, obstacle_share=0.1, feature_count=12, name="bathroom")
     write_scene(scene, Path("scenes/bathroom.h5"))
     fewer = {"frames=600_000": "frames=2_000, envs=10, width=16", "episodes=100": "episodes=1"}
@@ -133,5 +132,5 @@ def test_runs_and_experiments_of_one_s_own(tmp_path: Path, monkeypatch, capsys) 
     assert claim.text in Path("mine/report.md").read_text()
     assert len(list(Path("mine/runs").iterdir())) == 8
     monkeypatch.undo()
-    with pytest.raises(RunError, match=r"'mine' is none of table1, .* known to the program alone that adds them"):
+    with pytest.raises(RunError, match=r"experiment mine: is not known here\. Use one of table1"):
         reproduce.gather(tmp_path / "mine")

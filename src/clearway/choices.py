@@ -12,23 +12,6 @@ RoomName = Literal["bathroom", "bedroom", "living_room", "kitchen"]
 SensorName = Literal["rgb", "depth"]
 """See `clearway.scenes.sensors`."""
 
-ExperimentName = Literal[
-    "table1",
-    "fig3",
-    "fig4",
-    "table2",
-    "table3",
-    "fig5",
-    "fig6",
-    "analysis",
-    "memory",
-    "zones-or-step",
-    "zone-levels",
-    "ablations",
-    "off-grid",
-]
-"""See `clearway.experiments.catalogue`."""
-
 BudgetName = Literal["smoke", "paper"]
 """See `clearway.experiments.budget`."""
 

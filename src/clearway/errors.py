@@ -18,6 +18,11 @@ def reason_of(fault: BaseException) -> str:
     return " ".join(str(told).split())[:200] or type(fault).__name__
 
 
+def kind_and_reason(fault: BaseException) -> str:
+    """What code of another has raised, in one line, such as "ValueError: no camera"."""
+    return f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+
+
 def install_hint(extra: str) -> str:
     """How to install one of our extras into the Python that runs: from the clone that this is, else from one."""
     clone = Path(__file__).parents[2]

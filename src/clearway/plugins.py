@@ -1,4 +1,4 @@
-"""Encoders, rewards, agents, importers and algorithms from other packages, by entry points.
+"""Encoders, rewards, agents, importers, algorithms and experiments from other packages, by entry points.
 
 A package offers one in its `pyproject.toml`, by a name of its own:
 
@@ -14,9 +14,9 @@ import sys
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from clearway.errors import PluginError
+from clearway.errors import PluginError, kind_and_reason
 
-Kind = Literal["encoders", "rewards", "agents", "importers", "algorithms"]
+Kind = Literal["encoders", "rewards", "agents", "importers", "algorithms", "experiments"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 BUILT_IN: dict[Kind, tuple[str, ...]] = {
@@ -25,6 +25,10 @@ BUILT_IN: dict[Kind, tuple[str, ...]] = {
     "agents": ("random", "shortest path"),
     "importers": ("thor-v1", "floor-plan", "images", "savn", "avd", "ai2thor", "mjcf", "miniworld"),
     "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "recurrent", "adapt", "default", "paper", "paper-a3c"),
+    "experiments": (
+        *("table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis", "memory"),
+        *("zones-or-step", "zone-levels", "ablations", "off-grid", "all"),
+    ),
 }
 """Names that are ours, which no other package can take."""
 
@@ -109,7 +113,7 @@ def load_plugin(plugin: Plugin) -> object:
     try:
         return EntryPoint(plugin.name, plugin.target, f"clearway.{plugin.kind}").load()
     except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
-        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        reason = kind_and_reason(fault)
         remedy = f"Ask its authors, or uninstall {plugin.package}"
         raise PluginError(f"{plugin}: {plugin.target} cannot be imported ({reason}). {remedy}") from fault
 
@@ -144,5 +148,5 @@ def imported(path: str) -> object:
     try:
         return getattr(import_module(module), name)
     except Exception as fault:  # another's code: anything can come of it
-        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        reason = kind_and_reason(fault)
         raise PluginError(f"{path}: cannot be loaded ({reason}). Check the module and the name") from fault

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from clearway.errors import ClearwayError, PluginError
+from clearway.errors import ClearwayError, PluginError, kind_and_reason
 from clearway.plugins import find_plugin, imported, load_plugin, offered
 from clearway.spelling import did_you_mean
 
@@ -258,7 +258,7 @@ class Reward:
         try:
             earned = term(before, moves)
         except Exception as fault:
-            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            reason = kind_and_reason(fault)
             kind = type(term).__name__
             raise RewardError(f"reward {self.name}: the term {kind} failed ({reason}). Correct the term") from fault
         return self._checked(term, earned, before.shape)
@@ -404,7 +404,7 @@ def _made(source: str, found: object) -> Reward:
     try:
         made = found() if callable(found) else found
     except Exception as fault:  # likewise
-        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        reason = kind_and_reason(fault)
         raise RewardError(f"{source}: cannot be made ({reason}). Correct it") from fault
     if not isinstance(made, Reward):
         raise RewardError(f"{source}: gives {made!r:.60}, expected a clearway.Reward. Correct it")

@@ -10,7 +10,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from clearway.choices import BudgetName, ExperimentName, LearnerName
+from clearway.choices import BudgetName, LearnerName
 from clearway.errors import SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
@@ -21,6 +21,7 @@ from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
+from helpers.plugin_package import write_package
 from helpers.small_runs import small_learner
 from helpers.small_setting import BUDGET, do_here, small_rooms
 
@@ -200,8 +201,31 @@ def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
         "own-goals": own_goals,
     } == setting.LEARNERS
     assert set(setting.LEARNERS) == set(get_args(LearnerName))
-    assert set(EXPERIMENTS) == set(get_args(ExperimentName))
     assert set(BUDGETS) == set(get_args(BudgetName))
+
+
+def test_the_command_s_help_names_all_experiments(clearway) -> None:
+    told = clearway("reproduce", "--help").out
+    assert all(name in told for name in EXPERIMENTS)
+
+
+@pytest.mark.parametrize("names", [("fig9",), ("all", "fig9"), ("fig5", "fig9")])
+def test_an_experiment_that_nobody_offers_is_refused(clearway, tmp_path: Path, names: tuple[str, ...]) -> None:
+    assert clearway("reproduce", *names, "--out", tmp_path / "out").refusal("experiment fig9", "table1", "plugins")
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_package_s_experiment_stands_after_ours_in_the_report(
+    clearway, first, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(write_package(tmp_path / "site")))
+    both = clearway("reproduce", "twice", *first.words, "--learners", "default", "--out", out)
+    assert [section["name"] for section in both.json["sections"]] == ["fig5", "twice"]
+    assert not both.json["sections"][1]["missing"]
+    assert (out / "tables" / "twice_seeds.csv").read_text().splitlines() == ["seed", "0"]
+    assert clearway("report", out, "--json").json["sections"] == both.json["sections"]
+    monkeypatch.undo()
+    assert clearway("report", out).refusal("reproduction.json: experiment twice", "not known here", "plugins")
 
 
 def test_no_experiment_is_refused(clearway, tmp_path: Path) -> None:
@@ -265,8 +289,7 @@ def test_what_cannot_be_asked_of_the_scenes_is_refused_and_not_kept(
         raise SceneError("bathroom", "no", "Leave tables 2 and 3 out")
 
     monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
-    tables = {**reproduce.EXPERIMENTS, "table2": replace(reproduce.EXPERIMENTS["table2"], jobs=refused)}
-    monkeypatch.setattr(reproduce, "EXPERIMENTS", tables)
+    monkeypatch.setitem(EXPERIMENTS, "table2", replace(EXPERIMENTS["table2"], jobs=refused))
     out = tmp_path / "out"
     request = ReproduceRequest(names=("table2",), out=out, budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1)
     with pytest.raises(SceneError, match="Leave tables 2 and 3 out"):

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clearway.choices import ExperimentName
 from clearway.evaluation.episode_files import read_episodes
 from clearway.evaluation.episodes import EpisodeTable, episode_starts
 from clearway.evaluation.optimum import world_yardsticks
@@ -103,7 +102,7 @@ def test_before_any_run_every_section_says_what_is_missing(
 def test_trials_on_unseen_targets_end_when_success_is_settled(
     setting: Setting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def caps(*names: ExperimentName) -> set[int]:
+    def caps(*names: str) -> set[int]:
         patient = replace(setting, budget=replace(setting.budget, step_limit=10_000))
         return {trial.step_limit for job in planned(patient, names) for trial in job.trials}
 
@@ -254,7 +253,7 @@ def test_every_claim_names_its_learner(sections: dict[str, Section]) -> None:
 def test_the_paper_s_further_claims_are_judged(setting: Setting, sections: dict[str, Section]) -> None:
     """Each against the episodes themselves, of the default learner."""
 
-    def runs(name: ExperimentName, reward: str, halfway: bool = False) -> list[EpisodeTable]:
+    def runs(name: str, reward: str, halfway: bool = False) -> list[EpisodeTable]:
         own = [
             (job.run, trial)
             for job in planned(setting, [name])
@@ -263,7 +262,7 @@ def test_the_paper_s_further_claims_are_judged(setting: Setting, sections: dict[
         ]
         return [episodes_of(setting.out, *each) for each in own]
 
-    def numbers(name: ExperimentName, words: str) -> list[float]:
+    def numbers(name: str, words: str) -> list[float]:
         (claim,) = [each for each in sections[name].claims if each.text.startswith("default: ") and words in each.text]
         return [claim.numbers[each].value for each in ("first", "second")]
 

@@ -17,8 +17,11 @@ from typing import ClassVar
 import numpy as np
 
 from clearway.agents.agent import Decisions
+from clearway.experiments.experiment import Experiment
+from clearway.experiments.groups import all_jobs, all_missing, compared
+from clearway.experiments.section import ReportTable, Section
 from clearway.learn.q_learning import QLearning
-from clearway.reward import Arrival, Reward, Time
+from clearway.reward import SHORTEST, Arrival, Reward, Time
 from clearway.scenes.thor_v1 import read_scene
 
 
@@ -70,6 +73,18 @@ class Hasty(QLearning):
 
     algorithm: ClassVar[str] = "hasty"
     explore_end: float = 0.5
+
+
+def of_shortest(setting):
+    return compared(setting, (SHORTEST,))
+
+
+def section(setting):
+    table = ReportTable("twice_seeds", "Seeds", ("seed",), tuple((seed,) for seed in setting.seeds))
+    return Section("twice", "Twice", "One reward.", (table,), missing=all_missing(of_shortest(setting), setting.out))
+
+
+TWICE = Experiment(lambda setting: all_jobs(of_shortest(setting)), section)
 '''
 
 ENTRY_POINTS = """
@@ -87,6 +102,9 @@ pair = tiny_plugins:read_pair
 
 [clearway.algorithms]
 hasty = tiny_plugins:Hasty
+
+[clearway.experiments]
+twice = tiny_plugins:TWICE
 """
 
 

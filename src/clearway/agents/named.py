@@ -14,7 +14,7 @@ import numpy as np
 
 from clearway.agents.agent import Agent, Decisions, Observation, State
 from clearway.agents.by_pose import RandomWalk, shortest_paths
-from clearway.errors import AgentError, PluginError
+from clearway.errors import AgentError, PluginError, kind_and_reason
 from clearway.plugins import find_plugin, imported, load_plugin, offered
 from clearway.spelling import did_you_mean
 from clearway.world.world import World
@@ -54,7 +54,7 @@ def named_maker(source: str, found: object) -> AgentMaker:
         try:
             agent = found(world)
         except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
-            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            reason = kind_and_reason(fault)
             raise AgentError(f"{source}: cannot be made ({reason}). Correct it") from fault
         return Foreign(checked_agent(source, agent), source)
 
@@ -88,7 +88,7 @@ class Foreign:
         try:
             yield
         except Exception as fault:  # another's code: anything can come of it
-            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            reason = kind_and_reason(fault)
             raise AgentError(f"{self._source}: failed ({reason}). Correct it") from fault
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Plugins:
-    """List encoders, rewards, agents, importers and algorithms: our own, and those of other installed packages.
+    """List encoders, rewards, agents, importers, algorithms and experiments: our own, and other installed packages'.
 
     Example: clearway plugins
     """

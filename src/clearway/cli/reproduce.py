@@ -6,11 +6,11 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from clearway.choices import BudgetName, ExperimentName, LearnerName, RoomName
+from clearway.choices import BudgetName, LearnerName, RoomName
 from clearway.cli.arguments import check_at_least, check_seeds, scene_files
 from clearway.cli.console import print_json, say
 from clearway.errors import ClearwayError
@@ -29,8 +29,9 @@ class Reproduce:
     Example: clearway reproduce all --budget smoke
     """
 
-    names: Annotated[tuple[Literal["all"] | ExperimentName, ...], tyro.conf.Positional]
-    """Experiments, or all."""
+    names: Annotated[tuple[str, ...], tyro.conf.Positional]
+    """Some of table1, fig3, fig4, table2, table3, fig5, fig6, analysis, memory, zones-or-step, zone-levels, ablations,
+    off-grid; all: each of these; or experiments of installed packages (clearway plugins)."""
     out: Path = Path("reproduction")
     """Folder of scenes, runs and the report."""
     budget: BudgetName = "smoke"
@@ -62,7 +63,7 @@ class Reproduce:
 
     def run(self) -> None:
         """Run what is missing, write the report, say where it is."""
-        from clearway.experiments.catalogue import EXPERIMENTS
+        from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
 
         check_at_least(1, threads=self.threads, seeds=self.seeds, workers=self.workers, frames=self.frames)
@@ -75,9 +76,11 @@ class Reproduce:
             raise ClearwayError("--encoder is for default rooms, and --scenes have their features. Give one of the two")
         if self.workers is not None and self.ray not in (None, "local"):
             raise ClearwayError(f"--workers are this machine's, and --ray {self.ray} says how many fit. Leave one out")
-        named = [name for name in EXPERIMENTS if name in self.names]
+        names = in_order({*self.names, *(EXPERIMENTS if "all" in self.names else ())} - {"all"})
+        for name in names:
+            experiment(name)
         request = ReproduceRequest(
-            names=list(EXPERIMENTS) if "all" in self.names else named,
+            names=names,
             out=self.out,
             budget=self.budget,
             dumps=scene_files((self.scenes,)) if self.scenes else (),

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Collection
 
+from clearway.errors import RunError
 from clearway.experiments import (
     ablations,
     analysis,
@@ -19,23 +19,9 @@ from clearway.experiments import (
     zone_levels,
     zones_or_step,
 )
-from clearway.experiments.plan import Job
-from clearway.experiments.section import Section
-from clearway.experiments.setting import Setting
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """One table or figure of the paper, or an experiment of one's own.
-
-    Attributes:
-        jobs: what must be trained and tried.
-        section: its part of the report, from what is complete.
-    """
-
-    jobs: Callable[[Setting], list[Job]]
-    section: Callable[[Setting], Section]
-
+from clearway.experiments.experiment import Experiment
+from clearway.experiments.plugged import plugged_experiment
+from clearway.plugins import find_plugin
 
 EXPERIMENTS: dict[str, Experiment] = {
     "table1": Experiment(table1.jobs, table1.section),
@@ -52,4 +38,25 @@ EXPERIMENTS: dict[str, Experiment] = {
     "ablations": Experiment(ablations.jobs, ablations.section),
     "off-grid": Experiment(off_grid.jobs, off_grid.section),
 }
-"""Those of the command line (`choices.ExperimentName`). A program may add its own, which it alone knows then."""
+"""Ours. A program may add its own, which it alone knows then; what a package offers, every command knows."""
+
+
+def experiment(name: str) -> Experiment:
+    """The experiment of that name: one of `EXPERIMENTS`, or another package's.
+
+    Raises:
+        RunError: there is none.
+        PluginError: two packages offer one of this name, or it cannot be imported, or is no experiment.
+    """
+    if name in EXPERIMENTS:
+        return EXPERIMENTS[name]
+    plugin = find_plugin("experiments", name)
+    if plugin is None:
+        known = f"Use one of {', '.join(EXPERIMENTS)}, or of an installed package"
+        raise RunError(f"experiment {name:.40}: is not known here. {known} (clearway plugins)")
+    return plugged_experiment(plugin)
+
+
+def in_order(names: Collection[str]) -> list[str]:
+    """Names of experiments as they stand in a report: ours as above, then those of packages by name."""
+    return [*(name for name in EXPERIMENTS if name in names), *sorted({*names}.difference(EXPERIMENTS))]

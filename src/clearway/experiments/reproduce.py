@@ -12,7 +12,7 @@ from clearway.choices import BudgetName, LearnerName, RoomName
 from clearway.errors import RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
-from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.catalogue import experiment, in_order
 from clearway.experiments.correction import corrected
 from clearway.experiments.expected_time import told_time
 from clearway.experiments.job import is_done
@@ -134,6 +134,8 @@ def _read_request(out: Path) -> ReproduceRequest:
         return _checked(ReproduceRequest(out=out, dumps=dumps, **content))
     except FileNotFoundError as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
+    except RunError as error:
+        raise RunError(f"{path}: {error}. Or run clearway reproduce on the folder again") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
 
@@ -142,18 +144,21 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
     """The request, if it is one that a command could make.
 
     Raises:
-        ValueError: a name is unknown, or a number is none.
+        RunError: an experiment is not known here.
+        PluginError: a package's experiment cannot be used.
+        ValueError: another name is unknown, or a number is none.
     """
-    choices: tuple[tuple[Sequence[str], Sequence[str], str], ...] = (
-        (request.names, tuple(EXPERIMENTS), "; others are known to the program alone that adds them"),
-        ([request.budget], get_args(BudgetName), ""),
-        (request.rooms or (), get_args(RoomName), ""),
-        (request.learners, get_args(LearnerName), ""),
+    for name in request.names:
+        experiment(name)
+    choices: tuple[tuple[Sequence[str], Sequence[str]], ...] = (
+        ([request.budget], get_args(BudgetName)),
+        (request.rooms or (), get_args(RoomName)),
+        (request.learners, get_args(LearnerName)),
     )
-    for given, known, told in choices:
+    for given, known in choices:
         unknown = [name for name in given if name not in known]
         if unknown:
-            raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(known)}{told}")
+            raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(known)}")
     for count, least in ((request.frames, 1), (request.seeds, 1), (request.first_seed, 0)):
         if count is not None and (type(count) is not int or count < least):
             raise ValueError(f"{count!r:.40} where a number of at least {least} is expected")
@@ -173,7 +178,7 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
         return request
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
-    return replace(request, names=[name for name in EXPERIMENTS if name in names], commands=tuple(commands))
+    return replace(request, names=in_order(names), commands=tuple(commands))
 
 
 def _question(request: ReproduceRequest) -> str:
@@ -193,7 +198,7 @@ def _question(request: ReproduceRequest) -> str:
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
-        sections = [corrected(EXPERIMENTS[name].section(setting)) for name in request.names]
+        sections = [corrected(experiment(name).section(setting)) for name in request.names]
     return Reproduction(
         tuple(request.commands), tuple(request.changes), setting, planned(setting, request.names), sections
     )
@@ -220,4 +225,4 @@ def _request_json(request: ReproduceRequest) -> dict[str, object]:
 
 def planned(setting: Setting, names: Sequence[str]) -> list[Job]:
     """All jobs of some experiments, each run once with all that it is to be tried on."""
-    return merged(job for name in names for job in EXPERIMENTS[name].jobs(setting))
+    return merged(job for name in names for job in experiment(name).jobs(setting))

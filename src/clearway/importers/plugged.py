@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from clearway.errors import ClearwayError, PluginError
+from clearway.errors import ClearwayError, PluginError, kind_and_reason
 from clearway.plugins import BUILT_IN, Plugin, load_plugin, plugin_of
 from clearway.scenes.parts import check_records
 from clearway.scenes.scene import Scene
@@ -41,7 +41,7 @@ def plugged_scenes(name: str, files: Sequence[Path]) -> list[Scene]:
         except ClearwayError:
             raise
         except Exception as fault:  # another's code, as in load_plugin
-            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            reason = kind_and_reason(fault)
             raise PluginError(f"{file}: the {plugin} failed ({reason}). Check the file, or ask its authors") from fault
         if not given:
             raise ClearwayError(f"{file}: the {plugin} found no scene in it. Give another file")

@@ -8,7 +8,7 @@ from typing import Any
 
 from torch import Tensor
 
-from clearway.errors import PluginError
+from clearway.errors import PluginError, kind_and_reason
 from clearway.learn.figures import Figures
 from clearway.learn.foreign_agent import made_agent
 from clearway.learn.kinds import fits
@@ -160,7 +160,7 @@ class ForeignTrainer:
         try:
             made_agent(record, acting, self.frames)
         except (LookupError, RuntimeError, ValueError) as fault:
-            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            reason = kind_and_reason(fault)
             given = f"given {', '.join(acting) or 'no tensors'}, by acts_on {self.learner.acts_on!r:.40}"
             raise self._fault(f"agent failed ({reason}), {given}") from fault
 

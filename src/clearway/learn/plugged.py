@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 
-from clearway.errors import ClearwayError, PluginError, RunError, is_out_of_memory
+from clearway.errors import ClearwayError, PluginError, RunError, is_out_of_memory, kind_and_reason
 from clearway.learn.kinds import field_types
 from clearway.learn.learner import Learner
 from clearway.learn.peers import LostPeer
@@ -87,5 +87,5 @@ def faults_of(learner: Learner | type[Learner], what: str, passing: tuple[type[E
         plugin = None if passes else find_plugin("algorithms", learner.algorithm)
         if plugin is None:
             raise
-        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        reason = kind_and_reason(fault)
         raise PluginError(f"{plugin}: {what} failed ({reason}). Ask its authors") from fault

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from clearway.errors import EncoderError, PluginError
+from clearway.errors import EncoderError, PluginError, kind_and_reason
 from clearway.perception.encoder import SENSOR, identity_of
 from clearway.plugins import Plugin, find_plugin, load_plugin
 from clearway.scenes.scene import EncoderRecord
@@ -55,7 +55,7 @@ class CheckedEncoder:
         try:
             features = np.asarray(self.made.encode(pictures))
         except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
-            reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+            reason = kind_and_reason(fault)
             raise EncoderError(f"encoder {self.record.name}: failed ({reason}). Mend it, or use another") from fault
         expected = (len(pictures), self.feature_count)
         if features.shape != expected or features.dtype.kind not in "fiu":
@@ -80,7 +80,7 @@ def make_encoder(plugin: Plugin) -> CheckedEncoder:
     try:
         made: Any = make()  # type: ignore[operator]
     except Exception as fault:  # another's code, as in load_plugin
-        reason = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        reason = kind_and_reason(fault)
         raise PluginError(f"{plugin}: cannot be made ({reason}). {remedy}") from fault
     fixed: dict[str, object] = {"kind": KIND, "plugin": plugin.name, "package": plugin.package}
     return _checked(made, plugin.name, fixed, {"version": plugin.version}, str(plugin), remedy)

@@ -1,0 +1,71 @@
+"""Experiments of other packages: what they give is checked, what they raise is told as their fault."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from clearway.errors import PluginError, RunError, SceneError
+from clearway.experiments.catalogue import experiment, in_order
+from helpers.plugin_package import write_package
+from helpers.small_setting import small_setting
+
+MADE = """
+from clearway.experiments.experiment import Experiment
+from clearway.experiments.section import ReportTable, Section
+def table(name): return ReportTable(name, "Seeds", ("seed",), ((1,),))
+"""
+
+
+@pytest.fixture
+def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Offers what an expression makes as the experiment odd."""
+
+    def offer(made: str):
+        folder = tmp_path / "site"
+        entry_points = "[clearway.experiments]\nodd = others:Made\n"
+        write_package(folder, package="others", module=f"{MADE}Made = {made}\n", entry_points=entry_points)
+        monkeypatch.syspath_prepend(str(folder))
+        return experiment("odd")
+
+    sys.modules.pop("others", None)
+    yield offer
+    sys.modules.pop("others", None)
+
+
+@pytest.mark.parametrize(
+    ("made", "part"),
+    [
+        ("3", "is 3, expected an Experiment"),
+        ("Experiment(lambda setting: 1 / 0, None)", r"jobs failed \(ZeroDivisionError: division by zero\)"),
+        ("Experiment(lambda setting: None, None)", r"jobs failed \(TypeError"),
+        ("Experiment(lambda setting: [7], None)", "jobs gives 7, expected jobs"),
+        ("Experiment(lambda setting: [], lambda setting: setting.nothing)", r"section failed \(AttributeError"),
+        ("Experiment(lambda setting: [], lambda setting: 7)", "section gives 7, expected a Section"),
+        ("Experiment(lambda s: [], lambda s: Section('fig5', '', ''))", "its section is called 'fig5'. Call it 'odd'"),
+        (
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('fig5'),)))",
+            "a file of its report is called 'fig5', which may be another's. Begin its name with 'odd'",
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_told_with_the_package(offered, tmp_path: Path, made: str, part: str) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    with pytest.raises(PluginError, match=rf"experiment odd of the package others 1\.2: {part}") as caught:
+        found = offered(made)
+        found.jobs(setting)
+        found.section(setting)
+    assert "\n" not in str(caught.value)
+
+
+def test_errors_of_ours_pass(offered, tmp_path: Path) -> None:
+    module = "__import__('clearway').errors.SceneError('hall.h5', 'has no features', 'Encode it')"
+    found = offered(f"Experiment(lambda setting: (_ for _ in ()).throw({module}), None)")
+    with pytest.raises(SceneError, match=r"hall\.h5: has no features\. Encode it"):
+        found.jobs(small_setting(tmp_path, seeds=1))
+
+
+def test_names_stand_in_the_order_of_the_report() -> None:
+    assert in_order({"twice", "fig5", "alike", "table1"}) == ["table1", "fig5", "alike", "twice"]
+    with pytest.raises(RunError, match=r"experiment fig9: is not known here\. Use one of table1"):
+        experiment("fig9")
