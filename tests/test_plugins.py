@@ -22,7 +22,7 @@ from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.presets import PRESETS
 from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record, eyes
-from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, load_plugin, offered, plugin_of, plugins
+from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, imported, load_plugin, offered, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, RewardError, Time, reward_named
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from helpers.made import corridor_scene, grid_scene
@@ -286,6 +286,17 @@ def test_scenes_with_features_are_written_as_they_are(tmp_path) -> None:
     assert np.array_equal(read_scene(tmp_path / "out/corridor.h5").features, corridor_scene().features)
     refused = clearway_with(site, words=(*words, "--encoder", "auto-2"), cache=tmp_path)
     assert refused.returncode == 2 and "gives scenes with features" in refused.stderr
+
+
+def test_a_module_of_the_current_folder_stands_behind_what_is_installed(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place])
+    Path("mine_alone.py").write_text("ANSWER = 7")
+    Path("colorsys.py").write_text("raise SystemError('shadowed')")
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    assert imported("mine_alone:ANSWER") == 7
+    assert callable(imported("colorsys:rgb_to_hsv"))
+    sys.modules.pop("mine_alone")
 
 
 def test_a_plugin_says_what_it_is() -> None:

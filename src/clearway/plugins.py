@@ -133,7 +133,7 @@ def plugin_of(kind: Kind, name: str) -> Plugin:
 
 
 def imported(path: str) -> object:
-    """What a user names as `package.module:name`; a module may lie in the current folder, as for python -m.
+    """What a user names as `package.module:name`; a module may lie in the current folder, behind what is installed.
 
     Raises:
         PluginError: it is no such path, or cannot be imported, whatever the module raises.
@@ -144,7 +144,7 @@ def imported(path: str) -> object:
     if not colon or not module or not name:
         raise PluginError(f"{path!r:.80}: expected package.module:name. Name one so")
     if "" not in sys.path:
-        sys.path.insert(0, "")
+        sys.path.append("")
     try:
         return getattr(import_module(module), name)
     except Exception as fault:  # another's code: anything can come of it
