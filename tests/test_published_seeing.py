@@ -566,7 +566,7 @@ def test_walkers_grow_as_their_record_says() -> None:
     page = PAGE.partition("### How walkers grow")[2].partition("\n## ")[0]
     lines = [line.strip("| ").split(" | ") for line in page.splitlines() if re.match(r"\| \d+ \| \d M", line)]
     runs = {f"rooms{count}-0": (count, 4) for count in (20, 40, 80)}
-    runs |= {"aware-0": (160, 4), "frames2-0": (160, 2), "frames1-0": (160, 1)}
+    runs |= {"aware-0": (160, 4), "frames8-0": (160, 8), "frames2-0": (160, 2), "frames1-0": (160, 1)}
     asked = [("curve-rooms", name) for name in THREE] + [("curve-flats", name) for name in THREE[:2]]
     means = {}
     for (run, (rooms, frames)), (told_rooms, told_frames, *cells) in zip(runs.items(), lines, strict=True):
@@ -585,6 +585,21 @@ def test_walkers_grow_as_their_record_says() -> None:
             x = np.log10([runs[run][place] for run in chosen])
             slope = float(np.polyfit(x, [means[run, part, name] for run in chosen], 1)[0])
             assert_written(cell.strip("+").split()[0], slope, f"{name} with {label}")
+
+
+def test_twice_as_many_frames_bring_walkers_what_is_said() -> None:
+    said = words_of(
+        r"SPL rises by (\S+) points \((\S+) to (\S+)\), collisions stay \((\S+) more, -(\S+)\s+to (\S+)\), and in "
+        r"flats success falls by (\S+) points \((\S+) to (\S+)\)",
+        PAGE,
+    ).groups()
+    asked = (("curve-rooms", "spl", 100), ("curve-rooms", "collisions", 1), ("curve-flats", "success", 100))
+    for place, (part, name, scale) in enumerate(asked):
+        pairs = zip(*(scenes_of(ELSEWHERE, part, run) for run in ("frames8-0", "aware-0")), strict=True)
+        more = scale * np.array([eight[name] - four[name] for eight, four in pairs])
+        found = sorted(abs(value) for value in ends(more)) if name != "collisions" else [-ends(more)[0], ends(more)[1]]
+        for written, value in zip(said[3 * place : 3 * place + 3], (abs(more.mean()), *found), strict=True):
+            assert_written(written, float(value), f"{name} in {part}")
 
 
 def test_one_real_plan_holds_as_much_of_what_fails_as_is_said() -> None:
