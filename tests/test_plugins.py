@@ -186,6 +186,7 @@ def test_two_of_one_name_are_refused_and_shown(here, tmp_path, monkeypatch) -> N
     [
         ("raise SystemError('out of\\norder')", r"others:Made cannot be imported \(SystemError: out of order\)"),
         ("Other = 3", "others:Made cannot be imported"),
+        ("raise SystemExit(0)", r"others:Made cannot be imported \(SystemExit: 0\)"),
         ("Made = 3", r"cannot be made \(TypeError"),
         ("class Made: pass", "its identity is None, expected a text"),
         ("class Made: identity = 'a'; feature_count = 0", "its feature_count is 0"),
@@ -296,6 +297,9 @@ def test_a_module_of_the_current_folder_stands_behind_what_is_installed(tmp_path
     monkeypatch.delitem(sys.modules, "colorsys", raising=False)
     assert imported("mine_alone:ANSWER") == 7
     assert callable(imported("colorsys:rgb_to_hsv"))
+    Path("leaves.py").write_text("import sys\nsys.exit(0)")
+    with pytest.raises(PluginError, match=r"leaves:X: cannot be loaded \(SystemExit: 0\)"):
+        imported("leaves:X")
     sys.modules.pop("mine_alone")
 
 

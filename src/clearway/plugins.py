@@ -112,7 +112,10 @@ def load_plugin(plugin: Plugin) -> object:
 
     try:
         return EntryPoint(plugin.name, plugin.target, f"clearway.{plugin.kind}").load()
-    except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+    except (
+        Exception,
+        SystemExit,
+    ) as fault:  # another's code: anything can come of it: the user is told whose
         reason = kind_and_reason(fault)
         remedy = f"Ask its authors, or uninstall {plugin.package}"
         raise PluginError(f"{plugin}: {plugin.target} cannot be imported ({reason}). {remedy}") from fault
@@ -147,6 +150,6 @@ def imported(path: str) -> object:
         sys.path.append("")
     try:
         return getattr(import_module(module), name)
-    except Exception as fault:  # another's code: anything can come of it
+    except (Exception, SystemExit) as fault:  # another's code: anything can come of it
         reason = kind_and_reason(fault)
         raise PluginError(f"{path}: cannot be loaded ({reason}). Check the module and the name") from fault

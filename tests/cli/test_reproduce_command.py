@@ -224,8 +224,14 @@ def test_another_package_s_experiment_stands_after_ours_in_the_report(
     assert not both.json["sections"][1]["missing"]
     assert (out / "tables" / "twice_seeds.csv").read_text().splitlines() == ["seed", "0"]
     assert clearway("report", out, "--json").json["sections"] == both.json["sections"]
-    monkeypatch.undo()
-    assert clearway("report", out).refusal("reproduction.json: experiment twice", "not known here", "plugins")
+    shutil.rmtree(tmp_path / "site")  # uninstalled
+    without = clearway("report", out, "--json")
+    assert [section["name"] for section in without.json["sections"]] == ["fig5"]
+    assert "the report leaves out what is not known here. experiment twice" in without.err
+    (request,) = json.loads((out / "reproduction.json").read_text())["names"][1:]
+    assert request == "twice"  # it comes back with its package
+    (out / "reproduction.json").write_text((out / "reproduction.json").read_text().replace('"fig5",', ""))
+    assert clearway("report", out).refusal("reproduction.json: experiment twice", "not known here", "another folder")
 
 
 def test_no_experiment_is_refused(clearway, tmp_path: Path) -> None:

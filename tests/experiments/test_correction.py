@@ -60,3 +60,10 @@ def test_learners_are_families_of_their_own_and_what_was_not_tested_stays() -> N
     assert (first.verdict, "for 3 claims 0.096 (Holm)" in first.evidence) == ("undecided", True)  # as it will be
     (claim,) = corrected(section_of(None)).claims
     assert claim.evidence == "E."
+
+
+def test_claims_that_name_no_learner_are_judged_together() -> None:
+    section = Section("s", "", "", claims=tuple(Claim(f"Claim {n}.", "holds", "E.", p=0.03) for n in range(3)))
+    assert {claim.verdict for claim in corrected(section).claims} == {"undecided"}
+    (alone,) = corrected(Section("s", "", "", claims=section.claims[:1])).claims
+    assert alone.verdict == "holds"

@@ -1,10 +1,11 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from clearway.experiments.plan import Job, PlannedRun, SceneFile, Trial, merged
-from clearway.reward import COLLISION_AWARE, SHORTEST
+from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Reward, Term, Time
 from helpers.small_runs import small_learner
 
 RUN = PlannedRun((SceneFile("room", Path("a/room.h5"), "digest"),), ((1, 2),), SHORTEST, small_learner(), 0)
@@ -37,6 +38,27 @@ def test_whatever_changes_the_agent_changes_the_name(change: dict) -> None:
 def test_a_learner_s_name_is_what_it_was_before_it_could_set_itself_goals() -> None:
     assert RUN.name.endswith("fdeec392ab")
     assert replace(RUN, learner=small_learner(goals="seen")).name != RUN.name
+
+
+@dataclass(frozen=True)
+class Dear(Term):
+    cost: float = 0.1
+
+    def __call__(self, earned, moves):
+        return earned - self.cost
+
+
+@dataclass(frozen=True)
+class Cheap(Dear):
+    def __call__(self, earned, moves):
+        return earned + self.cost
+
+
+def test_terms_of_one_s_own_are_told_apart_by_their_class() -> None:
+    first, second = (replace(RUN, reward=Reward("mine", (Time(), kind(0.1), Arrival()))) for kind in (Dear, Cheap))
+    assert first.name != second.name
+    numpy = Reward("shortest", (Time(np.float32(-0.5)), Arrival()))
+    assert replace(RUN, reward=numpy).name == replace(RUN, reward=Reward("shortest", (Time(-0.5), Arrival()))).name
 
 
 @pytest.mark.parametrize(("frames", "half"), [(1, 1), (2, 1), (3, 1), (10, 5)])

@@ -44,8 +44,16 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ("Experiment(lambda setting: [], lambda setting: 7)", "section gives 7, expected a Section"),
         ("Experiment(lambda s: [], lambda s: Section('fig5', '', ''))", "its section is called 'fig5'. Call it 'odd'"),
         (
-            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('fig5'),)))",
-            "a file of its report is called 'fig5', which may be another's. Begin its name with 'odd'",
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('odd5'),)))",
+            "a table or figure is called 'odd5', as another's may be. Call it 'odd', or 'odd_' and more",
+        ),
+        (
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('odd_/../a'),)))",
+            "two tables or figures, or no file, can be called 'odd_/../a'",
+        ),
+        (
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('odd'), table('odd'))))",
+            "two tables or figures, or no file, can be called 'odd'. Rename it",
         ),
     ],
 )

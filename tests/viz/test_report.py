@@ -1,9 +1,11 @@
 """The report's page, from sections written by hand."""
 
+import json
 from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series
@@ -70,3 +72,15 @@ def test_pictures_are_inside(written, page_parts, tmp_path):
 def test_no_warning_is_no_paragraph(tmp_path, page_parts):
     page = write_report(tmp_path, "T", [], {}, "", []).read_text(encoding="utf-8")
     assert not page_parts(page).all("p")[1:]  # the mark alone
+
+
+def test_numbers_of_numpy_stand_as_python_s(tmp_path):
+    values = (np.int64(1234), np.float32(0.5), np.bool_(True), None)
+    table = ReportTable("numpy", "N", ("a", "b", "c", "d"), (values,))
+    figure = ReportFigure("line", "L", "x", "y", (Series("a", np.arange(2), np.float32([1, 2]), low=np.zeros(2)),))
+    write_report(tmp_path, "T", [Section("s", "S", "Text.", (table,), (figure,))], {}, "", [])
+    (section,) = json.loads((tmp_path / "report.json").read_text())["sections"]
+    assert section["tables"][0]["rows"] == [[1234, 0.5, True, None]]
+    assert section["figures"][0]["series"][0]["x"] == [0, 1]
+    assert (tmp_path / "tables" / "numpy.csv").read_text().splitlines() == ["a,b,c,d", "1234,0.5,True,"]
+    assert "| 1,234 | 0.5 | yes |" in (tmp_path / "report.md").read_text()

@@ -2,7 +2,8 @@
 
 Of twenty claims that say nothing one is told by chance at 5 %. Holm's rule holds that chance at 5 % for all claims of
 a section about one learner together: of m claims the i-th smallest p, times m + 1 - i, is to be 5 % at most, and so
-are all before it. Claims whose runs are not there yet count, so that no verdict is taken back when they come.
+are all before it. Claims that name no learner before a colon are together, too. Claims whose runs are not there yet
+count, so that no verdict is taken back when they come.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ def corrected(section: Section) -> Section:
     claims = list(section.claims)
     families: dict[str, list[int]] = {}
     for number, claim in enumerate(claims):
-        families.setdefault(claim.text.partition(":")[0], []).append(number)
+        learner, colon, _ = claim.text.partition(":")
+        families.setdefault(learner if colon else "", []).append(number)
     for numbers in families.values():
         told = [claims[number].p for number in numbers]
         for number, own, p in zip(numbers, told, holm([1.0 if p is None else p for p in told]), strict=True):

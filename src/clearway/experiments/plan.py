@@ -57,7 +57,10 @@ class PlannedRun:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
         settings = {"algorithm": self.learner.algorithm, **without_later(asdict(self.learner))}
-        content = [scenes, self.targets, asdict(self.reward), settings, self.seed]
+        paid = self.reward.to_json()
+        if "terms" not in paid:  # all are ours: runs planned before keep their names
+            paid = asdict(self.reward)
+        content = [scenes, self.targets, paid, settings, self.seed]
         if self.zone_level != "pose":  # runs planned before keep their names
             content.append(self.zone_level)
         targets = sum(len(own) for own in self.targets)
@@ -118,8 +121,8 @@ class Job:
 
 
 def _digest(content: object) -> str:
-    """Of JSON values."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+    """Of JSON values, and numbers of NumPy's."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=float).encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def merged(jobs: Iterable[Job]) -> list[Job]:

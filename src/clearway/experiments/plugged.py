@@ -1,7 +1,7 @@
 """Experiments of other packages (`clearway.plugins`), behind checks of what they give.
 
-An entry point of the group `clearway.experiments` is an `Experiment`. The name of its section is its own; those of its
-tables, figures and maps, which are files of the report, begin with it.
+An entry point of the group `clearway.experiments` is an `Experiment`. Its section has its name. So have tables, figures
+and maps, which are files of the report; behind it may come an underscore and more.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from clearway.experiments.plan import Job
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
 from clearway.plugins import Plugin, load_plugin
+from clearway.scenes.parts import is_name
 
 
 def plugged_experiment(plugin: Plugin) -> Experiment:
@@ -42,13 +43,21 @@ def plugged_experiment(plugin: Plugin) -> Experiment:
             raise PluginError(f"{plugin}: section gives {given!r:.60}, expected a Section. Ask its authors")
         if given.name != plugin.name:
             raise PluginError(f"{plugin}: its section is called {given.name!r:.40}. Call it {plugin.name!r}")
-        for part in (*given.tables, *given.pictures):
-            if not part.name.startswith(plugin.name):
-                told = f"{plugin}: a file of its report is called {part.name!r:.40}"
-                raise PluginError(f"{told}, which may be another's. Begin its name with {plugin.name!r}")
+        for files in (given.tables, given.pictures):
+            _check_names([part.name for part in files], plugin)
         return given
 
     return Experiment(jobs, section)
+
+
+def _check_names(names: list[str], plugin: Plugin) -> None:
+    """Raise PluginError where one is not the plugin's own, or no file can be called so, or two are called so."""
+    for place, name in enumerate(names):
+        if name != plugin.name and not name.startswith(f"{plugin.name}_"):
+            wanted = f"Call it {plugin.name!r}, or {plugin.name + '_'!r} and more"
+            raise PluginError(f"{plugin}: a table or figure is called {name!r:.60}, as another's may be. {wanted}")
+        if not is_name(name) or name in names[:place]:
+            raise PluginError(f"{plugin}: two tables or figures, or no file, can be called {name!r:.60}. Rename it")
 
 
 @contextmanager

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import get_args
 
 from clearway.choices import BudgetName, LearnerName, RoomName
-from clearway.errors import RunError
+from clearway.errors import ClearwayError, RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import experiment, in_order
@@ -134,8 +135,6 @@ def _read_request(out: Path) -> ReproduceRequest:
         return _checked(ReproduceRequest(out=out, dumps=dumps, **content))
     except FileNotFoundError as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
-    except RunError as error:
-        raise RunError(f"{path}: {error}. Or run clearway reproduce on the folder again") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
 
@@ -143,13 +142,11 @@ def _read_request(out: Path) -> ReproduceRequest:
 def _checked(request: ReproduceRequest) -> ReproduceRequest:
     """The request, if it is one that a command could make.
 
+    Names of experiments may be unknown here: packages come and go.
+
     Raises:
-        RunError: an experiment is not known here.
-        PluginError: a package's experiment cannot be used.
         ValueError: another name is unknown, or a number is none.
     """
-    for name in request.names:
-        experiment(name)
     choices: tuple[tuple[Sequence[str], Sequence[str]], ...] = (
         ([request.budget], get_args(BudgetName)),
         (request.rooms or (), get_args(RoomName)),
@@ -162,8 +159,9 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
     for count, least in ((request.frames, 1), (request.seeds, 1), (request.first_seed, 0)):
         if count is not None and (type(count) is not int or count < least):
             raise ValueError(f"{count!r:.40} where a number of at least {least} is expected")
-    if not all(isinstance(text, str) for text in (request.encoder, *request.changes, *request.commands)):
-        raise ValueError("the encoder, a change or a command is no text")
+    texts = (*request.names, request.encoder, *request.changes, *request.commands)
+    if not request.names or not all(isinstance(text, str) for text in texts):
+        raise ValueError("it names no experiment, or the encoder, a change or a command is no text")
     return request
 
 
@@ -197,11 +195,31 @@ def _question(request: ReproduceRequest) -> str:
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
+    names = _known(request)
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
-        sections = [corrected(experiment(name).section(setting)) for name in request.names]
-    return Reproduction(
-        tuple(request.commands), tuple(request.changes), setting, planned(setting, request.names), sections
-    )
+        sections = [corrected(experiment(name).section(setting)) for name in names]
+    return Reproduction(tuple(request.commands), tuple(request.changes), setting, planned(setting, names), sections)
+
+
+def _known(request: ReproduceRequest) -> list[str]:
+    """The request's experiments without those that nobody offers here any more, of which a warning tells.
+
+    Raises:
+        ClearwayError: none is left.
+    """
+    known, faults = list[str](), list[ClearwayError]()
+    for name in request.names:
+        try:
+            experiment(name)
+            known.append(name)
+        except ClearwayError as fault:
+            faults.append(fault)
+    path = request.out / REQUEST_FILE
+    if not known:
+        raise RunError(f"{path}: {faults[0]}. Or run clearway reproduce on another folder") from faults[0]
+    for unknown in faults:
+        warnings.warn(f"{path}: the report leaves out what is not known here. {unknown}", stacklevel=4)
+    return known
 
 
 def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:

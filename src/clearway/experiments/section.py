@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from clearway.evaluation.across_seeds import Estimate
 
 Verdict = Literal["holds", "does not hold", "undecided"]
@@ -33,7 +35,9 @@ class ReportTable:
     folded: bool = False
 
     def __post_init__(self) -> None:
-        """Every row must fit the headings."""
+        """Every row must fit the headings; NumPy's numbers become Python's."""
+        rows = tuple(tuple(v.item() if isinstance(v, np.generic) else v for v in row) for row in self.rows)
+        object.__setattr__(self, "rows", rows)
         assert all(len(row) == len(self.headings) for row in self.rows), f"{self.name}: a row of another length"
 
 
@@ -56,6 +60,12 @@ class Series:
     high: Sequence[float] | None = None
     points: bool = False
     highlighted: bool = False
+
+    def __post_init__(self) -> None:
+        """NumPy's arrays and numbers become Python's."""
+        for name in ("x", "y", "low", "high"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, np.asarray(getattr(self, name)).tolist())
 
 
 @dataclass(frozen=True)
