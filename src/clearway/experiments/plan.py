@@ -57,10 +57,10 @@ class PlannedRun:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
         settings = {"algorithm": self.learner.algorithm, **without_later(asdict(self.learner))}
-        paid = self.reward.to_json()
-        if "terms" not in paid:  # all are ours: runs planned before keep their names
-            paid = asdict(self.reward)
-        content = [scenes, self.targets, paid, settings, self.seed]
+        kinds = [type(term).__module__ for term in self.reward.terms]
+        ours = all(kind.startswith("clearway.") for kind in kinds)  # their values tell them apart
+        paid = asdict(self.reward) if ours else self.reward.to_json()
+        content: list[object] = [scenes, self.targets, paid, settings, self.seed]
         if self.zone_level != "pose":  # runs planned before keep their names
             content.append(self.zone_level)
         targets = sum(len(own) for own in self.targets)
