@@ -21,7 +21,7 @@ from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.importers.plugged import plugged_scenes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.presets import PRESETS
-from clearway.perception import depth_grid, encode, encode_scenes, encoder_from_record, eyes
+from clearway.perception import check_encoder, depth_grid, encode, encode_scenes, encoder_from_record, eyes
 from clearway.plugins import BUILT_IN, KINDS, Plugin, find_plugin, imported, load_plugin, offered, plugin_of, plugins
 from clearway.reward import REWARDS, Arrival, Reward, RewardError, Time, reward_named
 from clearway.scenes.thor_v1 import read_scene, write_scene
@@ -45,7 +45,8 @@ def here(package, monkeypatch, tmp_path):
 
 MADE = """
 from dataclasses import replace
-from clearway.scenes.scene import Provenance
+import numpy as np
+from clearway.scenes.scene import EncoderRecord, Provenance
 from helpers.made import corridor_scene
 class Dark:
     shape = (20, 8, 8, 3)
@@ -114,6 +115,17 @@ def test_an_encoder_is_made_again_from_its_record(here) -> None:
     assert encoder.feature_count == 12
     assert np.array_equal(encoder.encode(scene.observations), scene.features)
     assert scene.features.dtype == np.float32
+
+
+def test_the_sensor_of_its_encoder_is_to_be_rendered(here, tmp_path, monkeypatch) -> None:
+    deep = "from tiny_plugins import MeanColour\nclass Deep(MeanColour): sensor = 'depth'"
+    monkeypatch.syspath_prepend(str(offer(tmp_path, "encoders", "deep = others:Deep", deep)))
+    sys.modules.pop("others", None)
+    with pytest.raises(EncoderError, match=r"deep sees depth, and it is not rendered\. Add --sensors rgb depth"):
+        check_encoder("deep", ("rgb",))
+    check_encoder("deep", ("rgb", "depth"))
+    check_encoder("mean-colour", ("rgb",))
+    sys.modules.pop("others", None)
 
 
 def test_another_version_of_the_encoder_is_refused(tmp_path, here, monkeypatch) -> None:
@@ -255,6 +267,10 @@ def test_a_broken_importer_is_named(tmp_path, monkeypatch, module, part) -> None
         (
             "replace(corridor_scene(), made_by=Provenance('x', notes={'a': {1}}))",
             r"file\.txt: made_by\.notes is no JSON",
+        ),
+        (
+            "replace(corridor_scene(), encoder=EncoderRecord('x', '1', arrays={'labels': np.array(['a', 'b'])}))",
+            r"file\.txt: encoder\.arrays\['labels'\] is an array of <U1, expected a NumPy array of numbers",
         ),
     ],
 )

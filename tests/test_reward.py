@@ -1,6 +1,7 @@
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,6 +136,10 @@ def test_changes_that_cannot_be(parameters: dict, message: str) -> None:
             "another order. Give Time, Zones, Bump, Clearance, then those of your own",
         ),
         ((Doubled(2.0), Time(), Arrival()), "stand in another order"),
+        ((Time(None), Arrival()), "alpha is None, expected a finite number"),
+        ((Time(), Bump(None), Arrival()), "blocked is None, expected a finite number"),
+        ((Time(), Clearance(None, 0.5), Arrival()), "clearance is None, expected a finite number"),
+        ((Time(), Arrival(None)), "terminal is None, expected a finite number"),
     ],
 )
 def test_terms_that_make_no_reward(terms: tuple, message: str) -> None:
@@ -291,7 +296,7 @@ def test_rewards_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
             reward_named(name)
 
 
-@pytest.mark.parametrize("distance_m", [0.0, -0.5, float("nan")])
-def test_a_clearance_that_grows_with_distance_is_refused(distance_m: float) -> None:
+@pytest.mark.parametrize("distance_m", [0.0, -0.5, float("nan"), None, "0.5"])
+def test_a_clearance_that_grows_with_distance_or_has_none_is_refused(distance_m: Any) -> None:
     with pytest.raises(RewardError, match="expected more than 0"):
         Clearance(0.02, distance_m)

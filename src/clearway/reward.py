@@ -119,8 +119,8 @@ class Clearance(Term):
 
     def __post_init__(self) -> None:
         """Raise RewardError where there is no such distance."""
-        if not self.clearance_m > 0:
-            raise RewardError(f"--clearance-m is {self.clearance_m}, expected more than 0. Give a distance")
+        if not isinstance(self.clearance_m, Real) or not self.clearance_m > 0:
+            raise RewardError(f"--clearance-m is {self.clearance_m!r:.40}, expected more than 0. Give a distance")
 
     def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
         """Subtracted near obstacles."""
@@ -217,10 +217,10 @@ class Reward:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """The parameters of our own terms by name; those that are None are left out."""
-        own = [term for term in self.terms if type(term) in TERMS.values()]
-        found = {own.name: getattr(term, own.name) for term in own for own in fields(term)}
-        return {name: value for name, value in found.items() if value is not None}
+        """The parameters of our own terms by name; those that are None are left out, which `Zones` alone may have."""
+        ours = [term for term in self.terms if type(term) in TERMS.values()]
+        found = [(own, getattr(term, own.name)) for term in ours for own in fields(term)]
+        return {own.name: value for own, value in found if value is not None or own.default is not None}
 
     @property
     def is_known(self) -> bool:

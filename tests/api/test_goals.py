@@ -179,8 +179,11 @@ def test_perturbations_that_cannot_be_had_are_one_line(run, taken, tmp_path, mon
         evaluate_goals(Spy(FEATURES), [replace(corridor_scene(5), encoder=None)], goals=4, perturb="all")
     write_scene(corridor_scene(5, feature_count=12), tmp_path / "corridor.h5")
     by_pose = clearway.train(tmp_path / "corridor.h5", [16, 8], out=tmp_path / "run", **SMALL)
-    with pytest.raises(ArgumentError, match="an agent of the algorithm ppo goes by poses on the grid"):
+    with pytest.raises(ArgumentError, match=r"the algorithm ppo goes by poses on the grid.*evaluate --live"):
         evaluate_goals(by_pose.folder, [tmp_path / "corridor.h5"], goals=4, perturb="all")
+    table = clearway.train(corridor_scene(5), frames=80, envs=10, rollout_steps=8, algorithm="q-learning").agent
+    with pytest.raises(ArgumentError, match=r"algorithm q-learning goes by poses on the grid.*Leave it out"):
+        evaluate_goals(table, [corridor_scene(5)], goals=4, perturb="all")
     monkeypatch.undo()
     with pytest.raises(SceneError, match="there is no room to walk in: the scene comes from test"):
         evaluate_goals(run / "run", [corridor_scene(5)], goals=4, perturb="all")

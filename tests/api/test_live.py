@@ -82,9 +82,14 @@ def test_what_cannot_be_walked_is_one_line(agent, monkeypatch):
         evaluate_live("generalist", built, goals=2)
     with pytest.raises(RunError, match=r"runs/x: "):
         evaluate_live("runs/x", corridor_scene(5))
-    trained = clearway.train(corridor_scene(5), frames=80, envs=10, rollout_steps=8, width=16).agent
-    with pytest.raises(ArgumentError, match=r"ppo: bound to its rooms, and off the grid goals are drawn anew"):
+    small = {"frames": 80, "envs": 10, "rollout_steps": 8}
+    trained = clearway.train(corridor_scene(5), **small, width=16).agent
+    bound = "bound to its rooms, and off the grid goals are drawn anew in any"
+    with pytest.raises(ArgumentError, match=f"ppo: {bound}.*clearway evaluate RUN --live, without --goals"):
         evaluate_live(trained, corridor_scene(5))
+    table = clearway.train(corridor_scene(5), algorithm="q-learning", **small).agent  # no network, so no --live either
+    with pytest.raises(ArgumentError, match=f"q-learning: {bound}.*clearway evaluate RUN without --goals and --live"):
+        evaluate_live(table, corridor_scene(5))
     with pytest.raises(ArgumentError, match="sweep sets the perturbations itself"):
         evaluate_live("generalist", corridor_scene(5), perturb="all", sweep=(1.0,))
     for sweep in (0.5, None, "1.0"):

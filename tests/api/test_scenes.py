@@ -149,6 +149,26 @@ def test_an_encoder_of_one_s_own_may_take_depth() -> None:
         clearway.encode_scenes(grid_scene(1), Nearest())
 
 
+class Sonic(Nearest):
+    identity = "sonic-1"
+    sensor = "sonar"
+
+
+@pytest.mark.parametrize(
+    ("encoder", "part"),
+    [
+        (Nearest(), r"Nearest sees depth, and it is not rendered\. Add --sensors rgb depth"),
+        (Sonic(), r"Sonic sees sonar, and it is not rendered\. Use one that sees rgb or depth"),
+    ],
+)
+def test_an_encoder_of_one_s_own_whose_sensor_is_not_rendered_is_refused_before(monkeypatch, encoder, part) -> None:
+    from clearway.rooms import library
+
+    monkeypatch.setattr(library, "cached_room_scene", lambda *_, **__: pytest.fail("a room was built"))
+    with pytest.raises(clearway.ClearwayError, match=part):
+        clearway.build_room("bathroom", encoder=encoder)
+
+
 class Other(Brightness):
     identity = "brightness-2"
 

@@ -147,30 +147,47 @@ def test_perturbed_pictures_are_of_rooms_and_for_algorithms_that_learn_by_them(c
         clearway.train(corridor, perturb="all", **SMALL)
 
 
-def test_what_is_wrong_is_told_before_pictures_are_taken(corridor, monkeypatch) -> None:
+@dataclass(frozen=True)
+class Weighed(Term):
+    weights: object
+
+    def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+        return earned
+
+
+UNTOLD = Reward("odd", (Time(), Weighed(np.zeros(3)), Arrival()))
+
+
+def test_what_is_wrong_is_told_before_pictures_are_taken(corridor, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(training, "takes_seen", lambda *_, **__: pytest.fail("taken"))
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.json").touch()
+    (tmp_path / "left" / "checkpoints").mkdir(parents=True)
+    before = sorted(tmp_path.rglob("*"))
     for wrong, part in (
         ({"reward": "shortst"}, "shortst"),
         ({"zone_level": "room"}, "zone_level='room'"),
         ({"device": 3}, "device=3"),
         ({"threads": 0}, "threads=0"),
         ({"until_solved": "yes"}, "until_solved='yes'"),
+        ({"reward": UNTOLD}, "reward odd: a parameter is no JSON value"),
+        ({"reward": replace(SHORTEST, clip=True), "clip_rewards": False}, "reward shortest clips, and ppo's setting"),
+        ({"track": "excel"}, "--track excel: expected tensorboard or wandb"),
+        ({"device": "abacus"}, "device abacus: cannot be used here"),
+        ({"workers": 2}, "1 scene"),
+        ({"feature_store": "mapped"}, "features of perturbed pictures are kept in memory"),
+        ({"out": 3}, "out=3: expected a path"),
+        ({"out": tmp_path / "run"}, "run: holds a run already"),
+        ({"out": tmp_path / "left"}, r"left: holds checkpoints but no run\.json"),
     ):
         with pytest.raises(ClearwayError, match=part):
             clearway.train(corridor, perturb="all", **wrong, **SMALL)
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_reward_that_no_record_can_hold_leaves_no_folder(corridor, tmp_path) -> None:
-    @dataclass(frozen=True)
-    class Weighed(Term):
-        weights: object
-
-        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
-            return earned
-
-    odd = Reward("odd", (Time(), Weighed(np.zeros(3)), Arrival()))
     with pytest.raises(RewardError, match=r"reward odd: a parameter is no JSON value .*ndarray") as caught:
-        clearway.train(corridor, reward=odd, out=tmp_path / "run", **SMALL)
+        clearway.train(corridor, reward=UNTOLD, out=tmp_path / "run", **SMALL)
     assert "\n" not in str(caught.value) and not (tmp_path / "run").exists()
 
 

@@ -10,6 +10,7 @@ from clearway.learn.algorithms import ALGORITHMS
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from helpers.own_algorithm import offer_algorithm, with_body
 from helpers.small_eyes import seen_by_eyes, ship, small_generalist
 
 PICTURES = ("curves", "map-bathroom_02", "episode-bathroom_02")
@@ -24,6 +25,23 @@ def seen(scene: Path, folder: Path) -> Path:
 
 
 SLOWEST = ("a3c", "adapt")
+LOOKING = """
+class Looking:
+    sees = ("rgb",)
+
+    def __init__(self, record, frames):
+        self.record, self.frames = record, frames
+
+    def on_poses(self, world):
+        return self
+
+    def reset(self, target, seed):
+        return {"target": target["rgb"]}
+
+    def act(self, observation, state):
+        action = (observation["rgb"].astype(int) + state["target"]).sum((1, 2, 3)) % 4
+        return clearway.Decisions(action, torch.eye(4).numpy()[action]), state
+"""
 
 
 @pytest.mark.parametrize(
@@ -63,6 +81,21 @@ def test_a_table_s_episode_can_be_filmed(clearway, trained, tmp_path):
     answer = clearway("video", run, "--out", film, "--most-steps", 3)
     assert answer.code == 0, answer
     assert film.read_bytes().startswith(b"GIF")
+
+
+def test_who_sees_pictures_is_filmed_and_drawn_by_the_scenes_of_its_run(clearway, trained, tmp_path, monkeypatch):
+    body = with_body("def agent(self, record, tensors, frames): return Looking(record, frames)")
+    offer_algorithm(tmp_path, monkeypatch, LOOKING + body)
+    run, film, drawn = tmp_path / "run", tmp_path / "out.gif", tmp_path / "pictures"
+    assert clearway("train", trained.scene, "--out", run, "--algorithm", "odd", *SETTINGS).code == 0
+    for scenes in ((), ("--scenes", trained.scene)):
+        answer = clearway("video", run, "--out", film, "--most-steps", 3, *scenes)
+        assert answer.code == 0, answer
+        assert film.read_bytes().startswith(b"GIF")
+        film.unlink()
+    answer = clearway("evaluate", run, "--episodes", 1, "--step-limit", 5, "--pictures", drawn)
+    assert answer.code == 0, answer
+    assert {path.stem for path in drawn.iterdir()} == set(PICTURES)
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,9 @@ def check_decisions(decisions: object, count: int) -> None:
         raise AgentError(f"the agent gave action {wrong}, expected 0 to {ACTION_COUNT - 1}, see scenes.actions.Action")
     if told is not None:
         total = told.astype(np.float64).sum(1)
-        if not ((total > 0) & np.isfinite(total)).all():
-            raise AgentError("the agent gave probabilities that are not finite or all zero. Give finite ones")
+        if not (told >= 0).all() or not ((total > 0) & np.isfinite(total)).all():  # NaN fails the comparison
+            problem = "the agent gave probabilities that are negative, not finite or all zero"
+            raise AgentError(f"{problem}. Give finite ones from 0 on")
 
 
 def _check_array(name: str, given: object, expected: str, shape: tuple[int, ...]) -> None:

@@ -143,12 +143,13 @@ def check_can_tour(agent: object, steps: int) -> None:
 
 def _check_sees(agent: object) -> None:
     """Raise ArgumentError where an agent knows the poses that it is in, whatever it is shown."""
-    from clearway.learn.load import TrainedAgent
+    from clearway.learn.load import TrainedAgent, TrainedNetwork
     from clearway.learn.recurrent import TrainedRecurrent
 
     if isinstance(agent, TrainedAgent) and not isinstance(agent, TrainedRecurrent):
         problem = f"an agent of the algorithm {agent.record.learner.algorithm} goes by poses on the grid"
-        raise ArgumentError(f"perturb: {problem}, and would see nothing of it. Walk off the grid: evaluate --live")
+        instead = "Walk off the grid: evaluate --live" if isinstance(agent, TrainedNetwork) else "Leave it out"
+        raise ArgumentError(f"perturb: {problem}, and would see nothing of it. {instead}")
 
 
 def _takes(

@@ -65,7 +65,7 @@ def evaluate_live(
             than the agent; or the agent cannot be made, or walk there.
     """
     from clearway.agents.generalist import Generalist
-    from clearway.learn.load import TrainedAgent
+    from clearway.learn.load import TrainedAgent, TrainedNetwork
     from clearway.learn.recurrent import TrainedRecurrent
     from clearway.live.goals import LiveTouring, walk_to_goals
     from clearway.live.live_room import MODEL_SOURCE
@@ -105,7 +105,8 @@ def evaluate_live(
         problem = (
             f"{agent.record.learner.algorithm:.80}: bound to its rooms, and off the grid goals are drawn anew in any"
         )
-        raise ArgumentError(f"{problem}. Evaluate it at its targets: clearway evaluate RUN --live, without --goals")
+        options = "--live, without --goals" if isinstance(agent, TrainedNetwork) else "without --goals and --live"
+        raise ArgumentError(f"{problem}. Evaluate it at its targets: clearway evaluate RUN {options}")
     else:
         walker = named_agent(agent)[1]
     settings = [Condition(label_of(perturbations), perturbations)]

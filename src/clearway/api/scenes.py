@@ -188,7 +188,7 @@ def build_room(
         ArgumentError: there is no such room, or a number or path is none.
         ClearwayError: there is no such sensor, rendering is not possible here, or the encoder cannot be had.
     """
-    from clearway.perception.encode import check_encoder
+    from clearway.perception.encode import check_encoder, check_rendered
     from clearway.rooms.library import cached_room_scene
 
     room, room_seed = as_choice("name", name, ROOM_NAMES), as_seed("seed", seed)
@@ -201,7 +201,7 @@ def build_room(
     if isinstance(encoder, str):
         check_encoder(encoder, sensors)
     else:
-        own_encoder(encoder)
+        check_rendered(own_encoder(encoder).record, sensors)
     scene = cached_room_scene(room, room_seed, sensors=tuple(sensors), workers=count, progress=show_progress)
     (encoded,) = encode_scenes(scene, encoder, encoder_seed=encoder_seed, show_progress=show_progress)
     if path is None:

@@ -27,9 +27,11 @@ from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
 from clearway.learn.plugged import faults_of
 from clearway.learn.presets import PRESETS
+from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import RunRecord
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.learn.solved import unsolved_targets
+from clearway.learn.tracking import check_tracker
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_alone
 from clearway.learn.workers import train_by_workers
@@ -40,6 +42,7 @@ from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
 from clearway.spelling import did_you_mean
+from clearway.torch_device import usable_device
 from clearway.torch_threads import torch_threads
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
@@ -179,7 +182,7 @@ def train(
     thread_count = None if threads is None else as_whole("threads", threads, 1)
     until_solved = as_truth("until_solved", until_solved)
     copied = None if copy_to is None else as_word("copy_to", copy_to)
-    seen = _takes(loaded, perturbations_asked(perturb), takes, number, learner, show_progress)
+    kept = None if out is None else as_path("out", out)
     request = RunRequest(
         scenes=loaded,
         targets=chosen,
@@ -190,9 +193,11 @@ def train(
         paths=by_name(pairs),
         device=word,
         feature_store=store,  # type: ignore[arg-type]
-        takes=None if seen is None else seen.seen[FEATURES],
-        takes_made=None if seen is None else {**seen.made, "seed": number},
     )
+    _check(request, kept, workers=processes, resume=resume, track=track)
+    seen = _takes(request, perturbations_asked(perturb), takes, show_progress)
+    if seen is not None:
+        request = replace(request, takes=seen.seen[FEATURES], takes_made={**seen.made, "seed": number})
 
     def begun(path: Path) -> None:
         leave_settings(
@@ -210,7 +215,7 @@ def train(
 
     with ExitStack() as stack:
         stack.enter_context(torch_threads(thread_count))
-        path = stack.enter_context(_temporary()) if out is None else as_path("out", out)
+        path = stack.enter_context(_temporary()) if kept is None else kept
         together = partial(train_by_workers, workers=processes, threads=threads, ray=ray)
         train_run = train_alone if processes == 1 else together
         folder = train_run(
@@ -227,7 +232,7 @@ def train(
             agent=load_agent(path),
             scenes=tuple(loaded),
             metrics=tuple(folder.metrics()),
-            folder=None if out is None else path,
+            folder=kept,
             unsolved=unsolved_targets(folder),
         )
 
@@ -265,23 +270,30 @@ def chosen_learner(
         return replace(learner, **changes)
 
 
-def _takes(
-    scenes: Sequence[Scene],
-    perturbations: Perturbations,
-    takes: int | None,
-    seed: int,
-    learner: Learner,
-    show_progress: bool,
-) -> Takes | None:
+def _check(request: RunRequest, folder: Path | None, *, workers: int, resume: bool, track: TrackerName | None) -> None:
+    """Refuse, before pictures are taken, what training would refuse after it. Raises ClearwayError."""
+    check_tracker(track)
+    with faults_of(request.learner, "paid"):
+        request.learner.paid(request.reward)
+    if workers > 1:
+        request.check_workers(workers)
+    else:
+        usable_device(request.device)
+    if folder is not None and not resume:
+        RunFolder(folder).check_free()
+
+
+def _takes(request: RunRequest, perturbations: Perturbations, takes: int | None, show_progress: bool) -> Takes | None:
     """Features of perturbed takes of the scenes' poses; None where nothing is perturbed."""
     if perturbations == Perturbations():
         if takes is not None:
             raise ArgumentError(f"takes={takes}: where nothing is perturbed a pose has one picture. Give perturb, too")
         return None
     count = TAKES if takes is None else as_whole("takes", takes, 1)
-    learner.check_sees_takes()  # before what takes long
-    own = SEED_LIMIT - 1 - seed  # no pictures that an evaluation with the same seed sees
-    return takes_seen(scenes, perturbations, (FEATURES,), None, takes=count, seed=own, show_progress=show_progress)
+    replace(request, takes=())  # refuses, before what takes long, what cannot be learnt by takes
+    own = SEED_LIMIT - 1 - request.seed  # no pictures that an evaluation with the same seed sees
+    sees = (FEATURES,)
+    return takes_seen(request.scenes, perturbations, sees, None, takes=count, seed=own, show_progress=show_progress)
 
 
 def _as_words(perturb: Perturbed) -> tuple[str, ...]:

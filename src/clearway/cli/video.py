@@ -62,7 +62,7 @@ class Video:
         world, trajectory = single_episode(
             agent, scenes, self.scene, self.target, selection=self.selection, step_limit=self.most_steps, seed=self.seed
         )
-        shown = walked(world, agent.on_poses(world), 0, trajectory)
+        shown = walked(world, agent.on_poses(world), 0, trajectory, scenes=scenes)
         write_video(self.out, frames(scenes, shown), self.frames_per_s)
         say(f"film: {self.out}, {len(trajectory.actions)} steps")
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from clearway.agents.agent import Agent
 from clearway.evaluation.episodes import Trajectory, run_episodes
+from clearway.scenes.scene import Scene
 from clearway.world.world import World
 
 EPISODES = 20  # a target, to choose from
@@ -32,18 +33,22 @@ class Showcase:
     walks: Mapping[str, Trajectory]
 
 
-def showcases(world: World, agents: Mapping[str, Agent], *, seed: int = 0) -> list[Showcase]:
+def showcases(
+    world: World, agents: Mapping[str, Agent], scenes: Sequence[Scene] = (), *, seed: int = 0
+) -> list[Showcase]:
     """For each scene the episode with the longest way among those that most of the agents finish.
 
     Args:
         world: scenes and targets.
         agents: by name; actions are sampled.
+        scenes: the world's, in its order, for agents that see pictures.
         seed: of starts and actions.
     """
     tables = {
         name: run_episodes(
             world,
             agent,
+            scenes=scenes,
             episodes_per_target=EPISODES,
             step_limit=STEP_LIMIT,
             seed=seed,

@@ -50,7 +50,8 @@ def single_episode(
         raise RunError(f"scene {wanted}: not of this run, which has {', '.join(trained)}. Give one of these")
     goal = trained[wanted][0] if target is None else target
     world = run_tables(agent.record, scenes).with_targets({wanted: (goal,)})
-    return world, walked_once(world, agent.on_poses(world), selection=selection, step_limit=step_limit, seed=seed)
+    walker = agent.on_poses(world)
+    return world, walked_once(world, walker, scenes, selection=selection, step_limit=step_limit, seed=seed)
 
 
 def episode_in(
@@ -75,11 +76,13 @@ def episode_in(
         ways = drawn.distance_table()[torch.arange(drawn.target_count), starts]
         target = drawn.scene_state(int(ways.argmax()))
     world = make_world([scene], {scene.name: [target]})
-    return world, walked_once(world, make(world), selection="sampled", step_limit=step_limit, seed=seed)
+    return world, walked_once(world, make(world), [scene], selection="sampled", step_limit=step_limit, seed=seed)
 
 
-def memories(world: World, agent: Agent, walk: Trajectory, target: int = 0) -> Iterator[tuple[Decisions, State]]:
-    """What an agent decides in each pose of an episode, and its state then; it sees poses or features.
+def memories(
+    world: World, agent: Agent, walk: Trajectory, target: int = 0, scenes: Sequence[Scene] = ()
+) -> Iterator[tuple[Decisions, State]]:
+    """What an agent decides in each pose of an episode, and its state then.
 
     What it remembers of its last action is what was done in the episode, whatever it would draw now.
 
@@ -88,8 +91,9 @@ def memories(world: World, agent: Agent, walk: Trajectory, target: int = 0) -> I
         agent: of the episode.
         walk: the episode.
         target: index of the world's.
+        scenes: the world's, in its order, for an agent that sees pictures.
     """
-    sight = Sight(world, agent)
+    sight = Sight(world, agent, scenes)
     state = agent.reset(sight(world.target_state[[target]]), np.zeros(1, np.int64))
     for pose, action in zip_longest(torch.from_numpy(walk.states), walk.actions):
         decisions, state = agent.act(sight(pose[None]), state)
@@ -98,10 +102,19 @@ def memories(world: World, agent: Agent, walk: Trajectory, target: int = 0) -> I
             state = having_taken(np.array([action], np.int64), state)
 
 
-def walked_once(world: World, agent: Agent, *, selection: ActionSelection, step_limit: int, seed: int) -> Trajectory:
-    """One episode to a world's only target."""
+def walked_once(
+    world: World, agent: Agent, scenes: Sequence[Scene], *, selection: ActionSelection, step_limit: int, seed: int
+) -> Trajectory:
+    """One episode to a world's only target; scenes: the world's, in its order."""
     table = run_episodes(
-        world, agent, selection=selection, episodes_per_target=1, step_limit=step_limit, seed=seed, record=True
+        world,
+        agent,
+        scenes=scenes,
+        selection=selection,
+        episodes_per_target=1,
+        step_limit=step_limit,
+        seed=seed,
+        record=True,
     )
     assert table.trajectories is not None
     return table.trajectories[0]

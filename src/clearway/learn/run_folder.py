@@ -119,14 +119,10 @@ class RunFolder:
             RunError: the folder holds a run already (and resume is off), or another experiment, or a run that is not
                 finished and was to have other frames.
         """
-        if not self.exists:
-            for left in (self.metrics_path, self.checkpoints):
-                if left.exists():
-                    raise RunError(f"{self.path}: holds {left.name} but no {RUN_FILE}. Empty it, or give another --out")
+        if not (self.exists and resume):
+            self.check_free()
             self.write_record(record)
             return None
-        if not resume:
-            raise RunError(f"{self.path}: holds a run already. Give --resume to go on with it, or another --out")
         before = self.read_record()
         longer = replace(before, learner=replace(before.learner, frames=record.learner.frames))
         if not longer.same_experiment(record):
@@ -139,6 +135,14 @@ class RunFolder:
             self.forget_metrics_after(-1)
             return None
         return before.other_bits(record)
+
+    def check_free(self) -> None:
+        """Raise RunError where no run can begin: one is here already, or what is left of one."""
+        if self.exists:
+            raise RunError(f"{self.path}: holds a run already. Give --resume to go on with it, or another --out")
+        for left in (self.metrics_path, self.checkpoints):
+            if left.exists():
+                raise RunError(f"{self.path}: holds {left.name} but no {RUN_FILE}. Empty it, or give another --out")
 
     def _lengthened(self, before: RunRecord, frames: int) -> RunRecord:
         """Have a finished run go on to more frames.

@@ -17,7 +17,7 @@ from clearway.perception.random_resnet import RESNET50, ResNetShape
 from clearway.plugins import find_plugin
 from clearway.progress import work_progress
 from clearway.scenes.scene import EncoderRecord, Observations, Scene
-from clearway.scenes.sensors import DEPTH, RGB
+from clearway.scenes.sensors import RGB, SENSORS
 from clearway.spread.workers import Work, Workers, workers_for
 from clearway.torch_threads import threads_in_use, torch_threads
 
@@ -71,10 +71,16 @@ def check_encoder(encoder: str, sensors: Sequence[str]) -> None:
     Raises:
         EncoderError, PluginError: as of `find_record`; or its sensor is not rendered.
     """
-    if encoder == depth_grid.NAME and DEPTH not in sensors:
-        raise EncoderError(f"encoder {encoder} sees depth, and it is not rendered. Add --sensors {RGB} {DEPTH}")
-    if encoder != RANDOM:
-        find_record(encoder, ())
+    if encoder != RANDOM:  # which sees colour, and is calibrated on pictures that are still to be rendered
+        check_rendered(find_record(encoder, ()), sensors)
+
+
+def check_rendered(record: EncoderRecord, sensors: Sequence[str]) -> None:
+    """Raise EncoderError where an encoder's sensor is not among those to be rendered."""
+    sensor = sensor_of(record)
+    if sensor not in sensors:
+        remedy = f"Add --sensors {RGB} {sensor}" if sensor in SENSORS else f"Use one that sees {' or '.join(SENSORS)}"
+        raise EncoderError(f"encoder {record.name} sees {sensor}, and it is not rendered. {remedy}")
 
 
 def encoder_from_record(record: EncoderRecord) -> Encoder:

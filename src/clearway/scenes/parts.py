@@ -12,7 +12,7 @@ import numpy as np
 
 from clearway.errors import SceneError
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene, TopView
-from clearway.scenes.sensors import Readings
+from clearway.scenes.sensors import Readings, Sensor
 
 CORRECT = "Correct the program that made it: clearway.scenes.scene.Scene says what each part is"
 MOST_LETTERS = 200  # of a scene's name, as UTF-8; names of files are cut at 255
@@ -63,8 +63,8 @@ def _parts(scene: Scene) -> Iterator[tuple[str, Any, bool, str]]:
         pictures is None or _is_indexed(pictures),
         "a NumPy array (S, height, width, 3) uint8",
     )
-    yield "features", features, features is None or hasattr(features, "__array__"), "a NumPy array (S, F)"
-    yield "cell_size_m", scene.cell_size_m, _is_number(scene.cell_size_m), "a number"
+    yield "features", features, features is None or _is_table(features), "a NumPy array (S, F)"
+    yield "cell_size_m", scene.cell_size_m, _is_number(scene.cell_size_m), "a number, int or float"
     yield "made_by", scene.made_by, isinstance(scene.made_by, Provenance), "a Provenance"
     yield from _parts_of_provenance(scene.made_by)
     if scene.encoder is not None:
@@ -72,9 +72,11 @@ def _parts(scene: Scene) -> Iterator[tuple[str, Any, bool, str]]:
     if (view := scene.top_view) is not None:
         yield "top_view", view, isinstance(view, TopView) and _is_array(view.image), "a TopView with a NumPy array"
         extent_m = (view.x_min_m, view.x_max_m, view.z_min_m, view.z_max_m)
-        yield "top_view's extent", extent_m, all(map(_is_number, extent_m)), "numbers"
+        yield "top_view's extent", extent_m, all(map(_is_number, extent_m)), "numbers, int or float"
     further = isinstance(scene.further, tuple) and all(isinstance(one, Readings) for one in scene.further)
     yield "further", scene.further, further, "a tuple of Readings"
+    for readings in scene.further:
+        yield from _parts_of_readings(readings)
 
 
 def _parts_of_provenance(made_by: Provenance) -> Iterator[tuple[str, Any, bool, str]]:
@@ -93,23 +95,51 @@ def _parts_of_encoder(encoder: EncoderRecord) -> Iterator[tuple[str, Any, bool, 
         yield f"encoder.{name}", value, isinstance(value, str), "a text"
     yield "encoder.settings", encoder.settings, isinstance(encoder.settings, Mapping), "a dict"
     arrays = encoder.arrays
-    sound = isinstance(arrays, Mapping) and all(isinstance(values, np.ndarray) for values in arrays.values())
-    yield "encoder.arrays", arrays, sound, "a dict of NumPy arrays"
+    yield "encoder.arrays", arrays, isinstance(arrays, Mapping), "a dict of NumPy arrays"
+    for name, values in arrays.items():
+        yield "a name in encoder.arrays", name, is_name(name), "a short text without slashes and line breaks"
+        yield f"encoder.arrays[{name!r}]", values, _is_array(values, "biuf"), "a NumPy array of numbers"
 
 
-def _is_array(values: object) -> bool:
-    return isinstance(values, np.ndarray) and values.dtype.kind in "iuf"
+def _parts_of_readings(readings: Readings) -> Iterator[tuple[str, Any, bool, str]]:
+    sensor, raw = readings.sensor, readings.raw
+    yield "further: a sensor", sensor, isinstance(sensor, Sensor), "a Sensor"
+    for name in ("name", "dtype", "unit"):
+        value = getattr(sensor, name)
+        yield f"further: a sensor's {name}", value, isinstance(value, str), "a text"
+    for name in ("low", "high", *(() if sensor.step is None else ("step",))):
+        value = getattr(sensor, name)
+        yield f"further: {sensor.name}'s {name}", value, _is_number(value), "a number, int or float"
+    sides = isinstance(sensor.shape, tuple | list) and all(isinstance(side, int | np.integer) for side in sensor.shape)
+    yield f"further: {sensor.name}'s shape", sensor.shape, sides, "a tuple of whole numbers"
+    yield f"further: {sensor.name}'s raw", raw, _is_on_demand(raw), "an array (S, ...)"
+
+
+def _is_array(values: object, kinds: str = "iuf") -> bool:
+    return isinstance(values, np.ndarray) and values.dtype.kind in kinds
+
+
+def _is_table(features: Any) -> bool:
+    """An array, whose shape is checked later, or what gives one of rows."""
+    shape = getattr(features, "shape", None)
+    rows = hasattr(features, "__array__") and isinstance(shape, tuple) and len(shape) == 2
+    return rows or isinstance(features, np.ndarray)
 
 
 def _is_indexed(pictures: Any) -> bool:
     """An array of bytes, or what is read on demand."""
     if isinstance(pictures, np.ndarray):
         return pictures.dtype == np.uint8
-    return isinstance(getattr(pictures, "shape", None), tuple) and hasattr(pictures, "__getitem__")
+    return _is_on_demand(pictures)
+
+
+def _is_on_demand(values: Any) -> bool:
+    return isinstance(getattr(values, "shape", None), tuple) and hasattr(values, "__getitem__")
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+    """One that a file can keep, Python's or NumPy's."""
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
 def _told(found: object) -> str:

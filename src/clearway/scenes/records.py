@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 import h5py
@@ -124,7 +123,7 @@ def write_sensor(dataset: h5py.Dataset, sensor: Sensor) -> None:
 
 def write_provenance(file: h5py.File, made_by: Provenance) -> None:
     """Keep what made the scene as one JSON attribute."""
-    hdf5.write_text(file, "made_by", json.dumps(asdict(made_by)))
+    hdf5.write_text(file, "made_by", json.dumps(made_by.to_json()))
 
 
 def write_encoder(file: h5py.File, encoder: EncoderRecord) -> None:

@@ -98,6 +98,10 @@ class Provenance:
     versions: Mapping[str, str] = field(default_factory=dict)
     notes: Mapping[str, object] = field(default_factory=dict)
 
+    def to_json(self) -> dict[str, object]:
+        """As JSON values."""
+        return {**vars(self), "versions": dict(self.versions), "notes": dict(self.notes)}
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

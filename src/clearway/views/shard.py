@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -97,7 +97,7 @@ class Shard:
 def room_key(scene: Scene) -> str:
     """A hash of what a room is: its poses, the moves between them, and what made it."""
     digest = hashlib.sha256()
-    made = {key: value for key, value in asdict(scene.made_by).items() if key != "versions"}
+    made = {key: value for key, value in scene.made_by.to_json().items() if key != "versions"}
     digest.update(json.dumps([scene.name, scene.cell_size_m, made], sort_keys=True, default=str).encode())
     for array in (scene.graph, scene.locations_m, scene.headings_deg):
         digest.update(str((array.shape, array.dtype.str)).encode())
@@ -112,7 +112,7 @@ def write_shard(path: Path, scene: Scene, settings: ViewSettings, views: RoomVie
         file.attrs["format_version"] = FORMAT_VERSION
         hdf5.write_text(file, "clearway_version", __version__)
         hdf5.write_text(file, "room", json.dumps({"name": scene.name, "key": room_key(scene)}))
-        hdf5.write_text(file, "made_by", json.dumps(asdict(scene.made_by)))
+        hdf5.write_text(file, "made_by", json.dumps(scene.made_by.to_json()))
         hdf5.write_text(file, "settings", json.dumps(settings.to_json()))
         file.attrs["vertical_fov_deg"] = VERTICAL_FOV_DEG
         table = hdf5.write_array(file, TABLE, views.table.to_array())

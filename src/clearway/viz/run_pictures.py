@@ -22,7 +22,7 @@ def draw_run_pictures(
     folder.mkdir(parents=True, exist_ok=True)
     world, level = run_world(agent.record, scenes), agent.record.zone_level
     name = agent.record.reward.name
-    shown = showcases(world, {name: agent.on_poses(world)}, seed=seed)
+    shown = showcases(world, {name: agent.on_poses(world)}, scenes, seed=seed)
     made = [folder / "curves.png"]
     draw_curves({name: RunFolder(run).metrics()}, made[0])
     for scene, show in zip(scenes, shown, strict=True):

@@ -52,14 +52,25 @@ class Walked:
 
 
 def walked(
-    world: World, agent: Agent, target: int, trajectory: Trajectory, holds: Callable[[State], Held] | None = None
+    world: World,
+    agent: Agent,
+    target: int,
+    trajectory: Trajectory,
+    holds: Callable[[State], Held] | None = None,
+    scenes: Sequence[Scene] = (),
 ) -> Walked:
-    """The episode with what the agent holds of its actions at each pose; it sees poses or features.
+    """The episode with what the agent holds of its actions at each pose.
 
-    holds: tells, by its state, what an agent with a map holds besides.
+    Args:
+        world: where it was walked.
+        agent: who walked.
+        target: index of the world's target.
+        trajectory: states and actions.
+        holds: tells, by its state, what an agent with a map holds besides.
+        scenes: the world's, in its order, for an agent that sees pictures.
     """
     thoughts, held = [], []
-    for decisions, state in memories(world, agent, trajectory, target):
+    for decisions, state in memories(world, agent, trajectory, target, scenes):
         thoughts.append(decisions.probabilities)
         held += [] if holds is None else [holds(state)]
     told = [thought for thought in thoughts if thought is not None]
