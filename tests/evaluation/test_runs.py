@@ -2,10 +2,12 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import torch
 
+from clearway.agents.agent import Decisions
 from clearway.agents.by_pose import RandomWalk
 from clearway.errors import RunError
 from clearway.evaluation.optimum import world_yardsticks
@@ -38,6 +40,22 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
     assert markdown_table([sampled, *others]).count(f"{told}[-1, 1], zones of cells.") == 1
     assert f"optimum ({NAME})" in [other.agent for other in others]  # not the unclipped one
     assert [other.agent for other in others if other.trained] == [NAME] * 2  # the other ways to choose
+
+
+def test_an_agent_that_tells_no_probabilities_is_evaluated_as_it_chooses_alone() -> None:
+    class Walks(RandomWalk):
+        def act(self, observation, state):
+            decisions, after = super().act(observation, state)
+            return Decisions(decisions.action), after
+
+    request = small_request()
+    silent = SimpleNamespace(record=record_of(request), frames=0, on_poses=lambda world: Walks())
+    found = evaluate_run(silent, request.scenes, episodes_per_target=2, step_limit=10)
+    of_agents = [(one.agent, one.protocol.action_selection) for one in found]
+    assert of_agents[0] == ("collision-aware", "sampled") and found[0].trained
+    assert [name for name, _ in of_agents].count("collision-aware") == 1
+    assert of_agents[-2:] == [("random", "sampled"), ("shortest path", "sampled")]
+    assert found[0].average.values == found[-2].average.values  # it is the random walk
 
 
 def test_runs_of_other_zones_and_names_given_twice_are_refused(tmp_path: Path) -> None:

@@ -1,23 +1,33 @@
 """Trainers and agents of other packages: every fault in one line, and no folder of a run that could not act."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import clearway
+from clearway.api.training import chosen_learner
 from clearway.errors import AgentError, PluginError, RunError
 from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.foreign_agent import ForeignTrained
+from clearway.learn.load import load_network
 from clearway.learn.metrics_log import OWN_FIGURES, metrics_row
+from clearway.learn.peers import ALONE
 from clearway.learn.q_learning import TableTrainer
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
+from clearway.learn.train import RunRequest, train_part
 from clearway.reward import COLLISION_AWARE
 from helpers.made import corridor_scene
-from helpers.own_algorithm import CLASS, SMALL, SOURCE, offer_algorithm, with_body, with_trainer
+from helpers.own_algorithm import CLASS, SMALL, SOURCE, forget_algorithm, offer_algorithm, with_body, with_trainer
 from helpers.small_runs import CORRIDOR_TARGETS, corridor_world
 
 SCENE = corridor_scene(5, feature_count=12)
 FIGURES = "def update(self): return super().update() and {}"
 TENSORS = "def tensors(self): return {}"
+FURTHER = "def tensors(self): return super().tensors() | ({} if {} else {{}})"
+CLOSES = "def close(self): open({!r}, 'w').close()"
+NO_AGENT = "    agent = clearway.Learner.agent\n"  # after a class's last line
 AGENT = "def agent(self, record, tensors, frames): {}"
 OWN_AGENT = """
 class Learnt:
@@ -31,8 +41,32 @@ class Learnt:
 """
 
 
+OWN_NETWORK = """
+from clearway.learn.load import TrainedNetwork
+from clearway.learn.ppo import PPO
+
+
+class Mine(TrainedNetwork):
+    pass
+
+
+@dataclass(frozen=True)
+class Odd(PPO):
+    algorithm: ClassVar[str] = "odd"
+
+    def agent(self, record, tensors, frames):
+        found = super().agent(record, tensors, frames)
+        return Mine(record, found.network, found.feature_map, frames)
+"""
+
+
 def trained(out: Path | None = None, **settings):
     return clearway.train(SCENE, list(CORRIDOR_TARGETS), algorithm="odd", out=out, **{**SMALL, **settings})
+
+
+def small_odd_request() -> RunRequest:
+    learner = chosen_learner("odd", settings=SMALL)
+    return RunRequest([SCENE], {SCENE.name: CORRIDOR_TARGETS}, learner, COLLISION_AWARE)
 
 
 @pytest.mark.parametrize(
@@ -58,6 +92,24 @@ def trained(out: Path | None = None, **settings):
         (with_trainer(TENSORS.format("{'net.values': self.values}")), "agent failed .*no tensors, by acts_on 'table'"),
         (with_trainer("def fixed_tensors(self): return 1 / 0"), r"fixed_tensors failed \(ZeroDivisionError"),
         (with_trainer("finished = property(lambda self: 1 / 0)"), r"trainer failed \(ZeroDivisionError"),
+        (with_trainer("finished = True"), r"its trainer is finished before its first frame\. Ask its authors"),
+        (
+            with_trainer(FURTHER.format("{'x.y': torch.zeros(2, dtype=torch.complex128)}", "True")),
+            r"keeping its tensors failed \(KeyError",
+        ),
+        (
+            with_trainer(FURTHER.format("{'table.y': torch.zeros(2, device='meta')}", "True")),
+            r"keeping its tensors failed \(NotImplementedError",
+        ),
+        (
+            with_trainer(FURTHER.format("{'__metadata__': torch.zeros(2)}", "True")),
+            r"keeping its tensors failed \(SafetensorError",
+        ),
+        (
+            with_trainer(FURTHER.format("{'x.y': torch.zeros(2, dtype=torch.complex128)}", "self.frames")),
+            r"keeping its tensors failed \(KeyError",
+        ),
+        (with_body("def warn_of(self, scenes): 1 / 0"), r"warn_of failed \(ZeroDivisionError"),
         (with_body("agent = clearway.Learner.agent"), r"agent failed \(KeyError: 'mean'\), given table.values"),
         (with_body(AGENT.format("return None")), "agent gives None, which lacks record, frames, on_poses"),
         (with_body(AGENT.format("return len(5)")), r"agent failed \(TypeError"),
@@ -69,6 +121,58 @@ def test_a_fault_is_one_line_that_says_whose_it_is_and_leaves_no_folder(tmp_path
         trained(tmp_path / "run")
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("paid", lambda request: request.paid),
+        ("check_workers", lambda request: request.check_workers(1)),
+        ("check_sees_takes", lambda request: replace(request, takes=())),
+    ],
+)
+def test_what_a_request_asks_of_its_class_is_told_as_its_fault_too(tmp_path, monkeypatch, name, asked) -> None:
+    offer_algorithm(tmp_path, monkeypatch, with_body(f"def {name}(self, *given): 1 / 0"))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: {name} failed \(ZeroDivisionError: division by zero\)"):
+        asked(small_odd_request())
+
+
+def test_a_run_whose_algorithm_fails_at_its_reward_by_now_is_told_of_in_a_line(tmp_path, monkeypatch) -> None:
+    site = offer_algorithm(tmp_path / "then", monkeypatch, CLASS)
+    trained(tmp_path / "run")
+    forget_algorithm(site, monkeypatch)
+    offer_algorithm(tmp_path / "now", monkeypatch, with_body("def paid(self, reward): 1 / 0"))
+    with pytest.raises(RunError, match=rf"run\.json: {SOURCE}: paid failed \(ZeroDivisionError: division by zero\)"):
+        clearway.load_agent(tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("trainer", "odd"),
+    [
+        ("", NO_AGENT),
+        ("", ""),  # what is in the folder is in the way
+        ("finished = True", ""),
+        ("finished = property(lambda self: 1 / 0)", ""),
+        ("statistics = property(lambda s: 3, lambda s, v: None)", ""),
+    ],
+)
+def test_a_trainer_is_closed_where_its_training_is_refused(tmp_path, monkeypatch, trainer, odd) -> None:
+    closed, left = tmp_path / "closed", tmp_path / "run" / "metrics.jsonl"
+    left.parent.mkdir()
+    left.touch()
+    offer_algorithm(tmp_path, monkeypatch, with_trainer(f"{CLOSES.format(str(closed))}\n{trainer}") + odd)
+    with pytest.raises((PluginError, RunError)):
+        trained(left.parent, resume=True)  # so that it is refused as late as can be
+    assert closed.exists()
+
+
+def test_the_trainer_of_one_of_several_workers_is_closed_too(tmp_path, monkeypatch) -> None:
+    closed, folder = tmp_path / "closed", RunFolder(tmp_path / "run")
+    offer_algorithm(tmp_path, monkeypatch, with_trainer(CLOSES.format(str(closed))))
+    request = small_odd_request()
+    with folder.held(), folder.begun(record_of(request), resume=False):
+        train_part(request, folder, ALONE, show_progress=False, until_solved=False, track=None, checkpoint_s=60.0)
+    assert closed.exists()
 
 
 def test_an_agent_that_cannot_be_made_is_told_of_before_the_first_frame(tmp_path, monkeypatch) -> None:
@@ -99,7 +203,8 @@ def test_a_fault_in_going_on_is_one_line_too(tmp_path, monkeypatch, body, told) 
 def test_figures_that_are_pytorch_s_and_tensors_of_one_memory_are_kept(tmp_path, monkeypatch) -> None:
     figures = FIGURES.format("{'loss': torch.tensor(1.5)}")
     tensors = "def tensors(self): return super().tensors() | {'table.same': self.values, 'x.y': torch.zeros(3, 4).t()}"
-    offer_algorithm(tmp_path, monkeypatch, with_trainer(f"{figures}\n{tensors}"))
+    fixed = "def fixed_tensors(self): return {'fixed': self.values, 'again': self.values[1:]}"
+    offer_algorithm(tmp_path, monkeypatch, with_trainer(f"{figures}\n{tensors}\n{fixed}"))
     run = trained(tmp_path / "run")
     assert run.figures["loss"] == 1.5
     assert trained(tmp_path / "run", resume=True).metrics == run.metrics
@@ -134,6 +239,13 @@ def test_an_agent_s_faults_in_walking_are_told_as_its_package_s(tmp_path, monkey
         clearway.evaluate(run, episodes=1, step_limit=5)
     with pytest.raises((PluginError, AgentError), match=told):
         clearway.evaluate_goals(run.agent, SCENE, goals=1, step_limit=5)
+
+
+def test_an_agent_derived_from_our_network_s_has_a_network(tmp_path, monkeypatch) -> None:
+    offer_algorithm(tmp_path, monkeypatch, OWN_NETWORK)
+    run = trained(tmp_path / "run", width=16)
+    assert isinstance(run.agent, ForeignTrained)
+    assert type(load_network(tmp_path / "run")).__name__ == "Mine"
 
 
 def test_what_is_ours_stands_behind_no_guard(tmp_path, monkeypatch) -> None:

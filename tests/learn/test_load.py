@@ -18,6 +18,7 @@ from clearway.learn.train import RunRequest, train
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.scenes.validate import SceneWarning
 from clearway.world.world import make_world
 from helpers.agents import after_poses
 from helpers.small_runs import small_learner, small_request, small_scenes
@@ -118,6 +119,17 @@ def test_a_renamed_file_is_known_by_what_it_holds(tmp_path: Path) -> None:
     assert [scene_digest(scene) for scene in scenes] == [scene.digest for scene in record.scenes]
     with pytest.raises(RunError, match=r"scene grid .* given \(other-grid, my-corridor\), by name or by what"):
         run_scenes(record, [other, renamed[1]])
+
+
+def test_what_is_left_out_is_told_of_where_the_run_was_not_trained_there_alone(tmp_path: Path) -> None:
+    request = request_with_files(tmp_path)
+    record = train(request, tmp_path / "run").read_record()
+    grid, corridor = tmp_path / "grid.h5", tmp_path / "corridor.h5"
+    again = [replace(scene, name=f"copy of {scene.name}") for scene in request.scenes]
+    scenes = run_scenes(record, [corridor, grid, corridor, *again])  # a warning is an error in tests
+    assert [scene.name for scene in scenes] == ["corridor", "grid"]
+    with pytest.warns(SceneWarning, match="^grid: left out, as the run was not trained there"):
+        run_scenes(record, [corridor, grid, changed(request.scenes[1])])
 
 
 def test_a_scene_made_in_memory_has_no_file_to_come_back_from(tmp_path: Path) -> None:

@@ -11,7 +11,9 @@ from clearway.learn.algorithms import algorithm
 from clearway.learn.plugged import ARGUMENTS, faults_of
 from clearway.learn.ppo import PPO
 from clearway.learn.settings import with_settings
-from helpers.own_algorithm import CLASS, OPTIONAL, SOURCE, offer_algorithm, with_body
+from helpers.made import corridor_scene
+from helpers.own_algorithm import CLASS, OPTIONAL, SMALL, SOURCE, offer_algorithm, with_body
+from helpers.small_runs import CORRIDOR_TARGETS
 
 UNDECORATED = CLASS.replace("@dataclass(frozen=True)\n", "")
 ELSEWHERE = """
@@ -120,6 +122,16 @@ def test_what_a_class_raises_of_values_is_told_as_its_fault(tmp_path, monkeypatc
     ):
         with pytest.raises(PluginError, match=told):
             set_hot()
+
+
+def test_a_run_goes_on_by_the_same_settings_alone_however_its_class_compares_them(tmp_path, monkeypatch) -> None:
+    source = CLASS.replace("frozen=True", "frozen=True, eq=False")
+    offer_algorithm(tmp_path, monkeypatch, f"{source}    extra: int = 3\n")
+    how = {"algorithm": "odd", "out": tmp_path / "run", **SMALL}
+    clearway.train(corridor_scene(5), list(CORRIDOR_TARGETS), **how)
+    with pytest.raises(RunError, match="holds another experiment"):
+        clearway.train(corridor_scene(5), list(CORRIDOR_TARGETS), **how, resume=True, extra=7)
+    clearway.train(corridor_scene(5), list(CORRIDOR_TARGETS), **how, resume=True, extra=3)
 
 
 def test_faults_of_ours_and_interruptions_pass(tmp_path, monkeypatch) -> None:

@@ -34,6 +34,10 @@ _BIT = np.arange(ACTION_COUNT)
 _ALL_TRIED = (1 << ACTION_COUNT) - 1
 
 
+class NoProbabilities(AgentError):
+    """An agent tells none, so that nobody can choose by them."""
+
+
 def selecting(agent: Agent, selection: ActionSelection, world: World) -> Agent:
     """The agent, choosing its actions in that way, in a world."""
     if selection == "sampled":
@@ -101,7 +105,7 @@ class ArgmaxUntried:
 
 
 def most_probable(decisions: Decisions) -> Decisions:
-    """The same with the most probable actions, the first among equals. Raises AgentError: none are told."""
+    """The same with the most probable actions, the first among equals. Raises NoProbabilities."""
     action = _probabilities(decisions).argmax(1)
     return replace(decisions, action=action, certain=np.ones(len(action), bool))
 
@@ -113,5 +117,7 @@ def having_taken(action: np.ndarray, state: State) -> State:
 
 def _probabilities(decisions: Decisions) -> np.ndarray:
     if decisions.probabilities is None:
-        raise AgentError("the agent tells no probabilities, which argmax goes by. Let it choose by itself: sampled")
+        raise NoProbabilities(
+            "the agent tells no probabilities, which argmax goes by. Let it choose by itself: sampled"
+        )
     return decisions.probabilities

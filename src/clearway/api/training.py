@@ -176,7 +176,8 @@ def train(
     chosen = chosen_targets(loaded, targets, number)
     for line in told_of_held_out(loaded, chosen):
         warnings.warn(line, SceneWarning, stacklevel=2)
-    learner.warn_of(loaded)
+    with faults_of(learner, "warn_of"):
+        learner.warn_of(loaded)
     earned, word = reward_named(reward), as_word("device", device)  # before what takes long
     level = as_choice("zone_level", zone_level, get_args(ZoneLevel))
     thread_count = None if threads is None else as_whole("threads", threads, 1)
@@ -273,8 +274,7 @@ def chosen_learner(
 def _check(request: RunRequest, folder: Path | None, *, workers: int, resume: bool, track: TrackerName | None) -> None:
     """Refuse, before pictures are taken, what training would refuse after it. Raises ClearwayError."""
     check_tracker(track)
-    with faults_of(request.learner, "paid"):
-        request.learner.paid(request.reward)
+    _ = request.paid
     if workers > 1:
         request.check_workers(workers)
     else:

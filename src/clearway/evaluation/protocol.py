@@ -8,7 +8,7 @@ from typing import get_args
 
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk, shortest_paths
-from clearway.agents.selection import ActionSelection
+from clearway.agents.selection import ActionSelection, NoProbabilities
 from clearway.errors import AgentError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT, run_episodes
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
@@ -35,7 +35,7 @@ def evaluate_agents(
     """Every agent with each way of choosing actions, then the references, random and shortest-path agent.
 
     All face the same starts. Order: each agent "sampled", "argmax" and "argmax-untried", references, "random",
-    "shortest path".
+    "shortest path". An agent that tells no probabilities has "sampled" alone: it chooses by itself.
 
     Args:
         world: scenes and targets.
@@ -58,7 +58,7 @@ def evaluate_agents(
     rows += [(RANDOM, "sampled", RandomWalk()), (SHORTEST_PATH, "sampled", shortest_paths(world))]
     evaluations = []
     with work_progress("evaluating", len(rows), show_progress, unit="agents") as show_done:
-        for name, selection, agent in rows:
+        for done, (name, selection, agent) in enumerate(rows, 1):
             try:
                 table = run_episodes(
                     world,
@@ -69,11 +69,13 @@ def evaluate_agents(
                     step_limit=step_limit,
                     seed=seed,
                 )
+            except NoProbabilities:
+                continue
             except AgentError as fault:
                 raise AgentError(f"{name}: {fault}") from fault
             protocol = Protocol(episodes_per_target, step_limit, seed, selection)
             evaluations.append(summarise(world, table, name, encoder, protocol))
-            show_done(len(evaluations))
+            show_done(done)
     return evaluations
 
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from safetensors import SafetensorError
-from safetensors.torch import load, save_file
+from safetensors.torch import load, save, save_file
 from torch import Tensor
 
 from clearway.errors import RunError, reason_of
@@ -65,7 +65,7 @@ def write_checkpoint(
         part.mkdir(parents=True)
         sums = {}
         for name, tensors in ((NETWORK_FILE, network), (TRAINING_FILE, training)):
-            save_file({key: tensor.detach().cpu().contiguous() for key, tensor in tensors.items()}, part / name)
+            save_file(_as_written(tensors), part / name)
             sums[name] = sha256_of(part / name)
         manifest = {"format_version": FORMAT_VERSION, **vars(progress), "sha256": sums}
         (part / MANIFEST_FILE).write_text(json.dumps(manifest, indent=2) + "\n")
@@ -80,6 +80,19 @@ def write_checkpoint(
     for old in upto_now[:-KEPT]:
         shutil.rmtree(old)
     return final
+
+
+def written_and_read(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors as a checkpoint would give them back; no file is made.
+
+    Raises:
+        Exception: whatever PyTorch and safetensors raise of what cannot be kept.
+    """
+    return load(save(_as_written(tensors)))
+
+
+def _as_written(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    return {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
 
 
 def keep_newest_checkpoint(folder: Path) -> None:

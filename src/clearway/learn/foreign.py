@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from operator import index
 from typing import Any
 
 from torch import Tensor
 
 from clearway.errors import PluginError, kind_and_reason
+from clearway.learn.checkpoint import written_and_read
 from clearway.learn.figures import Figures
 from clearway.learn.foreign_agent import made_agent
 from clearway.learn.kinds import fits
@@ -33,13 +35,25 @@ def made_trainer(learner: Learner, world: World, reward: Reward, seed: int, shar
         RunError: the seed or the settings do not fit the world, or the algorithm is not for several workers.
         PluginError: the algorithm is another package's and fails, or its trainer lacks what one has to offer.
     """
-    with faults_of(learner, "trainer" if share is None else "part_trainer"):
+    called = "trainer" if share is None else "part_trainer"
+    with faults_of(learner, called):
         trainer = (
             learner.trainer(world, reward, seed) if share is None else learner.part_trainer(world, reward, seed, share)
         )
-        plugin = find_plugin("algorithms", learner.algorithm)
-        if plugin is None:
-            return trainer
+    plugin = find_plugin("algorithms", learner.algorithm)
+    if plugin is None:
+        return trainer
+    try:
+        return _guarded(trainer, learner, plugin, called)
+    except BaseException:
+        with suppress(Exception):  # what is no trainer may lack it
+            trainer.close()
+        raise
+
+
+def _guarded(trainer: Learning, learner: Learner, plugin: Plugin, called: str) -> ForeignTrainer:
+    """Another's trainer at its first frame, behind its guard. Raises PluginError: it is none, or has nothing to do."""
+    with faults_of(learner, called):
         lacks = [name for name in OFFERED if not hasattr(trainer, name)]
     if lacks:
         told = f"{plugin}: trainer gives {trainer!r:.60}, which lacks {', '.join(lacks)}"
@@ -47,7 +61,10 @@ def made_trainer(learner: Learner, world: World, reward: Reward, seed: int, shar
     if not isinstance(trainer.statistics, EpisodeStatistics):
         told = f"{plugin}: its trainer's statistics are {trainer.statistics!r:.60}, expected EpisodeStatistics"
         raise PluginError(f"{told} (clearway.learn.statistics). Ask its authors")
-    return ForeignTrainer(trainer, learner, plugin)
+    guarded = ForeignTrainer(trainer, learner, plugin)
+    if guarded.finished:
+        raise PluginError(f"{plugin}: its trainer is finished before its first frame. Ask its authors")
+    return guarded
 
 
 class ForeignTrainer:
@@ -119,10 +136,10 @@ class ForeignTrainer:
         return self._checked("tensors", found)
 
     def fixed_tensors(self) -> dict[str, Tensor]:
-        """See `Learning`."""
+        """See `Learning`; copies, as they are written together with some of `tensors`."""
         with faults_of(self.learner, "fixed_tensors"):
             found = self.trainer.fixed_tensors()
-        return self._checked("fixed_tensors", found)
+        return {name: tensor.detach().clone() for name, tensor in self._checked("fixed_tensors", found).items()}
 
     def _checked(self, called: str, found: object) -> dict[str, Tensor]:
         if not isinstance(found, Mapping):
@@ -154,9 +171,11 @@ class ForeignTrainer:
         """Make an agent of its tensors, as one is made of a checkpoint's.
 
         Raises:
-            PluginError: there will be none.
+            PluginError: there will be none, or a checkpoint cannot keep them.
         """
-        acting = {name: tensor.detach().cpu() for name, tensor in acting_tensors(self, tensors).items()}
+        with faults_of(self.learner, "keeping its tensors"):
+            written_and_read(tensors)
+            acting = written_and_read(acting_tensors(self, tensors))
         try:
             made_agent(record, acting, self.frames)
         except (LookupError, RuntimeError, ValueError) as fault:

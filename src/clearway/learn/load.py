@@ -16,7 +16,7 @@ from clearway.choices import GENERALIST
 from clearway.errors import RunError
 from clearway.learn.checkpoint import newest_checkpoint, read_network, read_progress
 from clearway.learn.described import described
-from clearway.learn.foreign_agent import made_agent
+from clearway.learn.foreign_agent import ForeignTrained, made_agent
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
 from clearway.learn.run_folder import CHECKPOINTS, MILESTONES, RunFolder
@@ -104,6 +104,8 @@ def load_network(folder: Path, checkpoint: Path | None = None) -> TrainedNetwork
         RunError: as for `load_agent`, or the agent has no network.
     """
     agent = load_agent(folder, checkpoint)
+    if isinstance(agent, ForeignTrained):
+        agent = agent.trained
     if not isinstance(agent, TrainedNetwork):
         name = agent.record.learner.algorithm
         raise RunError(
@@ -181,7 +183,9 @@ def run_scenes(
         places = [_place_among(loaded, wanted) for wanted in record.scenes]
         found = [_called(loaded[place], wanted.name) for place, wanted in zip(places, record.scenes, strict=True)]
         if tells_others:
-            _warn_of_others([scene.name for place, scene in enumerate(loaded) if place not in places])
+            known = {wanted.digest for wanted in record.scenes}
+            left = [scene for place, scene in enumerate(loaded) if place not in places]
+            _warn_of_others([scene.name for scene in left if scene_digest(scene) not in known])
     else:
         paths = _places(record)
         found = [_in_file(wanted.name, paths.get(wanted.path or "", wanted.path)) for wanted in record.scenes]

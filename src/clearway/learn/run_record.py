@@ -98,7 +98,8 @@ class RunRecord:
 
         def essence(run: RunRecord) -> tuple:
             scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
-            return run.learner, run.reward.to_json(), run.seed, run.zone_level, scenes, run.takes
+            learner = run.learner.algorithm, asdict(run.learner)  # a class may be compared in another way
+            return learner, run.reward.to_json(), run.seed, run.zone_level, scenes, run.takes
 
         return essence(self) == essence(other)
 
@@ -151,7 +152,9 @@ def record_from(content: Mapping[str, Any], version: int) -> RunRecord:
         if not fits(given[name], kind):
             raise TypeError(f"{name} is {given[name]!r:.40}")
     _check_installed(content["learner"]["algorithm"], content["versions"])
-    learner, reward = clipped_once(_learner(content["learner"], version), reward_from_json(content["reward"]))
+    learner, reward = _learner(content["learner"], version), reward_from_json(content["reward"])
+    with faults_of(learner, "paid"):
+        learner, reward = clipped_once(learner, reward)
     return RunRecord(
         learner=learner,
         reward=reward,

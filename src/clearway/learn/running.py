@@ -20,6 +20,7 @@ from clearway.learn.learner import Learner
 from clearway.learn.metrics_log import MetricsLog, metrics_row
 from clearway.learn.pace import Pace
 from clearway.learn.peers import Peers
+from clearway.learn.plugged import faults_of
 from clearway.learn.progress import ProgressView
 from clearway.learn.run_copy import CopyingMeanwhile, RunCopy
 from clearway.learn.run_folder import RunFolder
@@ -194,8 +195,7 @@ def save(trainer: Learning, folder: RunFolder, seconds: float) -> None:
     """Write a checkpoint of the trainer as it stands."""
     tensors = trainer.tensors()
     training = {key: value for key, value in tensors.items() if not _acts(trainer, key)}
-    progress = Progress(trainer.frames, trainer.updates, seconds)
-    write_checkpoint(folder.checkpoints, acting_tensors(trainer, tensors), training, progress)
+    _write(trainer, folder.checkpoints, tensors, training, seconds)
 
 
 def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
@@ -203,8 +203,16 @@ def _save_agent(trainer: Learning, folder: Path, seconds: float) -> None:
     tensors = trainer.tensors()
     if folder.exists():
         shutil.rmtree(folder)
+    _write(trainer, folder, tensors, {}, seconds)
+
+
+def _write(
+    trainer: Learning, folder: Path, tensors: Mapping[str, Tensor], training: Mapping[str, Tensor], seconds: float
+) -> None:
+    """Write a checkpoint of what acts among the trainer's tensors, and of what it needs to train on."""
     progress = Progress(trainer.frames, trainer.updates, seconds)
-    write_checkpoint(folder, acting_tensors(trainer, tensors), {}, progress)
+    with faults_of(trainer.learner, "keeping its tensors", (OSError,)):
+        write_checkpoint(folder, acting_tensors(trainer, tensors), training, progress)
 
 
 def acting_tensors(trainer: Learning, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.peers import ALONE, Peers
+from clearway.learn.plugged import faults_of
 from clearway.learn.progress import progress_view
 from clearway.learn.run_copy import RunCopy
 from clearway.learn.run_folder import RunFolder
@@ -79,14 +80,16 @@ class RunRequest:
         for scene in self.scenes:
             check_name(scene.name, "scenes")
         if self.takes is not None:
-            self.learner.check_sees_takes()
+            with faults_of(self.learner, "check_sees_takes"):
+                self.learner.check_sees_takes()
             if self.feature_store == "mapped":
                 raise RunError("perturb: features of perturbed pictures are kept in memory. Leave feature_store out")
 
     @property
     def paid(self) -> Reward:
         """The reward as training pays it, see `Learner.paid`."""
-        return self.learner.paid(self.reward)
+        with faults_of(self.learner, "paid"):
+            return self.learner.paid(self.reward)
 
     def check_workers(self, workers: int) -> None:
         """Refuse what several workers cannot train, before any is started.
@@ -97,7 +100,8 @@ class RunRequest:
         usable_device(self.device)
         states = [scene.state_count for scene in self.scenes]
         check_scenes(len(states), workers)
-        self.learner.check_workers(torch.tensor(states))
+        with faults_of(self.learner, "check_workers"):
+            self.learner.check_workers(torch.tensor(states))
 
     def trainer(self, peers: Peers = ALONE) -> Learning:
         """A trainer at its first frame; of several workers, that of this one, with its part of the scenes.
@@ -156,24 +160,24 @@ def train(
     """
     check_tracker(track)
     folder = RunFolder(out)
-    with features_read_once(request) as read:
-        trainer, record = read.trainer(), record_of(read)  # what cannot be trained leaves no folder
-        if isinstance(trainer, ForeignTrainer):
-            trainer.try_agent(record, trainer.tensors())  # nor what could not act after all its frames
-        copy = opened_copy(copy_to, folder, resume)
-    with folder.held(), folder.begun(record, resume) as other_bits:
+    with ExitStack() as stack:
+        with features_read_once(request) as read:
+            trainer = stack.enter_context(closing(read.trainer()))  # what cannot be trained leaves no folder
+            record = record_of(read)
+            if isinstance(trainer, ForeignTrainer):
+                trainer.try_agent(record, trainer.tensors())  # nor what could not act after all its frames
+            copy = opened_copy(copy_to, folder, resume)
+        stack.enter_context(folder.held())
+        other_bits = stack.enter_context(folder.begun(record, resume))
         if on_begin is not None:
             on_begin(out)
         told_of_other_bits(folder, request, other_bits)
         seconds = 0.0 if other_bits is None else _resumed(trainer, folder)
-        with (
-            closing(trainer),
-            progress_view(trainer.learner.frames, show_progress) as view,
-            interruption() as interrupted,
-        ):
-            every_s = SECONDS_BETWEEN_CHECKPOINTS
-            run = Running(trainer, folder, view, interrupted, milestones, until_solved, track, ALONE, every_s, copy)
-            run.go_on(seconds)
+        view = stack.enter_context(progress_view(trainer.learner.frames, show_progress))
+        interrupted = stack.enter_context(interruption())
+        every_s = SECONDS_BETWEEN_CHECKPOINTS
+        run = Running(trainer, folder, view, interrupted, milestones, until_solved, track, ALONE, every_s, copy)
+        run.go_on(seconds)
     return folder
 
 
@@ -218,27 +222,26 @@ def train_part(
         RunError, KeyboardInterrupt: as of `train`.
         LostPeer: another worker ended, or does not answer.
     """
-    trainer = request.trainer(peers)
-    if peers.leads:
-        folder.clear_parts()
-    seconds = 0.0
-    if any(folder.checkpoints.glob("frames-*")):
-        seconds = _resumed(trainer, folder, peers)
-    elif peers.leads:
-        folder.forget_metrics_after(-1)
-    found = [frames for [frames] in peers.told(trainer.frames)]
-    if len(set(found)) > 1:
-        problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
-        raise RunError(f"{problem}. Give a folder that all machines share as --out")
-    peers.ready()
-    if isinstance(trainer, ForeignTrainer):
-        tensors = trainer.tensors()  # of all workers
+    with ExitStack() as stack:
+        trainer = stack.enter_context(closing(request.trainer(peers)))
         if peers.leads:
-            trainer.try_agent(folder.read_record(), tensors)
-    with (
-        progress_view(trainer.learner.frames, show_progress and peers.leads) as view,
-        interruption(of_several=True) as interrupted,
-    ):
+            folder.clear_parts()
+        seconds = 0.0
+        if any(folder.checkpoints.glob("frames-*")):
+            seconds = _resumed(trainer, folder, peers)
+        elif peers.leads:
+            folder.forget_metrics_after(-1)
+        found = [frames for [frames] in peers.told(trainer.frames)]
+        if len(set(found)) > 1:
+            problem = f"{folder.path}: the workers find checkpoints after {sorted(set(found))} frames"
+            raise RunError(f"{problem}. Give a folder that all machines share as --out")
+        peers.ready()
+        if isinstance(trainer, ForeignTrainer):
+            tensors = trainer.tensors()  # of all workers
+            if peers.leads:
+                trainer.try_agent(folder.read_record(), tensors)
+        view = stack.enter_context(progress_view(trainer.learner.frames, show_progress and peers.leads))
+        interrupted = stack.enter_context(interruption(of_several=True))
         copy = RunCopy(copy_to) if copy_to and peers.leads else None
         run = Running(trainer, folder, view, interrupted, (), until_solved, track, peers, checkpoint_s, copy)
         run.go_on(seconds)
