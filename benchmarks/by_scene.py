@@ -16,7 +16,7 @@ from clearway.evaluation.bootstrap import RESAMPLES, intervals
 from clearway.evaluation.goals import GoalEvaluation
 from clearway.experiments.correction import holm
 
-SHOWN = ("success", "success_4x", "spl", "collisions", "steps", "false_arrivals", "missed_arrivals")
+SHOWN = ("success", "success_4x", "spl", "collisions", "steps", "false_arrivals", "missed_arrivals", "success_stopped")
 COUNTS = ("collisions", "steps")
 
 

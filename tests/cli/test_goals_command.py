@@ -28,6 +28,7 @@ def test_it_walks_in_scenes_that_it_was_not_trained_in(clearway, run, monkeypatc
     found = clearway(*words, "--json").json
     assert [scene["scene"] for scene in found["scenes"]] == ["grid", "corridor"]
     wanted = {"scene", "success", "success_4x", "spl", "collisions", "steps", "episodes", "false_arrivals"}
+    wanted |= {"success_stopped"}
     assert all(set(scene) - {"missed_arrivals"} == wanted and scene["episodes"] == 5 for scene in found["scenes"])
     assert found["average"]["episodes"] == 10 and set(found["average"]) == wanted - {"scene"} | {"missed_arrivals"}
     assert [other["agent"] for other in found["others"]] == ["random", "shortest path"]

@@ -5,7 +5,7 @@ import pytest
 
 from clearway.agents.by_pose import shortest_paths
 from clearway.errors import SceneError
-from clearway.evaluation.goals import GoalEvaluation, GoalFigures, drawn_goals, evaluate_goals
+from clearway.evaluation.goals import GoalEvaluation, GoalFigures, arrivals, drawn_goals, evaluate_goals
 from clearway.scenes.actions import Action
 from helpers.agents import by_rule, only
 from helpers.made import corridor_scene, grid_scene, scene_of_cells
@@ -76,3 +76,16 @@ def test_the_average_is_the_mean_over_scenes():
         "episodes": 4,
     }
     assert content["average"]["episodes"] == 12
+
+
+def test_an_episode_that_ends_where_it_first_says_to_be_there_succeeds_at_the_goal_alone() -> None:
+    reached = np.array([True, True, True, False, False])
+    false = np.array([0, 3, 0, 0, 1])
+    told = np.array([True, True, False, False, False])
+    assert arrivals(reached, false, told) == {
+        "false_arrivals": 0.4,
+        "missed_arrivals": pytest.approx(1 / 3),
+        "success_stopped": 0.2,
+    }
+    assert arrivals(~reached & False, false, told)["missed_arrivals"] is None
+    assert arrivals(reached, None, None) == {}

@@ -100,6 +100,7 @@ def test_who_holds_to_be_there_is_asked_where_it_is_and_where_it_is_not(live, cl
     figures = told.scenes["walkable"]
     assert 0 < figures.success < 1
     assert figures.false_arrivals == float(claims) and figures.missed_arrivals == float(not claims)
+    assert figures.success_stopped == 0  # it says so at once, elsewhere, or never
 
 
 def test_what_no_agent_may_do_is_one_line_off_the_grid_too(live):

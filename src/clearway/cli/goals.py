@@ -30,6 +30,7 @@ HEADINGS = {
     "spl": "SPL",
     "false_arrivals": "false\narrivals",
     "missed_arrivals": "missed\narrivals",
+    "success_stopped": "success\nstopped",
 }
 
 
@@ -167,7 +168,8 @@ def _explained(table: Table, step_limit: int, seed: int) -> Group:
         f"One episode a goal from a random start, at most {step_limit:,} steps, seed {seed}.",
         "Means over scenes. Within 4 x: in at most four times the shortest path's steps.",
         "SPL: success weighted by path length. False arrivals: episodes in which it said",
-        "to be there elsewhere; missed: in which it did not say so at the goal.",
+        "to be there elsewhere; missed: in which it did not say so at the goal. Success",
+        "stopped: were an episode to end where it first says to be there.",
     )
     return noted(table, notes)
 

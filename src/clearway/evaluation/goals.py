@@ -9,6 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,8 @@ class GoalFigures:
         false_arrivals: share in which the agent held elsewhere that it was at the goal; None where it says nothing.
         missed_arrivals: share of those that reached the goal in which it did not hold so there; None likewise, and
             where none reached it.
+        success_stopped: share that would have succeeded had the episode ended where the agent first held that it was at
+            the goal: it reached it, held so there, and nowhere before. None where it says nothing.
     """
 
     success: float
@@ -49,6 +52,7 @@ class GoalFigures:
     episodes: int
     false_arrivals: float | None = None
     missed_arrivals: float | None = None
+    success_stopped: float | None = None
 
 
 FIGURES = fields(GoalFigures)
@@ -197,15 +201,23 @@ def _figures(world: World, table: EpisodeTable) -> dict[str, GoalFigures]:
     for number, name in enumerate(world.scene_names):
         here = scene == number
         means = {key: float(column[here].mean()) for key, column in columns.items()}
-        false, missed = _arrivals(table, here)
-        figures[name] = GoalFigures(**means, episodes=int(here.sum()), false_arrivals=false, missed_arrivals=missed)
+        told = (None if each is None else each[here] for each in (table.false_arrivals, table.told_arrival))
+        figures[name] = GoalFigures(**means, episodes=int(here.sum()), **arrivals(table.reached[here], *told))
     return figures
 
 
-def _arrivals(table: EpisodeTable, here: np.ndarray) -> tuple[float | None, float | None]:
-    """Shares of false and missed arrivals in some of the episodes (N,) bool."""
-    if table.false_arrivals is None or table.told_arrival is None:
-        return None, None
-    told = table.told_arrival[here & table.reached]
-    missed = float(1 - told.mean()) if len(told) else None
-    return float((table.false_arrivals[here] > 0).mean()), missed
+def arrivals(reached: np.ndarray, false: np.ndarray | None, told: np.ndarray | None) -> dict[str, Any]:
+    """Figures of what an agent says of having arrived, none where it says nothing.
+
+    Args:
+        reached: (N,) bool, the goal was.
+        false: (N,) int, steps elsewhere at which it held that it was there.
+        told: (N,) bool, it held so at the goal.
+    """
+    if false is None or told is None:
+        return {}
+    return {
+        "false_arrivals": float((false > 0).mean()),
+        "missed_arrivals": float(1 - told[reached].mean()) if reached.any() else None,
+        "success_stopped": float((reached & told & (false == 0)).mean()),
+    }

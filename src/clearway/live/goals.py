@@ -14,7 +14,7 @@ import numpy as np
 from clearway.agents.agent import Agent, State
 from clearway.agents.named import AgentMaker
 from clearway.errors import AgentError
-from clearway.evaluation.goals import GoalEvaluation, GoalFigures, drawn_goals
+from clearway.evaluation.goals import GoalEvaluation, GoalFigures, arrivals, drawn_goals
 from clearway.evaluation.metrics import SC_DETOUR
 from clearway.live.conditions import Condition
 from clearway.live.episodes import LiveProtocol, LiveTable, check_sight, run_live_episodes
@@ -148,10 +148,6 @@ def _figures(table: LiveTable) -> GoalFigures:
     """Means over episodes."""
     success_4x = table.reached & (table.steps <= SC_DETOUR * table.shortest_path_steps)
     spl = table.reached * table.shortest_path_steps / np.maximum(table.steps, table.shortest_path_steps)
-    false, missed = None, None
-    if table.false_arrivals is not None and table.told_arrival is not None:
-        false = float((table.false_arrivals > 0).mean())
-        missed = float(1 - table.told_arrival[table.reached].mean()) if table.reached.any() else None
     return GoalFigures(
         success=float(table.reached.mean()),
         success_4x=float(success_4x.mean()),
@@ -159,6 +155,5 @@ def _figures(table: LiveTable) -> GoalFigures:
         collisions=float(table.contacts.mean()),
         steps=float(table.steps.mean()),
         episodes=len(table),
-        false_arrivals=false,
-        missed_arrivals=missed,
+        **arrivals(table.reached, table.false_arrivals, table.told_arrival),
     )
