@@ -116,7 +116,8 @@ def main() -> None:
             "figures": found,
         }
         args.json.write_text(json.dumps(record) + "\n")
-    print(*judged(found, args.fewer), sep="\n")
+    for line in judged(found, args.fewer):
+        print(line)
 
 
 if __name__ == "__main__":

@@ -11,10 +11,12 @@ Looking names up imports none of them. What each kind has to be: `docs/python.md
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from clearway.errors import PluginError, kind_and_reason
+from clearway.spelling import did_you_mean
 
 Kind = Literal["encoders", "rewards", "agents", "importers", "algorithms", "experiments"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -87,6 +89,13 @@ def problem(plugin: Plugin, all_of_kind: list[Plugin]) -> str:
     return ""
 
 
+def unknown(kind: Kind, name: str, ours: Collection[str]) -> str:
+    """What is said of a name that neither is one of ours nor is offered by a package, with the remedy."""
+    known = (*ours, *offered(kind))
+    told = f"{kind.removesuffix('s')} {name!r:.40}: expected one of {', '.join(known)}.{did_you_mean(name, known)}"
+    return f"{told} Name one of these, or install the package that offers it"
+
+
 def find_plugin(kind: Kind, name: str) -> Plugin | None:
     """The plugin of that name; None where there is none, or the name is built in.
 
@@ -112,12 +121,9 @@ def load_plugin(plugin: Plugin) -> object:
 
     try:
         return EntryPoint(plugin.name, plugin.target, f"clearway.{plugin.kind}").load()
-    except (
-        Exception,
-        SystemExit,
-    ) as fault:  # another's code: anything can come of it: the user is told whose
-        reason = kind_and_reason(fault)
+    except (Exception, SystemExit) as fault:  # another's code: anything can come of it, and the user is told whose
         remedy = f"Ask its authors, or uninstall {plugin.package}"
+        reason = kind_and_reason(fault)
         raise PluginError(f"{plugin}: {plugin.target} cannot be imported ({reason}). {remedy}") from fault
 
 

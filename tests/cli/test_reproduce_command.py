@@ -211,7 +211,8 @@ def test_the_command_s_help_names_all_experiments(clearway) -> None:
 
 @pytest.mark.parametrize("names", [("fig9",), ("all", "fig9"), ("fig5", "fig9")])
 def test_an_experiment_that_nobody_offers_is_refused(clearway, tmp_path: Path, names: tuple[str, ...]) -> None:
-    assert clearway("reproduce", *names, "--out", tmp_path / "out").refusal("experiment fig9", "table1", "plugins")
+    answer = clearway("reproduce", *names, "--out", tmp_path / "out")
+    assert answer.refusal("experiment 'fig9'", "table1", "Did you mean fig", "install the package")
     assert not (tmp_path / "out").exists()
 
 
@@ -227,11 +228,11 @@ def test_another_package_s_experiment_stands_after_ours_in_the_report(
     shutil.rmtree(tmp_path / "site")  # uninstalled
     without = clearway("report", out, "--json")
     assert [section["name"] for section in without.json["sections"]] == ["fig5"]
-    assert "the report leaves out what is not known here. experiment twice" in without.err
+    assert "the report leaves out what is not known here. experiment 'twice'" in without.err
     (request,) = json.loads((out / "reproduction.json").read_text())["names"][1:]
     assert request == "twice"  # it comes back with its package
     (out / "reproduction.json").write_text((out / "reproduction.json").read_text().replace('"fig5",', ""))
-    assert clearway("report", out).refusal("reproduction.json: experiment twice", "not known here", "another folder")
+    assert clearway("report", out).refusal("reproduction.json: experiment 'twice': expected one of", "another folder")
 
 
 def test_no_experiment_is_refused(clearway, tmp_path: Path) -> None:

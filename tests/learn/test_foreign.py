@@ -123,11 +123,17 @@ def test_a_fault_is_one_line_that_says_whose_it_is_and_leaves_no_folder(tmp_path
     assert not (tmp_path / "run").exists()
 
 
+def with_a_second_room(request: RunRequest) -> RunRequest:
+    (scene,) = request.scenes
+    other = replace(scene, name="other")
+    return replace(request, scenes=[scene, other], targets={**request.targets, "other": request.targets[scene.name]})
+
+
 @pytest.mark.parametrize(
     ("name", "asked"),
     [
         ("paid", lambda request: request.paid),
-        ("check_workers", lambda request: request.check_workers(1)),
+        ("check_workers", lambda request: with_a_second_room(request).check(2)),
         ("check_sees_takes", lambda request: replace(request, takes=())),
     ],
 )

@@ -42,7 +42,6 @@ from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
 from clearway.spelling import did_you_mean
-from clearway.torch_device import usable_device
 from clearway.torch_threads import torch_threads
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
@@ -274,11 +273,7 @@ def chosen_learner(
 def _check(request: RunRequest, folder: Path | None, *, workers: int, resume: bool, track: TrackerName | None) -> None:
     """Refuse, before pictures are taken, what training would refuse after it. Raises ClearwayError."""
     check_tracker(track)
-    _ = request.paid
-    if workers > 1:
-        request.check_workers(workers)
-    else:
-        usable_device(request.device)
+    request.check(workers)
     if folder is not None and not resume:
         RunFolder(folder).check_free()
 

@@ -21,7 +21,7 @@ from clearway.experiments import (
 )
 from clearway.experiments.experiment import Experiment
 from clearway.experiments.plugged import plugged_experiment
-from clearway.plugins import find_plugin
+from clearway.plugins import find_plugin, unknown
 
 EXPERIMENTS: dict[str, Experiment] = {
     "table1": Experiment(table1.jobs, table1.section),
@@ -52,8 +52,7 @@ def experiment(name: str) -> Experiment:
         return EXPERIMENTS[name]
     plugin = find_plugin("experiments", name)
     if plugin is None:
-        known = f"Use one of {', '.join(EXPERIMENTS)}, or of an installed package"
-        raise RunError(f"experiment {name:.40}: is not known here. {known} (clearway plugins)")
+        raise RunError(unknown("experiments", name, EXPERIMENTS))
     return plugged_experiment(plugin)
 
 

@@ -17,7 +17,7 @@ from clearway.learn.plugged import plugged_algorithm
 from clearway.learn.ppo import PPO
 from clearway.learn.q_learning import QLearning
 from clearway.learn.recurrent import Recurrent
-from clearway.plugins import find_plugin, offered
+from clearway.plugins import find_plugin, unknown
 
 OURS = (PPO, A2C, A3C, BC, QLearning, Recurrent, Adapt)
 ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in OURS}
@@ -35,8 +35,7 @@ def algorithm(name: str) -> type[Learner]:
         return ALGORITHMS[name]
     plugin = find_plugin("algorithms", name)
     if plugin is None:
-        told = f"algorithm {name!r:.40}: expected one of {', '.join((*ALGORITHMS, *offered('algorithms')))}"
-        raise RunError(f"{told}. Name one of these, or install the package that offers it")
+        raise RunError(unknown("algorithms", name, ALGORITHMS))
     return plugged_algorithm(plugin)
 
 

@@ -91,13 +91,17 @@ class RunRequest:
         with faults_of(self.learner, "paid"):
             return self.learner.paid(self.reward)
 
-    def check_workers(self, workers: int) -> None:
-        """Refuse what several workers cannot train, before any is started.
+    def check(self, workers: int) -> None:
+        """Refuse what so many workers cannot train, before anything that takes long.
 
         Raises:
             RunError: the learner, its settings or the scenes are not for so many workers, or there is no such device.
+            ClearwayError: the learner cannot be paid so.
         """
         usable_device(self.device)
+        _ = self.paid
+        if workers == 1:
+            return
         states = [scene.state_count for scene in self.scenes]
         check_scenes(len(states), workers)
         with faults_of(self.learner, "check_workers"):

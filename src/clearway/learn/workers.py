@@ -104,7 +104,7 @@ def train_by_workers(
         RunError, KeyboardInterrupt: as of `train.train`; or workers were lost again and again.
     """
     check_tracker(track)
-    request.check_workers(workers)
+    request.check(workers)
     if ray is None:
         check_gpus(request.device, workers)
     folder = RunFolder(out)
