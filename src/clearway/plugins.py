@@ -89,11 +89,10 @@ def problem(plugin: Plugin, all_of_kind: list[Plugin]) -> str:
     return ""
 
 
-def unknown(kind: Kind, name: str, ours: Collection[str]) -> str:
+def unknown(kind: Kind, name: object, ours: Collection[str]) -> str:
     """What is said of a name that neither is one of ours nor is offered by a package, with the remedy."""
     known = (*ours, *offered(kind))
-    told = f"{kind.removesuffix('s')} {name!r:.40}: expected one of {', '.join(known)}.{did_you_mean(name, known)}"
-    return f"{told} Name one of these, or install the package that offers it"
+    return f"no such {kind.removesuffix('s')}.{did_you_mean(name, known)} Use one of {', '.join(known)}"
 
 
 def find_plugin(kind: Kind, name: str) -> Plugin | None:
@@ -121,7 +120,7 @@ def load_plugin(plugin: Plugin) -> object:
 
     try:
         return EntryPoint(plugin.name, plugin.target, f"clearway.{plugin.kind}").load()
-    except (Exception, SystemExit) as fault:  # another's code: anything can come of it, and the user is told whose
+    except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
         remedy = f"Ask its authors, or uninstall {plugin.package}"
         reason = kind_and_reason(fault)
         raise PluginError(f"{plugin}: {plugin.target} cannot be imported ({reason}). {remedy}") from fault

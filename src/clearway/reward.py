@@ -257,7 +257,7 @@ class Reward:
             return self._checked(term, term(before, moves), before.shape)
         try:
             earned = term(before, moves)
-        except Exception as fault:
+        except (Exception, SystemExit) as fault:
             reason = kind_and_reason(fault)
             kind = type(term).__name__
             raise RewardError(f"reward {self.name}: the term {kind} failed ({reason}). Correct the term") from fault
@@ -403,7 +403,7 @@ def _made(source: str, found: object) -> Reward:
     """What was found under a name, or what it gives when it is called."""
     try:
         made = found() if callable(found) else found
-    except Exception as fault:  # likewise
+    except (Exception, SystemExit) as fault:  # likewise
         reason = kind_and_reason(fault)
         raise RewardError(f"{source}: cannot be made ({reason}). Correct it") from fault
     if not isinstance(made, Reward):

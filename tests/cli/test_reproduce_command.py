@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -142,6 +143,8 @@ FOREIGN = (
     ("budget", "huge"),
     ("budget", ["paper"]),
     ("names", ["nosuch"]),
+    ("names", "fig5"),
+    ("names", None),
     ("names", [["fig5"]]),
     ("learners", ["mine"]),
     ("rooms", ["attic"]),
@@ -205,14 +208,15 @@ def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
 
 
 def test_the_command_s_help_names_all_experiments(clearway) -> None:
-    told = clearway("reproduce", "--help").out
-    assert all(name in told for name in EXPERIMENTS)
+    told = " ".join(clearway("reproduce", "--help").out.replace("│", " ").split())
+    (listed,) = re.findall(r"Some of (.*?); all:", told)
+    assert listed.split(", ") == list(EXPERIMENTS)
 
 
 @pytest.mark.parametrize("names", [("fig9",), ("all", "fig9"), ("fig5", "fig9")])
 def test_an_experiment_that_nobody_offers_is_refused(clearway, tmp_path: Path, names: tuple[str, ...]) -> None:
     answer = clearway("reproduce", *names, "--out", tmp_path / "out")
-    assert answer.refusal("experiment 'fig9'", "table1", "Did you mean fig", "install the package")
+    assert answer.refusal("experiment 'fig9'", "table1", "Did you mean fig", "no such experiment")
     assert not (tmp_path / "out").exists()
 
 
@@ -232,7 +236,16 @@ def test_another_package_s_experiment_stands_after_ours_in_the_report(
     (request,) = json.loads((out / "reproduction.json").read_text())["names"][1:]
     assert request == "twice"  # it comes back with its package
     (out / "reproduction.json").write_text((out / "reproduction.json").read_text().replace('"fig5",', ""))
-    assert clearway("report", out).refusal("reproduction.json: experiment 'twice': expected one of", "another folder")
+    assert clearway("report", out).refusal("clearway reproduce", "experiment 'twice': no such experiment")
+
+
+def test_two_tables_of_one_name_are_refused(clearway, first, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    named = replace(EXPERIMENTS["fig5"], section=lambda setting: replace(fig5(setting), name="fig3"))
+    fig5 = EXPERIMENTS["fig5"].section
+    monkeypatch.setitem(EXPERIMENTS, "fig3", named)
+    answer = clearway("reproduce", "fig3", *first.words, "--learners", "default", "--out", out)
+    assert answer.code == 2
+    assert "error: experiments fig3 and fig5: both call one of their tables 'fig5'. Rename one" in answer.err
 
 
 def test_no_experiment_is_refused(clearway, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Evaluation of a run: what stands beside its agent, and what is said of it."""
 
 import re
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ import torch
 from clearway.agents.agent import Decisions
 from clearway.agents.by_pose import RandomWalk
 from clearway.errors import RunError
+from clearway.evaluation import protocol
 from clearway.evaluation.optimum import world_yardsticks
 from clearway.evaluation.runs import _optima, evaluate_run, evaluate_runs
 from clearway.evaluation.tables import markdown_table
@@ -42,7 +44,16 @@ def test_an_evaluation_says_what_its_agent_was_trained_with(tmp_path: Path) -> N
     assert [other.agent for other in others if other.trained] == [NAME] * 2  # the other ways to choose
 
 
-def test_an_agent_that_tells_no_probabilities_is_evaluated_as_it_chooses_alone() -> None:
+def test_an_agent_that_tells_no_probabilities_is_evaluated_as_it_chooses_alone(monkeypatch) -> None:
+    shown: list[int] = []
+
+    @contextmanager
+    def progress(what: str, total: int, *_: object, **__: object):
+        yield shown.append
+        assert shown == sorted(shown) and shown[-1] == total  # what is left out counts as done
+
+    monkeypatch.setattr(protocol, "work_progress", progress)
+
     class Walks(RandomWalk):
         def act(self, observation, state):
             decisions, after = super().act(observation, state)

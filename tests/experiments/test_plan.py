@@ -57,6 +57,7 @@ class Cheap(Dear):
 def test_terms_of_one_s_own_are_told_apart_by_their_class() -> None:
     first, second = (replace(RUN, reward=Reward("mine", (Time(), kind(0.1), Arrival()))) for kind in (Dear, Cheap))
     assert first.name != second.name
+    assert replace(RUN, seed=np.int64(7)).name == replace(RUN, seed=7).name
     numpy = Reward("shortest", (Time(np.float32(-0.5)), Arrival()))
     assert replace(RUN, reward=numpy).name == replace(RUN, reward=Reward("shortest", (Time(-0.5), Arrival()))).name
 

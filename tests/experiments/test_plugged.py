@@ -42,18 +42,21 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ("Experiment(lambda setting: [7], None)", "jobs gives 7, expected jobs"),
         ("Experiment(lambda setting: [], lambda setting: setting.nothing)", r"section failed \(AttributeError"),
         ("Experiment(lambda setting: [], lambda setting: 7)", "section gives 7, expected a Section"),
-        ("Experiment(lambda s: [], lambda s: Section('fig5', '', ''))", "its section is called 'fig5'. Call it 'odd'"),
+        ("Experiment(lambda s: [], lambda s: __import__('sys').exit(0))", r"section failed \(SystemExit: 0\)"),
+        ("Experiment(lambda s: [], lambda s: Section('fig5', '', ''))", "its section is called 'fig5', expected 'odd'"),
+        ("Experiment(lambda s: [], lambda s: Section('odd', 7, ''))", "its section has 7 where a text is expected"),
         (
-            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('odd5'),)))",
-            "a table or figure is called 'odd5', as another's may be. Call it 'odd', or 'odd_' and more",
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', 7))",
+            "its section's tables are 7, expected a tuple of Rep",
         ),
         (
-            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('odd_/../a'),)))",
-            "two tables or figures, or no file, can be called 'odd_/../a'",
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', claims=('it holds',)))",
+            r"its section's claims are \('it holds',\), expected a tuple of Claim",
         ),
+        ("Experiment(lambda s: [], lambda s: Section('odd', '', '', (table(3),)))", "no file can be called 3"),
         (
-            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('odd'), table('odd'))))",
-            "two tables or figures, or no file, can be called 'odd'. Rename it",
+            "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('../a'),)))",
+            r"no file can be called '\.\./a', as a table or figure is",
         ),
     ],
 )
@@ -75,5 +78,5 @@ def test_errors_of_ours_pass(offered, tmp_path: Path) -> None:
 
 def test_names_stand_in_the_order_of_the_report() -> None:
     assert in_order({"twice", "fig5", "alike", "table1"}) == ["table1", "fig5", "alike", "twice"]
-    with pytest.raises(RunError, match=r"experiment 'fig9': expected one of table1, .* Name one of these"):
+    with pytest.raises(RunError, match=r"experiment 'fig9': no such experiment\. Did .* Use one of table1, .*off-grid"):
         experiment("fig9")

@@ -22,7 +22,7 @@ def test_algorithms_are_found_by_name() -> None:
     others = {"bc": BC, "q-learning": QLearning, "recurrent": Recurrent, "adapt": Adapt}
     assert {"ppo": PPO, "a2c": A2C, "a3c": A3C} | others == ALGORITHMS
     assert algorithm("a3c") is A3C
-    with pytest.raises(RunError, match=r"algorithm 'dqn': expected one of ppo, a2c, a3c, bc, q-learning"):
+    with pytest.raises(RunError, match=r"algorithm 'dqn': no such algorithm\. Use one of ppo, a2c, a3c, bc"):
         algorithm("dqn")
 
 

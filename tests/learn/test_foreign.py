@@ -8,6 +8,7 @@ import pytest
 import clearway
 from clearway.api.training import chosen_learner
 from clearway.errors import AgentError, PluginError, RunError
+from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.foreign_agent import ForeignTrained
 from clearway.learn.load import load_network
@@ -214,6 +215,22 @@ def test_figures_that_are_pytorch_s_and_tensors_of_one_memory_are_kept(tmp_path,
     run = trained(tmp_path / "run")
     assert run.figures["loss"] == 1.5
     assert trained(tmp_path / "run", resume=True).metrics == run.metrics
+
+
+def test_a_figure_of_a_whole_number_is_kept_as_a_number_with_a_point(tmp_path, monkeypatch) -> None:
+    offer_algorithm(tmp_path, monkeypatch, with_trainer(FIGURES.format("{'loss': torch.tensor(2)}")))
+    trainer = made_trainer(chosen_learner("odd", settings=SMALL), corridor_world(), COLLISION_AWARE, 0)
+    assert type(trainer.update()["loss"]) is float
+
+
+def test_a_full_disk_is_not_told_as_the_package_s_fault(tmp_path, monkeypatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    offer_algorithm(tmp_path, monkeypatch, CLASS)
+    monkeypatch.setattr(running, "write_checkpoint", full)
+    with pytest.raises(OSError, match="No space left on device"):
+        trained(tmp_path / "run")
 
 
 def test_interruptions_pass_and_faults_of_ours_keep_their_traceback(tmp_path, monkeypatch) -> None:

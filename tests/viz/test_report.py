@@ -77,10 +77,17 @@ def test_no_warning_is_no_paragraph(tmp_path, page_parts):
 def test_numbers_of_numpy_stand_as_python_s(tmp_path):
     values = (np.int64(1234), np.float32(0.5), np.bool_(True), None)
     table = ReportTable("numpy", "N", ("a", "b", "c", "d"), (values,))
-    figure = ReportFigure("line", "L", "x", "y", (Series("a", np.arange(2), np.float32([1, 2]), low=np.zeros(2)),))
+    figure = ReportFigure(
+        "line",
+        "L",
+        "x",
+        "y",
+        (Series("a", np.arange(2), np.float32([1, 2]), low=np.zeros(2), high=np.float32([3, 4])),),
+    )
     write_report(tmp_path, "T", [Section("s", "S", "Text.", (table,), (figure,))], {}, "", [])
     (section,) = json.loads((tmp_path / "report.json").read_text())["sections"]
     assert section["tables"][0]["rows"] == [[1234, 0.5, True, None]]
-    assert section["figures"][0]["series"][0]["x"] == [0, 1]
+    (line,) = section["figures"][0]["series"]
+    assert (line["x"], line["y"], line["low"], line["high"]) == ([0, 1], [1.0, 2.0], [0.0, 0.0], [3.0, 4.0])
     assert (tmp_path / "tables" / "numpy.csv").read_text().splitlines() == ["a,b,c,d", "1234,0.5,True,"]
     assert "| 1,234 | 0.5 | yes |" in (tmp_path / "report.md").read_text()

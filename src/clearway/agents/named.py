@@ -53,7 +53,7 @@ def named_maker(source: str, found: object) -> AgentMaker:
     def made(world: World) -> Agent:
         try:
             agent = found(world)
-        except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+        except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
             reason = kind_and_reason(fault)
             raise AgentError(f"{source}: cannot be made ({reason}). Correct it") from fault
         return Foreign(checked_agent(source, agent), source)
@@ -87,7 +87,7 @@ class Foreign:
     def _told(self) -> Iterator[None]:
         try:
             yield
-        except Exception as fault:  # another's code: anything can come of it
+        except (Exception, SystemExit) as fault:  # another's code: anything can come of it
             reason = kind_and_reason(fault)
             raise AgentError(f"{self._source}: failed ({reason}). Correct it") from fault
 

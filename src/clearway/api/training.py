@@ -37,11 +37,10 @@ from clearway.learn.train import train as train_alone
 from clearway.learn.workers import train_by_workers
 from clearway.live.conditions import Perturbations
 from clearway.markdown import table_lines
-from clearway.plugins import find_plugin, offered
+from clearway.plugins import find_plugin, unknown
 from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
-from clearway.spelling import did_you_mean
 from clearway.torch_threads import torch_threads
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
@@ -261,9 +260,8 @@ def chosen_learner(
     elif isinstance(wanted, str) and (wanted in ALGORITHMS or find_plugin("algorithms", wanted)):
         learner = algorithm(wanted)()
     else:
-        names = (*ALGORITHMS, *PRESETS, *offered("algorithms"))
-        told = f"algorithm={wanted!r:.80}: no such algorithm.{did_you_mean(wanted, names)}"
-        raise ArgumentError(f"{told} Use one of {', '.join(names)}")
+        told = unknown("algorithms", wanted, (*ALGORITHMS, *PRESETS))
+        raise ArgumentError(f"algorithm={wanted!r:.80}: {told}")
     given = settings if frames is None else {**settings, "frames": frames}
     changes = as_settings(type(learner), given)
     with faults_of(learner, "settings"):
@@ -271,7 +269,7 @@ def chosen_learner(
 
 
 def _check(request: RunRequest, folder: Path | None, *, workers: int, resume: bool, track: TrackerName | None) -> None:
-    """Refuse, before pictures are taken, what training would refuse after it. Raises ClearwayError."""
+    """Refuse, before pictures are taken, most of what training would refuse after it. Raises ClearwayError."""
     check_tracker(track)
     request.check(workers)
     if folder is not None and not resume:

@@ -52,7 +52,7 @@ def experiment(name: str) -> Experiment:
         return EXPERIMENTS[name]
     plugin = find_plugin("experiments", name)
     if plugin is None:
-        raise RunError(unknown("experiments", name, EXPERIMENTS))
+        raise RunError(f"experiment {name!r:.40}: {unknown('experiments', name, EXPERIMENTS)}")
     return plugged_experiment(plugin)
 
 

@@ -122,7 +122,8 @@ class Job:
 
 def _digest(content: object) -> str:
     """Of JSON values, and numbers of NumPy's."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True, default=float).encode()).hexdigest()[:DIGEST_LENGTH]
+    text = json.dumps(content, sort_keys=True, default=lambda number: number.item())
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def merged(jobs: Iterable[Job]) -> list[Job]:

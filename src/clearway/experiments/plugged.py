@@ -1,7 +1,6 @@
 """Experiments of other packages (`clearway.plugins`), behind checks of what they give.
 
-An entry point of the group `clearway.experiments` is an `Experiment`. Its section has its name. So have tables, figures
-and maps, which are files of the report; behind it may come an underscore and more.
+An entry point of the group `clearway.experiments` is an `Experiment`, whose section has the entry point's name.
 """
 
 from __future__ import annotations
@@ -12,10 +11,12 @@ from contextlib import contextmanager
 from clearway.errors import ClearwayError, PluginError, kind_and_reason
 from clearway.experiments.experiment import Experiment
 from clearway.experiments.plan import Job
-from clearway.experiments.section import Section
+from clearway.experiments.section import Claim, ReportFigure, ReportMap, ReportTable, Section
 from clearway.experiments.setting import Setting
 from clearway.plugins import Plugin, load_plugin
 from clearway.scenes.parts import is_name
+
+PARTS = {"tables": ReportTable, "figures": ReportFigure, "maps": ReportMap, "claims": Claim, "missing": str}
 
 
 def plugged_experiment(plugin: Plugin) -> Experiment:
@@ -39,25 +40,30 @@ def plugged_experiment(plugin: Plugin) -> Experiment:
     def section(setting: Setting) -> Section:
         with _faults_of(plugin, "section"):
             given = found.section(setting)
-        if not isinstance(given, Section):
-            raise PluginError(f"{plugin}: section gives {given!r:.60}, expected a Section. Ask its authors")
-        if given.name != plugin.name:
-            raise PluginError(f"{plugin}: its section is called {given.name!r:.40}. Call it {plugin.name!r}")
-        for files in (given.tables, given.pictures):
-            _check_names([part.name for part in files], plugin)
+            fault = _fault(given, plugin.name)
+        if fault:
+            raise PluginError(f"{plugin}: {fault}. Ask its authors")
         return given
 
     return Experiment(jobs, section)
 
 
-def _check_names(names: list[str], plugin: Plugin) -> None:
-    """Raise PluginError where one is not the plugin's own, or no file can be called so, or two are called so."""
-    for place, name in enumerate(names):
-        if name != plugin.name and not name.startswith(f"{plugin.name}_"):
-            wanted = f"Call it {plugin.name!r}, or {plugin.name + '_'!r} and more"
-            raise PluginError(f"{plugin}: a table or figure is called {name!r:.60}, as another's may be. {wanted}")
-        if not is_name(name) or name in names[:place]:
-            raise PluginError(f"{plugin}: two tables or figures, or no file, can be called {name!r:.60}. Rename it")
+def _fault(section: object, name: str) -> str:
+    """Why it is no section of that name that a report can hold; empty where it is one."""
+    if not isinstance(section, Section):
+        return f"section gives {section!r:.60}, expected a Section"
+    if section.name != name:
+        return f"its section is called {section.name!r:.40}, expected {name!r}"
+    for called, kind in PARTS.items():
+        given = getattr(section, called)
+        if not isinstance(given, tuple) or not all(isinstance(part, kind) for part in given):
+            return f"its section's {called} are {given!r:.60}, expected a tuple of {kind.__name__}"
+    texts = (section.title, section.text, *(claim.text for claim in section.claims))
+    if others := [text for text in texts if not isinstance(text, str)]:
+        return f"its section has {others[0]!r:.60} where a text is expected"
+    if wrong := [part.name for part in (*section.tables, *section.pictures) if not is_name(part.name)]:
+        return f"no file can be called {wrong[0]!r:.60}, as a table or figure is"
+    return ""
 
 
 @contextmanager
@@ -66,5 +72,5 @@ def _faults_of(plugin: Plugin, what: str) -> Iterator[None]:
         yield
     except ClearwayError:
         raise
-    except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+    except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
         raise PluginError(f"{plugin}: {what} failed ({kind_and_reason(fault)}). Ask its authors") from fault

@@ -159,9 +159,10 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
     for count, least in ((request.frames, 1), (request.seeds, 1), (request.first_seed, 0)):
         if count is not None and (type(count) is not int or count < least):
             raise ValueError(f"{count!r:.40} where a number of at least {least} is expected")
-    texts = (*request.names, request.encoder, *request.changes, *request.commands)
-    if not request.names or not all(isinstance(text, str) for text in texts):
-        raise ValueError("it names no experiment, or the encoder, a change or a command is no text")
+    if not isinstance(request.names, list | tuple) or not request.names:
+        raise ValueError(f"names is {request.names!r:.40}, expected a list of experiments")
+    if not all(isinstance(t, str) for t in (*request.names, request.encoder, *request.changes, *request.commands)):
+        raise ValueError("an experiment's name, the encoder, a change or a command is no text")
     return request
 
 
@@ -198,7 +199,20 @@ def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     names = _known(request)
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
         sections = [corrected(experiment(name).section(setting)) for name in names]
+    _check_files(sections)
     return Reproduction(tuple(request.commands), tuple(request.changes), setting, planned(setting, names), sections)
+
+
+def _check_files(sections: Sequence[Section]) -> None:
+    """Raise RunError where two tables, or two figures, of the report would be one file."""
+    for called in ("tables", "pictures"):
+        owners: dict[str, str] = {}
+        for section in sections:
+            for part in getattr(section, called):
+                if part.name in owners:
+                    both = f"experiments {owners[part.name]} and {section.name}"
+                    raise RunError(f"{both}: both call one of their {called} {part.name!r:.60}. Rename one")
+                owners[part.name] = section.name
 
 
 def _known(request: ReproduceRequest) -> list[str]:
@@ -216,7 +230,7 @@ def _known(request: ReproduceRequest) -> list[str]:
             faults.append(fault)
     path = request.out / REQUEST_FILE
     if not known:
-        raise RunError(f"{path}: {faults[0]}. Or run clearway reproduce on another folder") from faults[0]
+        raise RunError(f"{path}: names nothing that clearway reproduce knows here. {faults[0]}") from faults[0]
     for unknown in faults:
         warnings.warn(f"{path}: the report leaves out what is not known here. {unknown}", stacklevel=4)
     return known

@@ -14,6 +14,11 @@ Verdict = Literal["holds", "does not hold", "undecided"]
 Value = str | int | float | None
 
 
+def _plain(value: Value) -> Value:
+    """A number of NumPy's as one of Python's."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
 @dataclass(frozen=True)
 class ReportTable:
     """A table.
@@ -36,8 +41,7 @@ class ReportTable:
 
     def __post_init__(self) -> None:
         """Every row must fit the headings; NumPy's numbers become Python's."""
-        rows = tuple(tuple(v.item() if isinstance(v, np.generic) else v for v in row) for row in self.rows)
-        object.__setattr__(self, "rows", rows)
+        object.__setattr__(self, "rows", tuple(tuple(map(_plain, row)) for row in self.rows))
         assert all(len(row) == len(self.headings) for row in self.rows), f"{self.name}: a row of another length"
 
 
@@ -62,10 +66,10 @@ class Series:
     highlighted: bool = False
 
     def __post_init__(self) -> None:
-        """NumPy's arrays and numbers become Python's."""
+        """NumPy's numbers become Python's."""
         for name in ("x", "y", "low", "high"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, np.asarray(getattr(self, name)).tolist())
+                object.__setattr__(self, name, tuple(map(_plain, getattr(self, name))))
 
 
 @dataclass(frozen=True)

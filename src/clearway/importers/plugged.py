@@ -40,7 +40,7 @@ def plugged_scenes(name: str, files: Sequence[Path]) -> list[Scene]:
                 _check(scene, plugin, file)
         except ClearwayError:
             raise
-        except Exception as fault:  # another's code, as in load_plugin
+        except (Exception, SystemExit) as fault:  # another's code, as in load_plugin
             reason = kind_and_reason(fault)
             raise PluginError(f"{file}: the {plugin} failed ({reason}). Check the file, or ask its authors") from fault
         if not given:

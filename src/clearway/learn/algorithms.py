@@ -35,7 +35,7 @@ def algorithm(name: str) -> type[Learner]:
         return ALGORITHMS[name]
     plugin = find_plugin("algorithms", name)
     if plugin is None:
-        raise RunError(unknown("algorithms", name, ALGORITHMS))
+        raise RunError(f"algorithm {name!r:.40}: {unknown('algorithms', name, ALGORITHMS)}")
     return plugged_algorithm(plugin)
 
 

@@ -82,7 +82,7 @@ def faults_of(learner: Learner | type[Learner], what: str, passing: tuple[type[E
     """
     try:
         yield
-    except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+    except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
         passes = isinstance(fault, (ClearwayError, LostPeer, *passing)) or is_out_of_memory(fault)
         plugin = None if passes else find_plugin("algorithms", learner.algorithm)
         if plugin is None:

@@ -54,7 +54,7 @@ class CheckedEncoder:
         """
         try:
             features = np.asarray(self.made.encode(pictures))
-        except Exception as fault:  # another's code: anything can come of it, and the user has to be told whose it is
+        except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
             reason = kind_and_reason(fault)
             raise EncoderError(f"encoder {self.record.name}: failed ({reason}). Mend it, or use another") from fault
         expected = (len(pictures), self.feature_count)
@@ -79,7 +79,7 @@ def make_encoder(plugin: Plugin) -> CheckedEncoder:
     remedy = f"Ask its authors, or uninstall {plugin.package}"
     try:
         made: Any = make()  # type: ignore[operator]
-    except Exception as fault:  # another's code, as in load_plugin
+    except (Exception, SystemExit) as fault:  # another's code, as in load_plugin
         reason = kind_and_reason(fault)
         raise PluginError(f"{plugin}: cannot be made ({reason}). {remedy}") from fault
     fixed: dict[str, object] = {"kind": KIND, "plugin": plugin.name, "package": plugin.package}
