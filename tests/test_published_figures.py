@@ -12,10 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clearway.experiments import fig5, fig6
 from clearway.experiments.convergence import mark_steps, settled_row
+from clearway.experiments.generalisation import Tried, tried
+from clearway.experiments.memory_alone import FRAMES_A_POSE, NEAREST, PLANNER, on_maps
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
+from clearway.experiments.setting import Setting
 from clearway.learn.run_folder import RunFolder
+from clearway.reward import COLLISION_AWARE
 from helpers.published import DOCS, assert_written, numbers
 
 RESULTS = (DOCS / "results.md").read_text(encoding="utf-8")
@@ -57,12 +62,41 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
             assert_written(mean, row[name], f"{name} after {count} frames")
             recorded = numbers(str(row[f"95 % of {name}"]))
             assert not interval or [*map(float, interval)] == [*map(float, recorded)]
+    check_targets_that_maps_were_not_given(found.setting)
     mark = mark_steps(found.setting, found.setting.targets)
     runs = [RunFolder(path) for path in (tmp_path / "memory" / "runs").glob("ppo-*")]
     settled = [settled_row(run.metrics(), mark)["frames"] for run in runs]
     assert len(settled) == 5 and f"settled after {round(np.mean(settled), -3):,.0f} frames" in page
     verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
+
+
+def check_targets_that_maps_were_not_given(setting: Setting) -> None:
+    """What the pages say of a planner on a learnt map, and the nearest picture, in figures 5 and 6."""
+    held_out = fig6.held_out_targets(setting)
+    (group,) = tried(setting, (COLLISION_AWARE,), held_out)
+    scenes = setting.world(held_out).target_scene.numpy()
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
+    part = page.partition("### Figure 6: more training targets")[2].partition("\n### ")[0].splitlines()
+    shown, spl = 0, {}
+    for mapped in on_maps(setting, group.trial, FRAMES_A_POSE):
+        cells = Tried(mapped.scores, scenes).cells()
+        spl[mapped.called] = cells[4]
+        for line in (line for line in part if line.startswith(f"| {', '.join(mapped.called)} |")):
+            for text, value, ends in zip(line.strip("|").split("|")[2:], cells[::2], cells[1::2], strict=True):
+                mean, *interval = numbers(text.replace("-", " "))
+                assert_written(mean, 100 * value, line)
+                for written, end in zip(interval, numbers(ends) if interval else (), strict=True):
+                    assert_written(written, 100 * float(end), line)
+            shown += 1
+    assert shown == 4
+    for frames in ("1,500 frames", "2,900 frames", "5,800 frames", "11,600 frames"):
+        assert abs(spl[PLANNER, frames] - spl[NEAREST, frames]) < 0.004
+    assert "| a map, 1,500 frames | 100 % held-out | 89 % (84-93) | | |" in (DOCS / "results.md").read_text()
+    for steps in fig5.DISTANCES:
+        (trial,) = {group.trial for group in fig5._groups(setting, steps)}
+        for mapped in on_maps(setting, trial):
+            assert mapped.scores.of("spl").min() == pytest.approx(1)
 
 
 def test_own_goals_are_what_their_record_comes_to() -> None:
@@ -165,12 +199,16 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     table = section.tables[0]
     for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows):
         if row["seeds"] == 5:
-            (line,) = [line for line in evidence.splitlines() if line.startswith(f"| {row['agent']} |")]
+            name = row["agent"] if row["learner"] == "paper" else row["learner"]
+            (line,) = [line for line in evidence.splitlines() if line.startswith(f"| {name} |")]
+            assert name == row["agent"] or f"Maps are of {row['agent']}" in evidence
             cell = line.strip("|").split("|")[2 if row["figure"] == "steps" else 3]
             mean, *interval = numbers(cell)
             assert_written(mean, row["average"], line)
-            for written, end in zip(interval, numbers(str(row["95 %"])), strict=True):
+            ends = numbers(str(row["95 %"]))
+            for written, end in zip(interval, ends if interval else (), strict=True):
                 assert_written(written, float(end), line)
+            assert interval or len(set(ends)) == 1
     claims = {" than ".join(re.findall(AGENTS, claim.text)): claim for claim in section.claims[1:]}
     claims["collision-aware than shortest"] = section.claims[0]
     for name, claim in claims.items():
@@ -335,6 +373,13 @@ def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> 
             mean, *interval = numbers(text.replace(",", "").replace("-", " "))
             assert_written(mean, row[name], begin)
             assert interval == numbers(str(row["95 %"]).replace(",", ""))
+    maps = [row for row in rows if row["agent"] == "41,500 frames" and "seed" not in row]
+    assert len(maps) == 4
+    for row in maps:
+        (line,) = [line for line in lines if line.startswith(f"| {row['learner']}, {row['agent']} |")]
+        mean, *interval = numbers(line.strip("|").split("|")[1 if row["figure"] == "steps" else 2].replace("-", " "))
+        assert_written(mean, row["average"], line)
+        assert interval == numbers(str(row["95 %"]))
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["undecided"] * 6
     claimed = [line.strip("| ").split(" | ") for line in lines if line.endswith("| undecided |")]
@@ -348,8 +393,9 @@ def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> 
             or {"beta-alone": "collision", "gamma-alone": "precollision"}[claim.text.rpartition(" ")[2]]
             == arm.split()[1]
         ), cells
-    failed = {row["failed targets"] for row in rows if row.get("seeds") == 5 and "failed targets" in row}
-    assert "All 50\ntargets" in part and failed == {"0 of 50"}
+    failed = {row["learner"]: row["failed targets"] for row in rows if row.get("seeds") and "failed targets" in row}
+    assert "All 50\ntargets" in part and "one of 50 targets is lost" in part
+    assert failed.pop("nearest picture") == "1 of 50" and set(failed.values()) == {"0 of 50"}
 
 
 def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from clearway.agents.agent import FEATURES, POSE
+from clearway.agents.agent import POSE
 from clearway.agents.on_learnt_map import UNSEEN, MapPlanner, NearestPicture
 from clearway.evaluation.episodes import run_episodes
-from clearway.experiments.memory import WALKERS, seen_by_walkers
+from clearway.experiments.memory_alone import WALKERS, seen_by_walkers
 from clearway.scenes.actions import Action
 from clearway.world.world import World, make_world
 from helpers.made import grid_scene
@@ -49,9 +49,9 @@ def test_pictures_that_were_not_seen_are_not_known() -> None:
     seen[0, Action.MOVE_FORWARD] = 1
     features = np.array([[0.0], [1.0], [5.0]], np.float32)
     agent = NearestPicture(seen, features)
-    state = agent.reset({FEATURES: features[[1]]}, np.zeros(1, np.int64))
-    assert agent.reset({FEATURES: features[[2]]}, np.zeros(1, np.int64))["target"].tolist() == [1]
-    decisions, _ = agent.act({FEATURES: features[[0]]}, state)
+    state = agent.reset({POSE: np.array([1])}, np.zeros(1, np.int64))
+    assert agent.reset({POSE: np.array([2])}, np.zeros(1, np.int64))["target"].tolist() == [1]
+    decisions, _ = agent.act({POSE: np.array([0])}, state)
     assert decisions.action.tolist() == [Action.MOVE_FORWARD]
 
 

@@ -22,7 +22,7 @@ from clearway.experiments import (
     hard_tables,
     hard_targets,
     job,
-    memory,
+    memory_alone,
     navigation_tables,
     off_grid,
     table1,
@@ -131,7 +131,8 @@ def test_table1_holds_what_the_episodes_say(setting: Setting, sections: dict[str
     assert [named["bathroom"], named["kitchen"]] == pytest.approx(expected)
     assert named["average"] == pytest.approx(sum(expected) / 2)
     assert named["seeds"] == 2
-    assert len(by_target.rows) == 5 * (2 * 3 + 2) * 2  # targets, learners by rewards and two without clipping, seeds
+    # targets; learners by rewards, two without clipping, two other learners, two agents on maps; seeds
+    assert len(by_target.rows) == 5 * (2 * 3 + 2 + 2 + 2) * 2
     assert set(column(by_target, "seed")) == {0, 1}
 
 
@@ -191,7 +192,10 @@ def test_bands_reach_from_the_smallest_to_the_largest_seed(setting: Setting, sec
 
 
 def test_table3_s_agents_are_trained_twice_as_long(setting: Setting) -> None:
-    frames = [{each.run.learner.frames for each in planned(setting, [name])} for name in ("table2", "table3")]
+    frames = [
+        {each.run.learner.frames for each in planned(setting, [name]) if each.run.learner.algorithm in ("ppo", "a2c")}
+        for name in ("table2", "table3")
+    ]
     assert frames == [{FRAMES}, {2 * FRAMES}]
 
 
@@ -220,7 +224,8 @@ def test_table1_repeats_the_clipping_learner_without_clipping(setting: Setting, 
     kinds = {row[1:3] for row in table.rows if row[1] not in ("exact", "walked")}
     assert {agent for learner, agent in kinds if learner == "paper, unclipped"} == {"shortest", "collision-aware"}
     assert not any(learner == "default, unclipped" for learner, _ in kinds)  # it does not clip
-    unclipped = {job.run.learner.clip_rewards for job in planned(setting, ["table1"]) if not job.run.learner.hindsight}
+    learners = [job.run.learner for job in planned(setting, ["table1"])]
+    unclipped = {learner.clip_rewards for learner in learners if learner.algorithm == "a2c"}
     assert unclipped == {True, False}
 
 
@@ -293,7 +298,7 @@ def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dic
     for name, places in (("fig5", 5), ("fig6", 1)):
         table, _ = sections[name].tables
         assert column(table, "agent" if name == "fig5" else "learner").count("random walk") == places
-        assert all(0 <= value <= 1 for value in column(table, "sc"))
+        assert all(0 <= value <= 1 + 1e-12 for value in column(table, "sc"))
         assert all(
             strict <= loose
             for strict, loose in zip(column(table, "sc within 4 x shortest"), column(table, "sc"), strict=True)
@@ -413,7 +418,8 @@ def test_a_failed_target_is_counted_named_and_listed_first(setting: Setting, fai
     assert [row[3:] for row in rows] == [(2, "1 of 10")] * 2
     assert [row[4] for row in table.rows if row[1:3] == ("paper", "bump")] == ["0 of 10"] * 2
     assert f"Failed, paper, shortest: {failing[0]} {failing[1]} (seed 1)." in table.notes
-    assert by_target.rows[0][:5] == (*failing, "paper", "shortest", 1)
+    lost = [row[:5] for row in by_target.rows if row[2] != memory_alone.NEAREST]  # made pictures are too alike for it
+    assert lost[0] == (*failing, "paper", "shortest", 1)
     told = [
         claim.evidence for claim in section.claims if claim.text.startswith("paper: fewer collisions than with the")
     ]
@@ -456,7 +462,7 @@ def test_memory_says_what_a_map_holds_of_the_frames_it_was_learnt_in(sections: d
     (line,) = figure.series
     assert list(line.x) == sorted(line.x) and line.y[0] < line.y[-1] == 1.0
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
-    by_frames = [row["steps"] for row in rows if row["agent"] == memory.PLANNER]
+    by_frames = [row["steps"] for row in rows if row["agent"] == memory_alone.PLANNER]
     best = min(row["steps"] for row in rows)
     assert by_frames[-1] == best and by_frames[0] > best  # nobody takes fewer than the shortest paths
     assert {"q-learning", "bc", "default", "paper", "random walk"} < {row["agent"] for row in rows}

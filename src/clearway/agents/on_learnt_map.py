@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import shortest_path
 
-from clearway.agents.agent import FEATURES, POSE, Decisions, Observation, State
+from clearway.agents.agent import POSE, Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
 
 UNSEEN = -1
@@ -50,25 +50,25 @@ class MapPlanner:
 
 
 class NearestPicture(MapPlanner):
-    """A `MapPlanner` that is not told poses: it holds that it stands where the most similar picture was taken.
+    """A `MapPlanner` that is not told its pose: it holds that it stands where the most similar picture was taken.
+
+    A pose always shows the same picture here: the pose says which one is seen, and is used for nothing else.
 
     Args:
         next_state: (S, A) int64, see `MapPlanner`.
-        features: (S, F) float32, of every pose's picture; those of poses that were not seen are not looked at.
+        features: (S, F) float32, of every pose's picture; of poses that the map lacks they are seen, not remembered.
     """
-
-    sees: tuple[str, ...] = (FEATURES,)
 
     def __init__(self, next_state: np.ndarray, features: np.ndarray) -> None:
         super().__init__(next_state)
-        self._seen = poses_seen(next_state)
-        self._features = features[self._seen].astype(np.float64)
-        self._squares = (self._features**2).sum(axis=1)
+        seen, pictures = poses_seen(next_state), features.astype(np.float64)
+        remembered = pictures[seen]
+        squares = (remembered**2).sum(axis=1)
+        self._taken_at = seen[(squares - 2 * pictures @ remembered.T).argmin(axis=1)]  # (S,), by Euclidean distance
 
     def _pose(self, seen: Observation) -> np.ndarray:
-        """(B,) int64: of the pictures that were seen the nearest, by Euclidean distance of features."""
-        distance = self._squares - 2 * seen[FEATURES].astype(np.float64) @ self._features.T
-        return self._seen[distance.argmin(axis=1)]
+        """(B,) int64: where the nearest picture of those remembered was taken."""
+        return self._taken_at[seen[POSE]]
 
 
 def steps_to_go(next_state: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from clearway.experiments.generalisation import (
     tried,
 )
 from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, random_walk
+from clearway.experiments.memory_alone import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value
@@ -50,6 +51,7 @@ def section(setting: Setting) -> Section:
         found: dict[Kind, Scores] = {
             (group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups
         }
+        found |= {mapped.called: mapped.scores for mapped in on_maps(setting, groups[0].trial)}
         found[None, RANDOM_WALK] = random_walk(world, groups[0].trial)
         for kind, values in found.items():
             figures = Tried(values, target_scene)
@@ -64,7 +66,13 @@ def section(setting: Setting) -> Section:
         for kind, parts in kinds.items()
     }
     headings = ("steps away", "learner", "agent", "seeds", "targets", *HEADINGS, "the paper's sc")
-    notes = (NOTE, *told_of_own_goals(setting), reminder(setting.original, original_targets=False), *_replaced(setting))
+    notes = (
+        NOTE,
+        ABOUT_MAPS,
+        *told_of_own_goals(setting),
+        reminder(setting.original, original_targets=False),
+        *_replaced(setting),
+    )
     title = "Success on unseen targets"
     return Section(
         name="fig5",

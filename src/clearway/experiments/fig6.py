@@ -17,6 +17,7 @@ from clearway.experiments.generalisation import (
     tried,
 )
 from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, random_walk
+from clearway.experiments.memory_alone import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
@@ -44,10 +45,13 @@ def section(setting: Setting) -> Section:
     held_out = held_out_targets(setting)
     world = setting.world(held_out)
     target_scene = world.target_scene.numpy()
-    walked = Tried(random_walk(world, _groups(setting, TRAINED[0])[0].trial), target_scene)
+    trial = _groups(setting, TRAINED[0])[0].trial
+    walked = Tried(random_walk(world, trial), target_scene)
+    on_map = {mapped.called: Tried(mapped.scores, target_scene) for mapped in on_maps(setting, trial)}
     rows: list[tuple[Value, ...]] = []
     by_target: list[tuple[Value, ...]] = []
-    points: dict[str, list[tuple[float, Tried]]] = {RANDOM_WALK: [(count, walked) for count in TRAINED]}
+    flat = {RANDOM_WALK: walked} | {", ".join(kind): figures for kind, figures in on_map.items()}
+    points = {label: [(float(count), figures) for count in TRAINED] for label, figures in flat.items()}
     missing: dict[str, None] = {}
     for count in TRAINED:
         for group, own in zip(_groups(setting, count), _on_trained(setting, count), strict=True):
@@ -56,6 +60,9 @@ def section(setting: Setting) -> Section:
             by_target += [(count, *row) for row in figures.by_target(world, group.learner, group.agent)]
             points.setdefault(group.learner, []).append((count, figures))
             missing.update(dict.fromkeys((*group.missing(setting.out), *own.missing(setting.out))))
+    for kind, figures in on_map.items():
+        rows.append((None, ", ".join(kind), len(figures.scores), None, *figures.cells()))
+        by_target += [(None, *row) for row in figures.by_target(world, *kind)]
     rows.append((None, RANDOM_WALK, None, None, *walked.cells()))
     headings = ("targets a scene", "learner", "seeds", "sc on trained targets", *HEADINGS)
     title = "Success on held-out targets"
@@ -68,7 +75,9 @@ def section(setting: Setting) -> Section:
             "been learnt: see the success on the trained ones. The paper prints its figures as a picture alone."
         ),
         tables=(
-            ReportTable("fig6", title, headings, tuple(rows), (NOTE, *told_of_own_goals(setting), *_fewer(setting))),
+            ReportTable(
+                "fig6", title, headings, tuple(rows), (NOTE, ABOUT_MAPS, *told_of_own_goals(setting), *_fewer(setting))
+            ),
             ReportTable(
                 "fig6_targets",
                 f"{title}: every target",

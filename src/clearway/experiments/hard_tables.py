@@ -11,6 +11,7 @@ from clearway.experiments.convergence import settling
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.hard_targets import hard_targets
 from clearway.experiments.kept import keep, kept
+from clearway.experiments.memory_alone import other_learners
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.paper_numbers import TABLE_2, TABLE_3, PaperRow
 from clearway.experiments.plan import Job, TargetSets
@@ -43,16 +44,17 @@ class HardTable:
 
     def jobs(self, setting: Setting) -> list[Job]:
         """What must be done."""
-        return all_jobs(self._groups(setting))
+        return all_jobs((*self._groups(setting), *other_learners(setting, chosen(setting))))
 
     def section(self, setting: Setting) -> Section:
         """What came of it."""
-        groups, name = self._groups(setting), f"table{self.number}"
+        groups, others = self._groups(setting), other_learners(setting, chosen(setting))
+        name = f"table{self.number}"
         frames = " and ".join(dict.fromkeys(f"{group.runs[0].learner.frames:,}" for group in groups))
         times = "" if self.frames_factor == 1 else f"{self.frames_factor} times "
         title = f"Hard targets after {times}the main experiment's frames"
         where = f" on hard targets after {times}the frames" if times else " on hard targets"
-        tables = navigation_tables(name, title, setting, chosen(setting), groups, self.paper)
+        tables = navigation_tables(name, title, setting, chosen(setting), groups, self.paper, others)
         settled, sooner = settling(name, setting, groups, where)
         return Section(
             name=name,
@@ -63,7 +65,7 @@ class HardTable:
             ),
             tables=(*tables, settled),
             claims=(*claims(setting, groups, where), *sooner, *self._beside_easy(setting, groups)),
-            missing=all_missing(groups, setting.out),
+            missing=all_missing((*groups, *others), setting.out),
         )
 
     def _beside_easy(self, setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:

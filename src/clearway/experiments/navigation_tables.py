@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
+from clearway.experiments.memory_alone import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import THE_PAPER, PaperRow, reminder
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import ReportTable, Value
@@ -23,10 +26,18 @@ TARGET_METRICS = ("steps", "shortest_path_steps", "collisions", "success", "sc",
 PAPER_COLUMN = "the paper's average of these scenes"
 NAMED_FAILURES = 8  # of each kind of agent, in the note below the table
 EXACT = "exact"
+Found: TypeAlias = tuple[tuple[str, str], Scores]
+"""A learner and what tells its agents from others, and their figures."""
 
 
 def navigation_tables(
-    name: str, title: str, setting: Setting, targets: TargetSets, groups: Sequence[Group], paper: Mapping[str, PaperRow]
+    name: str,
+    title: str,
+    setting: Setting,
+    targets: TargetSets,
+    groups: Sequence[Group],
+    paper: Mapping[str, PaperRow],
+    others: Sequence[Group] = (),
 ) -> tuple[ReportTable, ReportTable]:
     """Means by scene, and all targets one by one.
 
@@ -34,27 +45,31 @@ def navigation_tables(
         name, title: of the tables.
         setting: see there.
         targets: that all groups were tried on.
-        groups: rows of the tables.
+        groups: rows of the tables; of their rewards exact references are given.
         paper: the paper's own row by the name of a reward.
+        others: further rows, to which neither belongs.
     """
     world = setting.world(targets)
-    found = [(group, group.scores(setting.out, world.target_count)) for group in groups]
+    found: list[Found] = [
+        ((group.learner, group.agent), group.scores(setting.out, world.target_count)) for group in (*groups, *others)
+    ]
+    of_paper = [paper.get(group.runs[0].reward.name) for group in groups]
     rewards = list(dict.fromkeys(group.runs[0].learner.paid(group.runs[0].reward) for group in groups))
     trial = setting.trial(targets)
     exact = _references(world, rewards, episode_starts(world, trial.episodes_per_target, trial.seed))
     walked = random_walk(world, trial)
+    found += [(mapped.called, mapped.scores) for mapped in on_maps(setting, trial)]
     rows: list[tuple[Value, ...]] = []
     for metric in METRICS:
-        for group, values in found:
-            of_paper = paper.get(group.runs[0].reward.name)
-            own = of_paper.average(metric, world.scene_names) if of_paper else None
-            rows.append(_group_row(world, group, values, metric, own))
+        for (kind, values), published in zip_longest(found, of_paper):
+            own = published.average(metric, world.scene_names) if published else None
+            rows.append(_group_row(world, kind, values, metric, own))
         for reward, row in paper.items():
             scenes = row.by_scene(metric, world.scene_names)
             rows.append(_reference_row(metric, THE_PAPER, reward, scenes, row.average(metric, world.scene_names)))
-        for kind, agent, figures in [*exact, ("walked", RANDOM_WALK, {m: walked.of(m)[0] for m in METRICS})]:
+        for reference, agent, figures in [*exact, ("walked", RANDOM_WALK, {m: walked.of(m)[0] for m in METRICS})]:
             means = _by_scene(world, figures[metric])
-            rows.append(_reference_row(metric, kind, agent, means, float(np.mean(means))))
+            rows.append(_reference_row(metric, reference, agent, means, float(np.mean(means))))
     left = ("figure", "learner", "agent", "seeds", "failed targets")
     by_scene_headings = (heading for scene in world.scene_names for heading in (scene, f"95 % of {scene}"))
     headings = (*left, *by_scene_headings, "average", "95 %", PAPER_COLUMN)
@@ -64,12 +79,15 @@ def navigation_tables(
         *_failures(world, found),
         f"{SOFT_FIXED_POINT.capitalize()}: where the published loss comes to rest, exactly (entropy weight 0.01; "
         "rewards clipped unless it says otherwise). Exact figures are means over the starts of all agents.",
+        ABOUT_MAPS,
     )
     return ReportTable(name, title, headings, tuple(rows), notes), _target_table(name, title, world, found)
 
 
-def _group_row(world: World, group: Group, values: Scores, metric: str, of_paper: float | None) -> tuple[Value, ...]:
-    learnt = (metric, group.learner, group.agent, len(values))
+def _group_row(
+    world: World, kind: tuple[str, str], values: Scores, metric: str, of_paper: float | None
+) -> tuple[Value, ...]:
+    learnt = (metric, *kind, len(values))
     if not len(values):
         return (*learnt, None, *(None for _ in world.scene_names for _ in range(2)), None, None, of_paper)
     target_scene, own = world.target_scene.numpy(), values.of(metric)
@@ -86,10 +104,10 @@ def _reference_row(
     return (metric, kind, name, None, None, *(value for mean in means for value in (mean, None)), average, None, None)
 
 
-def _failures(world: World, found: Sequence[tuple[Group, Scores]]) -> list[str]:
+def _failures(world: World, found: Sequence[Found]) -> list[str]:
     """Which targets failed, by kind of agent."""
     notes = []
-    for group, values in found:
+    for (learner, agent), values in found:
         pairs = np.argwhere(values.of("success") < 1).tolist()
         places = [
             f"{world.scene_names[world.target_scene[index]]} {world.scene_state(index)} (seed {values.seeds[row]})"
@@ -97,7 +115,7 @@ def _failures(world: World, found: Sequence[tuple[Group, Scores]]) -> list[str]:
         ]
         more = f" and {len(places) - NAMED_FAILURES} more, see all targets" if len(places) > NAMED_FAILURES else ""
         if places:
-            notes.append(f"Failed, {group.learner}, {group.agent}: {', '.join(places[:NAMED_FAILURES])}{more}.")
+            notes.append(f"Failed, {learner}, {agent}: {', '.join(places[:NAMED_FAILURES])}{more}.")
     return notes
 
 
@@ -129,12 +147,12 @@ def _references(
     return found
 
 
-def _target_table(name: str, title: str, world: World, found: Sequence[tuple[Group, Scores]]) -> ReportTable:
+def _target_table(name: str, title: str, world: World, found: Sequence[Found]) -> ReportTable:
     """A row for each target and kind of agent, those that failed first: nothing is hidden in a mean."""
     rows: list[tuple[Value, ...]] = []
     for index, scene in enumerate(world.target_scene.tolist()):
-        for group, values in found:
-            place = (world.scene_names[scene], world.scene_state(index), group.learner, group.agent)
+        for kind, values in found:
+            place = (world.scene_names[scene], world.scene_state(index), *kind)
             rows += [
                 (*place, seed, *(float(values.of(metric)[row, index]) for metric in TARGET_METRICS))
                 for row, seed in enumerate(values.seeds)

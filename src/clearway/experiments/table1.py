@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.memory_alone import other_learners
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
@@ -24,24 +25,26 @@ UNCLIPPED = "unclipped"  # ends the name of a learner that the paper does not ha
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done."""
-    return all_jobs(all_groups(setting))
+    return all_jobs((*all_groups(setting), *other_learners(setting)))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
     groups = all_groups(setting)
-    tables = navigation_tables("table1", "Steps and collisions", setting, setting.targets, groups, TABLE_1)
+    others = other_learners(setting)
+    tables = navigation_tables("table1", "Steps and collisions", setting, setting.targets, groups, TABLE_1, others)
     return Section(
         name="table1",
         title="Navigation (the paper's table 1)",
         text=(
             "Agents trained on the paper's targets, one network for all scenes, walk from random starts. Published "
-            "learners clip rewards to [-1, 1], as the paper's code base does; unclipped, the target is worth 10."
+            "learners clip rewards to [-1, 1], as the paper's code base does; unclipped, the target is worth 10. "
+            "Beside them stand agents that solve by memory alone."
         ),
         tables=tables,
         maps=maps(setting, groups),
         claims=(*claims(setting, groups), *_tenth(setting, groups)),
-        missing=all_missing(groups, setting.out),
+        missing=all_missing((*groups, *others), setting.out),
     )
 
 

@@ -1,0 +1,143 @@
+"""What memory alone solves: agents on maps that random walkers have seen; learners told more than pictures.
+
+They stand in the tables of other experiments, and make one of their own (`memory`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from clearway.agents.on_learnt_map import UNSEEN, MapPlanner, NearestPicture
+from clearway.evaluation.episodes import run_episodes
+from clearway.evaluation.metrics import by_target
+from clearway.experiments.groups import Group, Scores, compared
+from clearway.experiments.kept import keep, kept
+from clearway.experiments.plan import TargetSets, Trial
+from clearway.experiments.setting import Setting
+from clearway.learn.bc import BC
+from clearway.learn.learner import Learner
+from clearway.learn.q_learning import QLearning
+from clearway.reward import SHORTEST
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.world.world import World
+
+FILE = "memory.json"
+PLANNER, NEAREST = "planner on a learnt map", "nearest picture"
+WALKERS = 100
+FRAMES_A_POSE = (1, 2, 4, 8, 16, 32, 64)
+"""Frames that the walkers take, for every pose of the scenes; the last has seen every step of the bathroom."""
+ABOUT_MAPS = (
+    f"Maps hold where the actions of {WALKERS} random walkers led, in so many frames of all together. The {PLANNER} "
+    f"takes shortest ways over them and is told its pose; '{NEAREST}' is told its picture, and holds that it stands "
+    "where the most similar one was taken. Where no way is known both act at random. Their seeds are the walkers'."
+)
+LEARNERS: tuple[Learner, ...] = (QLearning(), BC())
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Agents of one kind on maps of so many frames.
+
+    Attributes:
+        agent: its kind.
+        frames: of all walkers together.
+        scores: on a trial's targets, a seed of walkers each.
+        exact: for each seed, the share of starts from which the way to a target, of those known, is a shortest one.
+    """
+
+    agent: str
+    frames: int
+    scores: Scores
+    exact: tuple[float, ...]
+
+    @property
+    def called(self) -> tuple[str, str]:
+        """What stands for a learner and its agent in a table."""
+        return self.agent, f"{self.frames:,} frames"
+
+
+def on_maps(setting: Setting, trial: Trial, frames_a_pose: Sequence[int] = FRAMES_A_POSE[-1:]) -> Iterator[Mapped]:
+    """Both agents on maps, of every number of frames; what was found before is read from its file.
+
+    Args:
+        setting: gives the scenes, and the walkers' seeds.
+        trial: what the agents are tried on.
+        frames_a_pose: some of `FRAMES_A_POSE`.
+    """
+    path = setting.out / FILE
+    question = {"scenes": {file.name: file.digest for file in setting.files}}
+    known: dict[str, dict] = kept(path, question, "found") or {}
+    world = setting.world(trial.targets)
+    for factor in frames_a_pose:
+        frames = -(-factor * world.state_count // WALKERS) * WALKERS
+        for kind in (PLANNER, NEAREST):
+            found = []
+            for seed in setting.seeds:
+                key = json.dumps([trial.name, kind, frames, seed])
+                if key not in known:
+                    known[key] = _tried(world, trial, kind, frames, seed)
+                    keep(path, question, {"found": known})
+                found.append(known[key])
+            scores = Scores(setting.seeds, np.array([each["scores"] for each in found]))
+            yield Mapped(kind, frames, scores, tuple(each["exact"] for each in found))
+
+
+def seen_by_walkers(world: World, frames: int, seed: int) -> np.ndarray:
+    """(S, A) int64, where actions led that `WALKERS` random walkers took in so many frames together; else `UNSEEN`.
+
+    Walkers begin in poses from which a target can be reached, and are never put elsewhere.
+    """
+    draws = np.random.default_rng(seed)
+    tables = world.next_state.cpu().numpy()
+    found = np.full(tables.shape, UNSEEN, np.int64)
+    here = draws.choice(np.unique(world.start_state.cpu().numpy()), WALKERS)
+    for first in range(0, frames, WALKERS):
+        walking = slice(0, min(WALKERS, frames - first))
+        action = draws.integers(ACTION_COUNT, size=WALKERS)
+        after = tables[here, action]
+        found[here[walking], action[walking]] = after[walking]
+        here = after
+    return found
+
+
+def other_learners(setting: Setting, targets: TargetSets | None = None) -> list[Group]:
+    """Tabular Q-learning, which is told poses, and behaviour cloning, which is told shortest paths: a group each.
+
+    They are trained for their own frames, or the budget's where these are fewer.
+
+    Args:
+        setting: see there.
+        targets: to be trained and tried on; None: the paper's.
+    """
+    most = setting.budget.default_frames
+    learners = {
+        each.algorithm: each if most is None else replace(each, frames=min(each.frames, most)) for each in LEARNERS
+    }
+    return compared(replace(setting, learners=learners), (SHORTEST,), targets=targets)
+
+
+def _tried(world: World, trial: Trial, kind: str, frames: int, seed: int) -> dict:
+    """Figures of one agent on targets, and the share of exactly shortest ways."""
+    seen = seen_by_walkers(world, frames, seed)
+    if kind == PLANNER:
+        planner = MapPlanner(seen)
+    else:
+        assert world.features is not None, "scenes of an experiment have features"
+        planner = NearestPicture(seen, world.features.float().cpu().numpy())
+    table = run_episodes(
+        world,
+        planner,
+        episodes_per_target=trial.episodes_per_target,
+        step_limit=trial.step_limit,
+        seed=trial.seed,
+    )
+    target = np.repeat(world.target_state.cpu().numpy(), world.start_count.cpu().numpy())
+    held = planner.steps_to_go[world.start_state.cpu().numpy(), target]
+    return {
+        "scores": by_target(table, world.target_count).tolist(),
+        "exact": float((held == world.start_steps.cpu().numpy()).mean()),
+    }
