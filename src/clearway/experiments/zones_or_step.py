@@ -32,8 +32,13 @@ class ShuffledZones(Zones):
 
     def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
         """In place of what was earned."""
-        zone = np.random.default_rng(SHUFFLE_SEED).permutation(moves.zone)
-        return super().__call__(earned, Moves(moves.next_state, moves.blocked, zone, moves.clearance_m))
+        return super().__call__(earned, with_shuffled(moves, SHUFFLE_SEED))
+
+
+def with_shuffled(moves: Moves, seed: int) -> Moves:
+    """The same moves, zones dealt out to other poses."""
+    zone = np.random.default_rng(seed).permutation(moves.zone)
+    return Moves(moves.next_state, moves.blocked, zone, moves.clearance_m)
 
 
 def rewards(setting: Setting) -> tuple[Reward, ...]:

@@ -1,0 +1,124 @@
+"""Do zones make learning faster, or would a larger or better conditioned step? Both rewards, at several step sizes.
+
+The learning rate is multiplied, and the features are taken as they are or centred and whitened. Five seeds decide at
+most six claims of a table after Holm's correction, so there are six.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settling_table
+from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.navigation_tables import navigation_tables
+from clearway.experiments.plan import Job
+from clearway.experiments.section import Claim, Section
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less
+from clearway.learn.learner import Learner
+from clearway.learn.settings import with_settings
+from clearway.reward import COLLISION_AWARE, SHORTEST
+
+NAME = "step-size"
+CHANGED = ("lr_start", "lr_end", "centre_features", "whiten_features")
+
+
+@dataclass(frozen=True)
+class StepSize:
+    """A learner's steps.
+
+    Attributes:
+        rate: multiplies its learning rates.
+        whitened: its features are centred and whitened, else taken as they are.
+    """
+
+    rate: float
+    whitened: bool
+
+    def of(self, learner: Learner) -> Learner:
+        """The learner with these steps."""
+        rates = [f"{name}={self.rate * getattr(learner, name)!r}" for name in ("lr_start", "lr_end")]
+        whitened = str(self.whitened).lower()
+        return with_settings(learner, [*rates, f"centre_features={whitened}", f"whiten_features={whitened}"])
+
+    def __str__(self) -> str:
+        """Words for people."""
+        return f"{self.rate:g} x rate, {'whitened' if self.whitened else 'features as they are'}"
+
+
+LARGEST = 4.0
+ALL = tuple(StepSize(rate, whitened) for whitened in (False, True) for rate in (0.5, 1.0, 2.0, LARGEST))
+PUBLISHED = StepSize(1.0, whitened=False)
+LARGER = (StepSize(LARGEST, whitened=False), StepSize(1.0, whitened=True), StepSize(LARGEST, whitened=True))
+"""Of which claims are made one by one."""
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done."""
+    return all_jobs(_groups(setting))
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    groups = _groups(setting)
+    tables = navigation_tables(NAME, "Steps and collisions", setting, setting.targets, groups, {}) if groups else ()
+    return Section(
+        name=NAME,
+        title="Zones, at several step sizes",
+        text=(
+            "The paper's two rewards, with learning rates of half to four times a learner's own, on features as they "
+            "are and on centred and whitened ones. If zones make learning faster at all of them, it is not that they "
+            "make a small step larger; if the shortest-path reward with a larger or better conditioned step settles as "
+            "soon as zones do without, such a step does as much."
+        ),
+        tables=(*tables, settling_table(NAME, setting, groups)) if groups else (),
+        claims=tuple(replace(claim, further=True) for claim in _claims(setting, groups)),
+        missing=all_missing(groups, setting.out),
+    )
+
+
+def _learners(setting: Setting) -> dict[str, Learner]:
+    """Those that have such settings."""
+    return {
+        name: learner
+        for name, learner in setting.learners.items()
+        if set(CHANGED) <= {field.name for field in fields(learner)}
+    }
+
+
+def _called(learner: str, step: StepSize) -> str:
+    return f"{learner}, {step}"
+
+
+def _groups(setting: Setting) -> list[Group]:
+    learners = {_called(name, step): step.of(own) for name, own in _learners(setting).items() for step in ALL}
+    return compared(replace(setting, learners=learners), PAIR)
+
+
+def _claims(setting: Setting, groups: list[Group]) -> Iterator[Claim]:
+    """Zones settle sooner at every step size; without them a larger step settles sooner than zones as published."""
+    mark = mark_steps(setting, setting.targets)
+    frames = {(group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0] for group in groups}
+    zones, none = COLLISION_AWARE.name, SHORTEST.name
+    for learner in _learners(setting):
+        ours, theirs = (_together(learner, reward, frames) for reward in (zones, none))
+        text = f"{learner}: {zones} settles sooner than {none}"
+        what = "frames until settled"
+        yield judged_less(f"{text}, mean of all step sizes", what, ours, theirs, np.zeros(len(ALL), np.int64))
+        for step in LARGER:
+            ours, theirs = (frames[_called(learner, step), reward] for reward in (zones, none))
+            yield judged_less(f"{text}, {step}", what, ours, theirs, ONE_TARGET)
+        published = frames[_called(learner, PUBLISHED), zones]
+        for step in LARGER[:2]:
+            text = f"{learner}: {none} with {step}, settles sooner than {zones} with {PUBLISHED}"
+            yield judged_less(text, what, frames[_called(learner, step), none], published, ONE_TARGET)
+
+
+def _together(learner: str, reward: str, frames: Mapping[tuple[str, str], np.ndarray]) -> np.ndarray:
+    """(R, 8) frames at all step sizes, of as many seeds as are complete at each."""
+    found = [frames[_called(learner, step), reward] for step in ALL]
+    complete = min(map(len, found))
+    return np.concatenate([own[:complete] for own in found], axis=1)

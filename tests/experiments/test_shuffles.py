@@ -1,0 +1,42 @@
+"""Zones of shuffled poses, each seed's in its own way."""
+
+from pathlib import Path
+
+from clearway.experiments import shuffles
+from clearway.experiments.job import run_folder
+from clearway.experiments.reproduce import planned
+from clearway.learn.load import load_network
+from clearway.reward import COLLISION_AWARE
+from clearway.scenes.actions import Action
+from helpers.small_setting import do_here, small_setting
+
+
+def test_each_seed_has_its_own_shuffle_of_as_many_zones(tmp_path: Path) -> None:
+    moves = small_setting(tmp_path).world().moves()
+    left = Action.TURN_LEFT  # leads to every pose once
+    true, *others = (own.table(moves)[0][:, left] for own in (COLLISION_AWARE, *map(shuffles.reward, range(3))))
+    assert all(sorted(other) == sorted(true) for other in others)
+    assert len({other.tobytes() for other in (true, *others)}) == 4
+
+
+def test_runs_are_paid_by_the_shuffle_of_their_seed(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    jobs = [job for job in planned(setting, [shuffles.NAME]) if job.run.reward.name.startswith("shuffle-")]
+    assert [job.run.reward.name for job in jobs] == ["shuffle-0", "shuffle-1"] * 2  # learners, seeds
+    assert len({job.run.name for job in jobs}) == 4
+    do_here(setting.out, jobs, threads=1)
+    for job in jobs:
+        kept = load_network(run_folder(setting.out, job.run).path).record.reward
+        assert kept.to_json()["terms"] == shuffles.reward(job.run.seed).to_json()["terms"]
+
+
+def test_three_claims_are_made_of_each_learner(tmp_path: Path) -> None:
+    section = shuffles.section(small_setting(tmp_path))
+    assert [claim.text for claim in section.claims if claim.text.startswith("paper:")] == [
+        "paper: collision-aware settles sooner than own shuffle",
+        "paper: own shuffle settles sooner than shortest",
+        "paper: collision-aware, fewer collisions than own shuffle",
+    ]
+    assert all(claim.further for claim in section.claims) and len(section.claims) == 6
+    agents = {row[2] for row in section.tables[0].rows}
+    assert {"own shuffle", "soft fixed point (shuffle-0, unclipped)"} < agents
