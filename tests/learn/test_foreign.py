@@ -7,6 +7,7 @@ import pytest
 
 import clearway
 from clearway.api.training import chosen_learner
+from clearway.cli.goals import check_knows_any_room
 from clearway.errors import AgentError, PluginError, RunError
 from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
@@ -15,12 +16,14 @@ from clearway.learn.load import load_network
 from clearway.learn.metrics_log import OWN_FIGURES, metrics_row
 from clearway.learn.peers import ALONE
 from clearway.learn.q_learning import TableTrainer
+from clearway.learn.recurrent import TrainedRecurrent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest, train_part
 from clearway.reward import COLLISION_AWARE
-from helpers.made import corridor_scene
+from helpers.made import corridor_scene, grid_scene
 from helpers.own_algorithm import CLASS, SMALL, SOURCE, forget_algorithm, offer_algorithm, with_body, with_trainer
+from helpers.small_eyes import seen_by_eyes
 from helpers.small_runs import CORRIDOR_TARGETS, corridor_world
 
 SCENE = corridor_scene(5, feature_count=12)
@@ -58,6 +61,23 @@ class Odd(PPO):
     def agent(self, record, tensors, frames):
         found = super().agent(record, tensors, frames)
         return Mine(record, found.network, found.feature_map, frames)
+"""
+
+OWN_RECURRENT = """
+from clearway.learn.recurrent import Recurrent, TrainedRecurrent
+
+
+class Mine(TrainedRecurrent):
+    {}
+
+
+@dataclass(frozen=True)
+class Odd(Recurrent):
+    algorithm: ClassVar[str] = "odd"
+
+    def agent(self, record, tensors, frames):
+        found = super().agent(record, tensors, frames)
+        return Mine(record, found.network, found.pairs, frames)
 """
 
 
@@ -269,6 +289,47 @@ def test_an_agent_derived_from_our_network_s_has_a_network(tmp_path, monkeypatch
     run = trained(tmp_path / "run", width=16)
     assert isinstance(run.agent, ForeignTrained)
     assert type(load_network(tmp_path / "run")).__name__ == "Mine"
+
+
+def recurrent_run(folder: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> clearway.TrainResult:
+    """A run of an agent derived from our recurrent one, whose class has this body."""
+    offer_algorithm(folder, monkeypatch, OWN_RECURRENT.format(body))
+    (scene,) = seen_by_eyes(folder / "eyes", corridor_scene(5))
+    return clearway.train(scene, [8, 16], algorithm="odd", **{**SMALL, "frames": 80}, width=8)
+
+
+def test_an_agent_derived_from_our_recurrent_one_goes_anywhere_as_that_does(tmp_path, monkeypatch) -> None:
+    agent = recurrent_run(tmp_path, monkeypatch, "pass").agent
+    assert isinstance(agent, ForeignTrained)
+    own = agent.trained
+    ours = TrainedRecurrent(replace(own.record, learner=clearway.Recurrent()), own.network, own.pairs, own.frames)
+    elsewhere, asked = grid_scene(2), {"goals": 4, "step_limit": 20}
+    told, *_ = clearway.evaluate_goals(agent, elsewhere, **asked)
+    assert told.agent == "odd" and told.scenes == clearway.evaluate_goals(ours, elsewhere, **asked)[0].scenes
+    check_knows_any_room(agent)  # of rooms that are generated for it
+
+
+@pytest.mark.parametrize(
+    ("body", "walk", "told"),
+    [
+        ("def seen(self, scenes): 1 / 0", clearway.evaluate_goals, r"seen failed \(ZeroDivisionError"),
+        ("def warn_of_aspect(self, scenes): 1 / 0", clearway.evaluate_live, r"warn_of_aspect failed \(ZeroDivision"),
+        ("def behind_camera(self): 1 / 0", clearway.evaluate_live, r"behind_camera failed \(ZeroDivisionError"),
+        ("def behind_camera(self): return 5", clearway.evaluate_live, "gives 5, expected an object with sees, reset"),
+    ],
+)
+def test_its_faults_anywhere_are_its_package_s(tmp_path, monkeypatch, body, walk, told) -> None:
+    agent = recurrent_run(tmp_path, monkeypatch, body).agent
+    with pytest.raises((PluginError, AgentError), match=f"^{SOURCE}: {told}"):
+        walk(agent, grid_scene(2), goals=2, step_limit=5)
+
+
+def test_the_eyes_of_a_package_s_agent_that_fail_are_told_of(tmp_path, monkeypatch) -> None:
+    agent = recurrent_run(tmp_path, monkeypatch, "encoder = property(lambda self: 1 / 0)").agent
+    monkeypatch.setattr("clearway.live.live_room.check_is_room", lambda scene: None)
+    monkeypatch.setattr(agent.trained.__class__, "seen", lambda self, scenes: list(scenes))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: encoder failed \(ZeroDivisionError"):
+        clearway.evaluate_goals(agent, grid_scene(2), goals=2, step_limit=5, perturb="light=0.5", takes=1)
 
 
 def test_what_is_ours_stands_behind_no_guard(tmp_path, monkeypatch) -> None:

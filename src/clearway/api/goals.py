@@ -68,8 +68,8 @@ def evaluate_goals(
     from clearway.evaluation import goals as walked
     from clearway.evaluation.tours import Touring
     from clearway.learn import load
+    from clearway.learn.foreign_agent import goes_anywhere
     from clearway.learn.load import TrainedAgent
-    from clearway.learn.recurrent import TrainedRecurrent
     from clearway.live.live_room import check_is_room
     from clearway.torch_threads import torch_threads
 
@@ -89,7 +89,7 @@ def evaluate_goals(
         for scene in found:  # before what takes long
             check_is_room(scene)
             walked.drawn_goals(scene, goals, seed)
-    if isinstance(agent, TrainedRecurrent | Generalist):
+    if isinstance(agent, Generalist) or goes_anywhere(agent):
         found = agent.seen(found)
     elif isinstance(agent, TrainedAgent):
         found = load.run_scenes(agent.record, found)
@@ -143,10 +143,10 @@ def check_can_tour(agent: object, steps: int) -> None:
 
 def _check_sees(agent: object) -> None:
     """Raise ArgumentError where an agent knows the poses that it is in, whatever it is shown."""
+    from clearway.learn.foreign_agent import goes_anywhere
     from clearway.learn.load import TrainedAgent, TrainedNetwork
-    from clearway.learn.recurrent import TrainedRecurrent
 
-    if isinstance(agent, TrainedAgent) and not isinstance(agent, TrainedRecurrent):
+    if isinstance(agent, TrainedAgent) and not goes_anywhere(agent):
         problem = f"an agent of the algorithm {agent.record.learner.algorithm} goes by poses on the grid"
         instead = "Walk off the grid: evaluate --live" if isinstance(agent, TrainedNetwork) else "Leave it out"
         raise ArgumentError(f"perturb: {problem}, and would see nothing of it. {instead}")
@@ -157,11 +157,11 @@ def _takes(
 ) -> Takes:
     """The perturbed takes of what an agent sees; of one that is yet to be made, of all it may see."""
     from clearway.agents.generalist import Generalist
-    from clearway.learn.recurrent import TrainedRecurrent
+    from clearway.learn.foreign_agent import goes_anywhere
 
     encoder: Encoder | None = None
     sees: tuple[str, ...] = (RGB,) if scenes[0].features is None or scenes[0].encoder is None else (RGB, FEATURES)
-    if isinstance(agent, TrainedRecurrent | Generalist):
+    if isinstance(agent, Generalist) or goes_anywhere(agent):
         encoder, sees = agent.encoder, (FEATURES,)
     elif _is_made(agent):
         sees = agent.sees

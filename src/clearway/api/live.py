@@ -65,8 +65,8 @@ def evaluate_live(
             than the agent; or the agent cannot be made, or walk there.
     """
     from clearway.agents.generalist import Generalist
+    from clearway.learn.foreign_agent import goes_anywhere
     from clearway.learn.load import TrainedAgent, TrainedNetwork
-    from clearway.learn.recurrent import TrainedRecurrent
     from clearway.live.goals import LiveTouring, walk_to_goals
     from clearway.live.live_room import MODEL_SOURCE
     from clearway.torch_threads import torch_threads
@@ -98,7 +98,7 @@ def evaluate_live(
         walker = agent.behind_camera()
         if steps:
             walker = LiveTouring(agent.explorer(steps, camera=True), partial(agent.after, camera=True), steps)
-    elif isinstance(agent, TrainedRecurrent):
+    elif goes_anywhere(agent):
         agent.warn_of_aspect(found)
         walker = agent.behind_camera()
     elif isinstance(agent, TrainedAgent):

@@ -71,10 +71,10 @@ def evaluate_at_goals(
 
 def check_knows_any_room(agent: object) -> None:
     """Raise ClearwayError where an agent walks in the scenes of its training alone, and rooms would be made for it."""
+    from clearway.learn.foreign_agent import goes_anywhere
     from clearway.learn.load import TrainedAgent
-    from clearway.learn.recurrent import TrainedRecurrent
 
-    if isinstance(agent, TrainedAgent) and not isinstance(agent, TrainedRecurrent):
+    if isinstance(agent, TrainedAgent) and not goes_anywhere(agent):
         problem = f"--rooms: an agent of the algorithm {agent.record.learner.algorithm} walks in its own alone"
         raise ClearwayError(f"{problem}. Leave it out, or evaluate {GENERALIST}")
 

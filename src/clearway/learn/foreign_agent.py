@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from torch import Tensor
 
@@ -11,8 +11,11 @@ from clearway.agents.agent import Agent
 from clearway.agents.named import Foreign, checked_agent
 from clearway.errors import PluginError
 from clearway.learn.plugged import faults_of
+from clearway.learn.recurrent import TrainedRecurrent
 from clearway.learn.run_record import RunRecord
+from clearway.perception.eyes import EyesEncoder
 from clearway.plugins import Plugin, find_plugin
+from clearway.scenes.scene import Scene
 from clearway.world.world import World
 
 if TYPE_CHECKING:
@@ -39,7 +42,7 @@ def made_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) ->
     if lacks:
         told = f"{plugin}: agent gives {agent!r:.60}, which lacks {', '.join(lacks)}"
         raise PluginError(f"{told} (clearway.learn.load.TrainedAgent). Ask its authors")
-    return ForeignTrained(agent, plugin)
+    return ForeignRecurrent(agent, plugin) if isinstance(agent, TrainedRecurrent) else ForeignTrained(agent, plugin)
 
 
 class ForeignTrained:
@@ -81,3 +84,39 @@ class ForeignTrained:
         with faults_of(self.record.learner, "on_poses"):
             agent = self.trained.on_poses(world)
         return Foreign(checked_agent(str(self._plugin), agent), str(self._plugin))
+
+
+class ForeignRecurrent(ForeignTrained):
+    """Another's trained agent that is derived from `TrainedRecurrent`, and goes by pictures in any room as that does.
+
+    What it raises in doing so is a PluginError.
+    """
+
+    trained: TrainedRecurrent
+
+    def behind_camera(self) -> Agent:
+        """Its agent that sees pictures, see `TrainedRecurrent`. Raises AgentError where it gives none."""
+        with faults_of(self.record.learner, "behind_camera"):
+            agent = self.trained.behind_camera()
+        return Foreign(checked_agent(str(self._plugin), agent), str(self._plugin))
+
+    @property
+    def encoder(self) -> EyesEncoder:
+        """Its own eyes."""
+        with faults_of(self.record.learner, "encoder"):
+            return self.trained.encoder
+
+    def warn_of_aspect(self, scenes: Sequence[Scene]) -> None:
+        """See `TrainedRecurrent`."""
+        with faults_of(self.record.learner, "warn_of_aspect"):
+            self.trained.warn_of_aspect(scenes)
+
+    def seen(self, scenes: Sequence[Scene]) -> list[Scene]:
+        """Any scenes with pictures as its own eyes see them, see `TrainedRecurrent`."""
+        with faults_of(self.record.learner, "seen"):
+            return self.trained.seen(scenes)
+
+
+def goes_anywhere(agent: object) -> TypeGuard[TrainedRecurrent | ForeignRecurrent]:
+    """Whether it is a run's agent that goes by pictures in any room; others are bound to the scenes of their run."""
+    return isinstance(agent, TrainedRecurrent | ForeignRecurrent)
