@@ -8,6 +8,8 @@ import pytest
 import clearway
 from clearway.api.training import chosen_learner
 from clearway.cli.goals import check_knows_any_room
+from clearway.deploy.export import export_onnx
+from clearway.deploy.from_run import RunInScene, load_run_in_scene
 from clearway.errors import AgentError, PluginError, RunError
 from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
@@ -21,6 +23,7 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest, train_part
 from clearway.reward import COLLISION_AWARE
+from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene, grid_scene
 from helpers.own_algorithm import CLASS, SMALL, SOURCE, forget_algorithm, offer_algorithm, with_body, with_trainer
 from helpers.small_eyes import seen_by_eyes
@@ -51,7 +54,7 @@ from clearway.learn.ppo import PPO
 
 
 class Mine(TrainedNetwork):
-    pass
+    {}
 
 
 @dataclass(frozen=True)
@@ -285,10 +288,63 @@ def test_an_agent_s_faults_in_walking_are_told_as_its_package_s(tmp_path, monkey
 
 
 def test_an_agent_derived_from_our_network_s_has_a_network(tmp_path, monkeypatch) -> None:
-    offer_algorithm(tmp_path, monkeypatch, OWN_NETWORK)
+    offer_algorithm(tmp_path, monkeypatch, OWN_NETWORK.format("pass"))
     run = trained(tmp_path / "run", width=16)
     assert isinstance(run.agent, ForeignTrained)
     assert type(load_network(tmp_path / "run")).__name__ == "Mine"
+
+
+def in_corridor(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> RunInScene:
+    """The agent of a run of this algorithm in its scene."""
+    offer_algorithm(folder, monkeypatch, source)
+    trained(folder / "run", width=16)
+    write_scene(SCENE, folder / "corridor.h5")
+    return load_run_in_scene(folder / "run", files=[folder / "corridor.h5"])
+
+
+OWN_FORWARD = """
+    def in_scene(self, index):
+        found = super().in_scene(index)
+        found.forward = lambda history, target: 1 / 0
+        return found
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("def in_scene(self, index): 1 / 0", r"in_scene failed \(ZeroDivisionError: division by zero\)"),
+        ("def in_scene(self, index): raise SystemExit(3)", r"in_scene failed \(SystemExit: 3\)"),
+        ("def in_scene(self, index): return 5", r"in_scene failed \(TypeError: gives 5, expected a ScenePolicy"),
+        (OWN_FORWARD, r"its network failed \(ZeroDivisionError: division by zero\)"),
+    ],
+)
+def test_an_agent_of_a_package_that_cannot_be_exported_is_one_line(tmp_path, monkeypatch, body, told) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(body))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: {told}.*\. Ask its authors") as caught:
+        export_onnx(chosen, tmp_path / "agent.onnx", with_encoder=False)
+    assert "\n" not in str(caught.value) and not (tmp_path / "agent.onnx").exists()
+
+
+def test_what_a_package_s_agent_tells_of_its_network_is_guarded_too(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("pass"))
+    monkeypatch.setattr(type(chosen.trained), "feature_map", property(lambda self: 1 / 0), raising=False)
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: what it tells of its network failed \(ZeroDivisionError"):
+        chosen.card(None)
+
+
+def test_a_network_that_cannot_be_translated_is_its_package_s_unless_it_is_ours(tmp_path, monkeypatch) -> None:
+    def refuses(*_: object, **__: object) -> None:
+        raise ValueError("no such operator")
+
+    monkeypatch.setattr("torch.onnx.export", refuses)
+    source = OWN_NETWORK.format("pass")
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: translating its network failed \(ValueError: no such op"):
+        export_onnx(in_corridor(tmp_path / "theirs", monkeypatch, source), tmp_path / "a.onnx", with_encoder=False)
+    forget_algorithm(tmp_path / "theirs" / "site", monkeypatch)
+    of_ours = source.partition("    def agent")[0]
+    with pytest.raises(ValueError, match="no such operator"):
+        export_onnx(in_corridor(tmp_path / "ours", monkeypatch, of_ours), tmp_path / "a.onnx", with_encoder=False)
 
 
 def recurrent_run(folder: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> clearway.TrainResult:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
 from clearway.deploy.onnx_graph import AgentGraph
 from clearway.errors import DeployError, install_hint
 from clearway.files import written_whole
+from clearway.learn.foreign_agent import faults_of_agent
 from clearway.mapping.settings import MappingSettings
 from clearway.perception.eyes import EyesEncoder
 from clearway.version import __version__
@@ -42,6 +43,7 @@ def export_onnx(
     Raises:
         DeployError: the packages of the extra `onnx` are not installed.
         EncoderError: the encoder that made the scene's features cannot be had.
+        PluginError: the agent is another package's, and fails, or cannot be translated.
     """
     check_can_export()
     encoder = exportable_encoder(chosen) if with_encoder else None
@@ -61,7 +63,9 @@ def export_onnx(
         inputs = {"picture": picture, "start": torch.zeros(2, dtype=torch.bool), **inputs}
         axes = {"picture": {0: batch, 1: height, 2: width}, "start": {0: batch}, **axes}
         outputs, graph = [*outputs, "history_after"], AgentGraph(policy, encoder)
-    _write(path, card, graph, inputs, outputs, axes)
+    with faults_of_agent(chosen.trained, "its network"), torch.no_grad():
+        policy(history, history[:, 0])
+    _write(path, card, graph, inputs, outputs, axes, faults_of_agent(chosen.trained, "translating its network"))
 
 
 def export_generalist(encoder: EyesEncoder, settings: MappingSettings, path: Path) -> None:
@@ -102,9 +106,11 @@ def _write(
     inputs: dict[str, torch.Tensor],
     outputs: list[str],
     axes: dict[str, dict[int, Any]],
+    guard: AbstractContextManager[None] | None = None,
 ) -> None:
-    """Write a graph with its card, sealed."""
-    model = _translated(graph.eval(), inputs, outputs, axes)
+    """Write a graph with its card, sealed; it is translated behind the guard, where there is one."""
+    with guard or nullcontext():
+        model = _translated(graph.eval(), inputs, outputs, axes)
     _sign(model, {CARD_KEY: card.to_json(), CHECKSUM_KEY: NO_DIGEST.decode()})
     with written_whole(path) as part:
         part.write_bytes(sealed(model.SerializeToString(deterministic=True)))

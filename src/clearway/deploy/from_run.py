@@ -14,6 +14,7 @@ from clearway.agents.arrival import Arrival, fitted_arrival
 from clearway.agents.by_features import FeatureAgent
 from clearway.deploy.card import ARRIVAL, Card
 from clearway.errors import DeployError, EncoderError
+from clearway.learn.foreign_agent import faults_of_agent
 from clearway.learn.learner import OnFeatures
 from clearway.learn.load import TrainedNetwork, load_network, run_scenes
 from clearway.model.policy import ScenePolicy
@@ -48,8 +49,12 @@ class RunInScene:
 
     @property
     def policy(self) -> ScenePolicy:
-        """What decides in the scene, by features."""
-        return self.trained.in_scene(self.index)
+        """What decides in the scene, by features. Raises PluginError: another package's agent gives none."""
+        with faults_of_agent(self.trained, "in_scene"):
+            policy: object = self.trained.in_scene(self.index)
+            if not isinstance(policy, ScenePolicy):
+                raise TypeError(f"gives {policy!r:.40}, expected a ScenePolicy (clearway.model.policy)")
+        return policy
 
     @cached_property
     def arrival(self) -> Arrival | None:
@@ -59,18 +64,22 @@ class RunInScene:
         return fitted_arrival(features, compared_numbers(self.encoder_record, features.shape[1]))
 
     def card(self, encoder: Encoder | None) -> Card:
-        """The agent's card; with or without its encoder inside."""
-        record, made_by, shape = self.trained.record, self.encoder_record, self.trained.network.shape
+        """The agent's card; with or without its encoder inside. Raises PluginError as `policy` does."""
+        record, made_by = self.trained.record, self.encoder_record
+        with faults_of_agent(self.trained, "what it tells of its network"):
+            history_length = self.trained.network.shape.history_length
+            feature_count = self.trained.feature_map.feature_count
+            normalisation = self._normalisation(encoder)
         pictures = self.scene.observations
         seen = next((one for one in self.scene.sensors if one.name == sensor_of(made_by)), None)
         return Card(
             scene=self.scene.name,
             actions=ACTION_NAMES,
-            history_length=shape.history_length,
-            feature_count=self.trained.feature_map.feature_count,
+            history_length=history_length,
+            feature_count=feature_count,
             takes_pictures=encoder is not None,
             encoder={"name": made_by.name, "identity": made_by.identity, "settings": dict(made_by.settings)},
-            normalisation=self._normalisation(encoder),
+            normalisation=normalisation,
             picture_size=None if pictures is None else (pictures.shape[1], pictures.shape[2]),
             training={
                 "seed": record.seed,

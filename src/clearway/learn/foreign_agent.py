@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from torch import Tensor
@@ -35,7 +36,7 @@ def made_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) ->
     with faults_of(learner, "agent", (LookupError, RuntimeError, ValueError)):
         agent = learner.agent(record, tensors, frames)
     plugin = find_plugin("algorithms", learner.algorithm)
-    if plugin is None or type(agent).__module__.startswith("clearway."):  # what is ours needs no guard
+    if plugin is None or _is_ours(agent):
         return agent
     with faults_of(learner, "agent"):
         lacks = [name for name in OFFERED if not hasattr(agent, name)]
@@ -43,6 +44,22 @@ def made_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) ->
         told = f"{plugin}: agent gives {agent!r:.60}, which lacks {', '.join(lacks)}"
         raise PluginError(f"{told} (clearway.learn.load.TrainedAgent). Ask its authors")
     return ForeignRecurrent(agent, plugin) if isinstance(agent, TrainedRecurrent) else ForeignTrained(agent, plugin)
+
+
+def _is_ours(agent: TrainedAgent) -> bool:
+    """It is of a class of clearway's, which needs no guard."""
+    return type(agent).__module__.startswith("clearway.")
+
+
+@contextmanager
+def faults_of_agent(agent: TrainedAgent, what: str) -> Iterator[None]:
+    """Tell of what an agent of a package's own class raises as that package's fault, see `faults_of`.
+
+    Raises:
+        PluginError: it failed.
+    """
+    with nullcontext() if _is_ours(agent) else faults_of(agent.record.learner, what):
+        yield
 
 
 class ForeignTrained:
