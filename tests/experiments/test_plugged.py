@@ -1,12 +1,18 @@
 """Experiments of other packages: what they give is checked, what they raise is told as their fault."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from clearway.api.training import chosen_learner
 from clearway.errors import PluginError, RunError, SceneError
 from clearway.experiments.catalogue import experiment, in_order
+from clearway.experiments.groups import compared
+from clearway.experiments.navigation_tables import navigation_tables
+from clearway.reward import COLLISION_AWARE
+from helpers.own_algorithm import SOURCE, offer_algorithm, with_body
 from helpers.plugin_package import write_package
 from helpers.small_setting import small_setting
 
@@ -67,6 +73,14 @@ def test_what_cannot_be_used_is_told_with_the_package(offered, tmp_path: Path, m
         found.jobs(setting)
         found.section(setting)
     assert "\n" not in str(caught.value)
+
+
+def test_a_learner_of_a_package_that_fails_at_its_reward_is_told_of_by_the_tables(tmp_path: Path, monkeypatch) -> None:
+    offer_algorithm(tmp_path, monkeypatch, with_body("def paid(self, reward): 1 / 0"))
+    setting = replace(small_setting(tmp_path, seeds=1), learners={"odd": chosen_learner("odd")})
+    groups = compared(setting, (COLLISION_AWARE,))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: paid failed \(ZeroDivisionError: division by zero\)\. Ask"):
+        navigation_tables("odd", "Odd", setting, setting.targets, groups, {})
 
 
 def test_errors_of_ours_pass(offered, tmp_path: Path) -> None:

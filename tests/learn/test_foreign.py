@@ -167,6 +167,13 @@ def test_what_a_request_asks_of_its_class_is_told_as_its_fault_too(tmp_path, mon
         asked(small_odd_request())
 
 
+def test_a_class_that_pays_no_reward_is_told_of(tmp_path, monkeypatch) -> None:
+    offer_algorithm(tmp_path, monkeypatch, with_body("def paid(self, reward): return None"))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: paid failed \(TypeError: gives None, expected a Reward\)"):
+        trained(tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_run_whose_algorithm_fails_at_its_reward_by_now_is_told_of_in_a_line(tmp_path, monkeypatch) -> None:
     site = offer_algorithm(tmp_path / "then", monkeypatch, CLASS)
     trained(tmp_path / "run")

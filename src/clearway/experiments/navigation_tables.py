@@ -54,7 +54,7 @@ def navigation_tables(
         ((group.learner, group.agent), group.scores(setting.out, world.target_count)) for group in (*groups, *others)
     ]
     of_paper = [paper.get(group.runs[0].reward.name) for group in groups]
-    rewards = list(dict.fromkeys(group.runs[0].learner.paid(group.runs[0].reward) for group in groups))
+    rewards = list(dict.fromkeys(group.runs[0].paid for group in groups))
     trial = setting.trial(targets)
     exact = _references(world, rewards, episode_starts(world, trial.episodes_per_target, trial.seed))
     walked = random_walk(world, trial)

@@ -12,6 +12,7 @@ from clearway.choices import ZoneLevel
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import without_later
+from clearway.learn.plugged import paid_by
 from clearway.live.conditions import Condition
 from clearway.reward import Reward
 
@@ -46,6 +47,11 @@ class PlannedRun:
     learner: Learner
     seed: int
     zone_level: ZoneLevel = "pose"
+
+    @property
+    def paid(self) -> Reward:
+        """The reward as training pays it, see `paid_by`."""
+        return paid_by(self.learner, self.reward)
 
     @property
     def halfway(self) -> int:

@@ -15,6 +15,7 @@ from clearway.learn.kinds import field_types
 from clearway.learn.learner import Learner
 from clearway.learn.peers import LostPeer
 from clearway.plugins import Plugin, find_plugin, load_plugin
+from clearway.reward import Reward
 
 CONSTANTS = {"algorithm": "ClassVar[str]", "acts_on": "ClassVar[str]", "sees_takes": "ClassVar[bool]"}
 ARGUMENTS = (
@@ -89,3 +90,17 @@ def faults_of(learner: Learner | type[Learner], what: str, passing: tuple[type[E
             raise
         reason = kind_and_reason(fault)
         raise PluginError(f"{plugin}: {what} failed ({reason}). Ask its authors") from fault
+
+
+def paid_by(learner: Learner, reward: Reward) -> Reward:
+    """The reward as training pays it, see `Learner.paid`.
+
+    Raises:
+        RunError: the learner cannot be paid so.
+        PluginError: another package's fails, or gives no reward.
+    """
+    with faults_of(learner, "paid"):
+        paid: object = learner.paid(reward)
+        if not isinstance(paid, Reward):
+            raise TypeError(f"gives {paid!r:.40}, expected a Reward")
+    return paid

@@ -19,7 +19,7 @@ from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.interruption import interruption
 from clearway.learn.learner import Learner
 from clearway.learn.peers import ALONE, Peers
-from clearway.learn.plugged import faults_of
+from clearway.learn.plugged import faults_of, paid_by
 from clearway.learn.progress import progress_view
 from clearway.learn.run_copy import RunCopy
 from clearway.learn.run_folder import RunFolder
@@ -87,9 +87,8 @@ class RunRequest:
 
     @property
     def paid(self) -> Reward:
-        """The reward as training pays it, see `Learner.paid`."""
-        with faults_of(self.learner, "paid"):
-            return self.learner.paid(self.reward)
+        """The reward as training pays it, see `paid_by`."""
+        return paid_by(self.learner, self.reward)
 
     def check(self, workers: int) -> None:
         """Refuse what so many workers cannot train, before anything that takes long.
