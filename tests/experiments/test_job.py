@@ -5,12 +5,16 @@ import numpy as np
 import pytest
 
 from clearway.errors import RunError
+from clearway.experiments.groups import PAIR, all_jobs, compared
 from clearway.experiments.job import do, episodes_of, is_done, run_folder
 from clearway.experiments.plan import Job
+from clearway.experiments.trajectories import maps
 from clearway.learn import train
 from clearway.learn.figures import Figures
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
+from clearway.world.world import World
+from helpers.agents import Spy
 from helpers.small_setting import small_setting
 
 
@@ -41,6 +45,32 @@ def test_a_job_that_is_done_is_left_alone(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(Trainer, "update", lambda self: pytest.fail("trains again"))
     do(tmp_path, job, threads=1)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json*")} == before
+
+
+class OnSight:
+    """Stands in for what a run has learnt: walks at random, and sees pictures."""
+
+    def __init__(self) -> None:
+        self.walkers: list[Spy] = []
+
+    def on_poses(self, world: World) -> Spy:
+        self.walkers.append(Spy("rgb"))
+        return self.walkers[-1]
+
+
+def test_agents_that_see_pictures_are_shown_them_in_trials_and_for_maps(tmp_path: Path, monkeypatch) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    setting = replace(setting, learners={"default": setting.learners["default"]})
+    groups, made = compared(setting, PAIR), OnSight()
+    monkeypatch.setattr("clearway.experiments.job.load_agent", lambda *_: made)
+    monkeypatch.setattr("clearway.experiments.trajectories.load_agent", lambda *_: made)
+    for each in all_jobs(groups):
+        do(tmp_path, each, threads=1)
+    assert [drawn.scene for drawn in maps(setting, groups)] == ["bathroom", "kitchen"]
+    assert len(made.walkers) == 4
+    shown = setting.scenes[0].seen_by("rgb").shape[1:]
+    for walker in made.walkers:
+        assert {seen["rgb"].shape[1:] for seen in (*walker.targets, *walker.seen)} == {shown}
 
 
 @pytest.mark.slow

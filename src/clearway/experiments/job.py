@@ -102,6 +102,7 @@ def _walk_on_grid(path: Path, folder: RunFolder, scenes: Sequence[Scene], run: P
     table = run_episodes(
         world,
         agent.on_poses(world),
+        scenes=scenes,
         episodes_per_target=trial.episodes_per_target,
         step_limit=trial.step_limit,
         seed=trial.seed,

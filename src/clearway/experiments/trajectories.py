@@ -28,7 +28,8 @@ def maps(setting: Setting, groups: Sequence[Group]) -> tuple[ReportMap, ...]:
             continue
         world = setting.world()
         agents = {agent: load_agent(folder.path) for agent, folder in folders.items()}
-        for show in showcases(world, {name: agent.on_poses(world) for name, agent in agents.items()}):
+        walkers = {name: agent.on_poses(world) for name, agent in agents.items()}
+        for show in showcases(world, walkers, setting.scenes):
             walks = {name: tuple(walk.states.tolist()) for name, walk in show.walks.items()}
             name = f"map_{learner.replace(', ', '_')}_{show.scene}"
             lost = [agent for agent, walk in walks.items() if walk[-1] != show.target]
