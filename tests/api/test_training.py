@@ -7,12 +7,15 @@ import torch
 
 import clearway
 from clearway.api import training
+from clearway.api.takes import perturbations_asked, takes_made
 from clearway.api.training import chosen_learner
 from clearway.errors import ArgumentError, ClearwayError
 from clearway.learn.presets import DEFAULT, PAPER_A3C
+from clearway.learn.run_folder import RunFolder
+from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
-from clearway.reward import SHORTEST, Arrival, Moves, Reward, RewardError, Term, Time
+from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Moves, Reward, RewardError, Term, Time
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
@@ -179,10 +182,49 @@ def test_what_is_wrong_is_told_before_pictures_are_taken(corridor, tmp_path, mon
         ({"out": 3}, "out=3: expected a path"),
         ({"out": tmp_path / "run"}, "run: holds a run already"),
         ({"out": tmp_path / "left"}, r"left: holds checkpoints but no run\.json"),
+        ({"out": tmp_path / "run" / "run.json"}, r"run\.json: not a folder to write to .* is a file\)"),
+        ({"out": tmp_path / "run" / "run.json" / "new"}, r"new: not a folder to write to .*run\.json is a file\)"),
+        ({"out": tmp_path / "new", "copy_to": "runs/one"}, "copy_to=runs/one: expected an address of s3:// or gs://"),
     ):
         with pytest.raises(ClearwayError, match=part):
             clearway.train(corridor, perturb="all", **wrong, **SMALL)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+class Taken(Exception):
+    pass
+
+
+def test_another_experiment_is_told_of_before_pictures_are_taken(corridor, tmp_path, monkeypatch, s3) -> None:
+    out, asked = tmp_path / "run", {"perturb": "all", "resume": True, "targets": [8], **SMALL}
+    made = takes_made(perturbations_asked("all"), 4)
+    request = RunRequest([corridor], {"corridor": [8]}, chosen_learner("ppo", settings=SMALL), COLLISION_AWARE)
+    record = record_of(replace(request, takes_made={**made, "seed": 0}))
+    with RunFolder(out).held():
+        RunFolder(out).write_record(record)
+    monkeypatch.setattr(training, "takes_seen", lambda *_, **__: (_ for _ in ()).throw(Taken))
+    for wrong, part in (
+        ({"seed": 1}, "run: holds another experiment"),
+        ({"perturb": "light=0.5"}, "run: holds another experiment"),
+        ({"takes": 3}, "run: holds another experiment"),
+        ({"frames": 1600}, "run: was started for 800 frames"),
+        ({"copy_to": "s3://no-such-bucket/run"}, "s3://no-such-bucket/run.*: there is nothing there"),
+    ):
+        with pytest.raises(ClearwayError, match=part):
+            clearway.train(corridor, out=out, **{**asked, **wrong})
+    with pytest.raises(Taken):
+        clearway.train(corridor, out=out, **asked)
+    with RunFolder(out).held(), pytest.raises(ClearwayError, match="run: another process trains here"):
+        clearway.train(corridor, out=out, **asked)
+    s3("runs/one/run.json", (out / "run.json").read_bytes())
+    elsewhere = {**asked, "out": tmp_path / "elsewhere", "copy_to": "s3://rooms/runs/one"}
+    with pytest.raises(ClearwayError, match=r"s3://rooms/runs/one: holds another experiment .* another --copy-to"):
+        clearway.train(corridor, **{**elsewhere, "seed": 1})
+    with pytest.raises(ClearwayError, match=r"s3://rooms/runs/one: holds a run already\. Give --resume"):
+        clearway.train(corridor, **{**elsewhere, "resume": False})
+    with pytest.raises(Taken):
+        clearway.train(corridor, **elsewhere)
+    assert not (tmp_path / "elsewhere").exists()
 
 
 def test_a_reward_that_no_record_can_hold_leaves_no_folder(corridor, tmp_path) -> None:

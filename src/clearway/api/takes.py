@@ -37,6 +37,11 @@ def perturbations_asked(perturb: Perturbed) -> Perturbations:
     return perturbations_named(perturb.split() if isinstance(perturb, str) else perturb)
 
 
+def takes_made(perturbations: Perturbations, takes: int) -> dict[str, object]:
+    """How so many takes of each pose are made, see `Takes.made`."""
+    return {"label": label_of(perturbations), "perturbations": perturbations.to_json(), "takes": takes}
+
+
 def takes_seen(
     scenes: Sequence[Scene],
     perturbations: Perturbations,
@@ -67,8 +72,7 @@ def takes_seen(
     from clearway.progress import work_progress
     from clearway.views.grid import grid_takes
 
-    label = label_of(perturbations)
-    made = {"label": label, "perturbations": perturbations.to_json(), "takes": takes}
+    made = takes_made(perturbations, takes)
     seen: dict[str, list[np.ndarray]] = {name: [] for name in (RGB, FEATURES) if name in sees}
     if not seen:
         return Takes(takes, seen, made)

@@ -13,15 +13,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_args
 
+import numpy as np
+
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word, as_workers
 from clearway.api.run_settings import leave_settings, reward_options
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
-from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
+from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_made, takes_seen
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
 from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import ArgumentError
-from clearway.evaluation.takes import Takes
 from clearway.learn.algorithms import ALGORITHMS, algorithm
 from clearway.learn.learner import Learner
 from clearway.learn.load import TrainedAgent, load_agent
@@ -32,7 +33,7 @@ from clearway.learn.run_record import RunRecord
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.learn.solved import unsolved_targets
 from clearway.learn.tracking import check_tracker
-from clearway.learn.train import RunRequest
+from clearway.learn.train import RunRequest, check_can_begin
 from clearway.learn.train import train as train_alone
 from clearway.learn.workers import train_by_workers
 from clearway.live.conditions import Perturbations
@@ -193,17 +194,19 @@ def train(
         device=word,
         feature_store=store,  # type: ignore[arg-type]
     )
-    _check(request, kept, workers=processes, resume=resume, track=track)
-    seen = _takes(request, perturbations_asked(perturb), takes, show_progress)
-    if seen is not None:
-        request = replace(request, takes=seen.seen[FEATURES], takes_made={**seen.made, "seed": number})
+    perturbations = perturbations_asked(perturb)
+    if (count := _takes_asked(perturbations, takes)) is not None:  # none yet, to be refused before they are taken
+        request = replace(request, takes=(), takes_made={**takes_made(perturbations, count), "seed": number})
+    _check(request, kept, workers=processes, resume=resume, track=track, copy_to=copied)
+    if count is not None:
+        request = replace(request, takes=_takes(request, perturbations, count, show_progress))
 
     def begun(path: Path) -> None:
         leave_settings(
             path,
             reward_options(reward),
             perturb=_as_words(perturb),
-            takes=None if seen is None else seen.count,
+            takes=count,
             threads=threads,
             workers=processes if processes > 1 else None,
             until="solved" if until_solved else None,
@@ -268,25 +271,41 @@ def chosen_learner(
         return replace(learner, **changes)
 
 
-def _check(request: RunRequest, folder: Path | None, *, workers: int, resume: bool, track: TrackerName | None) -> None:
+def _check(
+    request: RunRequest,
+    folder: Path | None,
+    *,
+    workers: int,
+    resume: bool,
+    track: TrackerName | None,
+    copy_to: str | None,
+) -> None:
     """Refuse, before pictures are taken, most of what training would refuse after it. Raises ClearwayError."""
     check_tracker(track)
     request.check(workers)
-    if folder is not None and not resume:
+    if folder is None:
+        return
+    if request.takes is not None:
+        check_can_begin(request, folder, resume=resume, copy_to=copy_to)
+    elif not resume:
         RunFolder(folder).check_free()
 
 
-def _takes(request: RunRequest, perturbations: Perturbations, takes: int | None, show_progress: bool) -> Takes | None:
-    """Features of perturbed takes of the scenes' poses; None where nothing is perturbed."""
-    if perturbations == Perturbations():
-        if takes is not None:
-            raise ArgumentError(f"takes={takes}: where nothing is perturbed a pose has one picture. Give perturb, too")
-        return None
-    count = TAKES if takes is None else as_whole("takes", takes, 1)
-    replace(request, takes=())  # refuses, before what takes long, what cannot be learnt by takes
+def _takes_asked(perturbations: Perturbations, takes: int | None) -> int | None:
+    """How many perturbed takes of each pose are seen; None where nothing is perturbed."""
+    if perturbations != Perturbations():
+        return TAKES if takes is None else as_whole("takes", takes, 1)
+    if takes is not None:
+        raise ArgumentError(f"takes={takes}: where nothing is perturbed a pose has one picture. Give perturb, too")
+    return None
+
+
+def _takes(request: RunRequest, perturbations: Perturbations, count: int, show_progress: bool) -> Sequence[np.ndarray]:
+    """Features of so many perturbed takes of the scenes' poses, see `RunRequest.takes`."""
     own = SEED_LIMIT - 1 - request.seed  # no pictures that an evaluation with the same seed sees
     sees = (FEATURES,)
-    return takes_seen(request.scenes, perturbations, sees, None, takes=count, seed=own, show_progress=show_progress)
+    taken = takes_seen(request.scenes, perturbations, sees, None, takes=count, seed=own, show_progress=show_progress)
+    return taken.seen[FEATURES]
 
 
 def _as_words(perturb: Perturbed) -> tuple[str, ...]:

@@ -11,11 +11,11 @@ milestones/N/    the agent after N frames, where it was asked for: a checkpoint 
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import warnings
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from clearway.choices import GENERALIST
@@ -123,11 +123,7 @@ class RunFolder:
             self.check_free()
             self.write_record(record)
             return None
-        before = self.read_record()
-        longer = replace(before, learner=replace(before.learner, frames=record.learner.frames))
-        if not longer.same_experiment(record):
-            problem = f"{self.path}: holds another experiment (see its {RUN_FILE})"
-            raise RunError(f"{problem}. Give the same settings, or another --out")
+        before = self.gone_on_with(record)
         if not before.same_experiment(record):
             before = self._lengthened(before, record.learner.frames)
         if not any(self.checkpoints.glob("frames-*")):
@@ -135,6 +131,37 @@ class RunFolder:
             self.forget_metrics_after(-1)
             return None
         return before.other_bits(record)
+
+    def gone_on_with(self, record: RunRecord) -> RunRecord:
+        """The record of the run here, with which a training of `record` can go on.
+
+        Raises:
+            RunError: it is another experiment; or it was to have other frames, and is not finished or has trained so
+                many already.
+        """
+        before, frames = self.read_record(), record.learner.frames
+        if not before.with_frames(frames).same_experiment(record):
+            problem = f"{self.path}: holds another experiment (see its {RUN_FILE})"
+            raise RunError(f"{problem}. Give the same settings, or another --out")
+        if before.same_experiment(record):
+            return before
+        begun, trained = before.learner.frames, self._trained_frames()
+        if trained < begun or frames <= trained:
+            problem = f"{self.path}: was started for {begun} frames, and its schedules end there"
+            remedy = f"Give --frames {begun}" if trained < begun else f"Give --frames {begun}, more than {trained}"
+            raise RunError(f"{problem}. {remedy}, or another --out")
+        return before
+
+    def check_place(self) -> None:
+        """Raise RunError where there can be no folder: a file is there, or on the way, or nothing can be written."""
+        try:
+            place = next(place for place in (self.path, *self.path.parents) if place.exists())
+            usable = place.is_dir() and os.access(place, os.W_OK | os.X_OK)
+            problem = f"{place} cannot be written to" if place.is_dir() else f"{place} is a file"
+        except OSError as error:
+            usable, problem = False, str(error)
+        if not usable:
+            raise RunError(f"{self.path}: not a folder to write to ({problem}). Choose another with --out")
 
     def check_free(self) -> None:
         """Raise RunError where no run can begin: one is here already, or what is left of one."""
@@ -147,20 +174,12 @@ class RunFolder:
     def _lengthened(self, before: RunRecord, frames: int) -> RunRecord:
         """Have a finished run go on to more frames.
 
-        Raises:
-            RunError: it is not finished, or has trained so many frames already.
-
         Warns:
             UserWarning: its schedules go on as those of so many frames.
         """
-        begun, trained = before.learner.frames, self._trained_frames()
-        if trained < begun or frames <= trained:
-            problem = f"{self.path}: was started for {begun} frames, and its schedules end there"
-            remedy = f"Give --frames {begun}" if trained < begun else f"Give --frames {begun}, more than {trained}"
-            raise RunError(f"{problem}. {remedy}, or another --out")
-        told = f"{self.path}: was finished after {trained:,} frames, and goes on to {frames:,}"
+        told = f"{self.path}: was finished after {self._trained_frames():,} frames, and goes on to {frames:,}"
         warnings.warn(f"{told}; results will not be those of one training so long", stacklevel=4)
-        longer = replace(before, learner=replace(before.learner, frames=frames))
+        longer = before.with_frames(frames)
         self.write_record(longer)
         return longer
 

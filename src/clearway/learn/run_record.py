@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -83,6 +83,10 @@ class RunRecord:
         """As JSON values."""
         learner = {"algorithm": self.learner.algorithm, **asdict(self.learner)}
         return {**asdict(self), "learner": learner, "reward": self.reward.to_json()}
+
+    def with_frames(self, frames: int) -> RunRecord:
+        """The record of such a run of so many frames."""
+        return replace(self, learner=replace(self.learner, frames=frames))
 
     def other_bits(self, now: RunRecord) -> list[str]:
         """Where a run goes on in another way than this one began, so that its bits are not an uninterrupted one's."""

@@ -250,20 +250,45 @@ def train_part(
         run.go_on(seconds)
 
 
+def check_can_begin(request: RunRequest, out: Path, *, resume: bool, copy_to: str | None) -> None:
+    """Refuse, before anything that takes long, to begin a run or to go on with one where `train` would refuse it.
+
+    Raises:
+        RunError: as of `train`, by its run folder.
+        ClearwayError: as of `opened_copy`, or the copy to go on with is of another experiment.
+    """
+    folder, record = RunFolder(out), record_of(request)
+    folder.check_place()
+    if resume and folder.exists:
+        with folder.held():
+            folder.gone_on_with(record)
+    else:
+        folder.check_free()
+    copy = _checked_copy(copy_to, folder, resume)
+    if copy is not None and not folder.exists:
+        copy.check_is_of(record)
+
+
 def opened_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy | None:
     """A run's copy, with what it holds in the run folder where that holds no run; None: there is to be none.
 
     Raises:
         ClearwayError: the store cannot be reached, or holds a run that is not to be written over.
     """
+    copy = _checked_copy(address, folder, resume)
+    if copy is not None and resume and not folder.exists:
+        copy.restore(folder.path)
+    return copy
+
+
+def _checked_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy | None:
+    """A run's copy, which can be written; nothing is fetched. Raises ClearwayError as `opened_copy`."""
     if address is None:
         return None
     copy = RunCopy(address)
     if folder.exists:
         copy.check_fits(folder)
-    elif resume:
-        copy.restore(folder.path)
-    elif copy.holds_a_run:
+    elif not resume and copy.holds_a_run:
         raise RunError(f"{address}: holds a run already. Give --resume to go on with it, or another --copy-to")
     copy.check_writable()
     return copy
