@@ -1,4 +1,4 @@
-"""Words as users write them: whole numbers, and names that are nearly right."""
+"""Words as users write them: whole numbers, texts in quotes, and names that are nearly right."""
 
 from __future__ import annotations
 
@@ -26,6 +26,11 @@ def whole_number(text: str) -> int:
     if not number.is_finite() or number.adjusted() > MOST_DIGITS or number != number.to_integral_value():
         raise ValueError(expected)
     return int(number)
+
+
+def unquoted(text: str) -> str:
+    """What stands in double quotes; another text as it is."""
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
 def nearest(word: object, names: Iterable[str]) -> str | None:

@@ -3,9 +3,12 @@
 from inspect import signature
 
 import pytest
+import yaml
 
 import clearway
 from clearway.api.training import chosen_learner
+from clearway.cli.config import with_config
+from clearway.cli.main import Command
 from clearway.errors import ArgumentError, PluginError, RunError
 from clearway.learn.algorithms import algorithm
 from clearway.learn.plugged import ARGUMENTS, faults_of
@@ -72,6 +75,11 @@ def optional(tmp_path, monkeypatch):
         ("note=x", "x"),
         ("note=null", None),
         ("note=", ""),
+        ('note="null"', "null"),
+        ('note=""null""', '"null"'),
+        ('note="', '"'),
+        ('note=""', ""),
+        ('style="loud"', "loud"),
         ("limit=3", 3),
         ("limit=2.5", 2.5),
         ("limit=null", None),
@@ -87,9 +95,17 @@ def test_words_are_read_by_the_types_of_settings(optional, word, expected) -> No
     assert found == expected and type(found) is type(expected)
 
 
+@pytest.mark.parametrize("note", [None, "null", '"null"', '"', "", "x", "3"])
+def test_a_run_s_settings_give_its_texts_again(optional, tmp_path, note) -> None:
+    (tmp_path / "set.yaml").write_text(yaml.safe_dump({"set": {"note": note}}))
+    *_, word = with_config(["train", "x.h5", "--config", str(tmp_path / "set.yaml")], Command)
+    assert with_settings(optional, [word]).note == note
+
+
 @pytest.mark.parametrize(
     ("word", "told"),
     [
+        ('limit="3"', "expected a whole number or a number or null"),
         ("limit=many", "expected a whole number or a number or null"),
         ("style=soft", "expected plain or loud or null"),
         ("temperature=null", "expected a number"),

@@ -16,7 +16,7 @@ import tyro
 from clearway.cli.known import command_of, options
 from clearway.cli.reading import without_none
 from clearway.errors import ClearwayError
-from clearway.spelling import did_you_mean, whole_number
+from clearway.spelling import did_you_mean, unquoted, whole_number
 
 CONFIG = "config"
 ADDED_TO = ("set",)  # options of single settings: the file's come first, and those of the command line change them
@@ -201,8 +201,11 @@ def _named_values(inner: Any, value: Mapping[Any, object]) -> Iterator[str]:
 
 
 def _bare(value: object) -> str:
+    """A value as `learn.settings` reads it: the text null, and one in quotes, stand in quotes."""
     if value is None:
         return "null"
+    if isinstance(value, str) and (value == "null" or value != unquoted(value)):
+        return f'"{value}"'
     return str(value).lower() if isinstance(value, bool) else _word(str, value)
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from clearway.errors import RunError
 from clearway.learn.kinds import UNIONS, field_types
 from clearway.learn.learner import Learner
 from clearway.learn.plugged import faults_of
-from clearway.spelling import did_you_mean, whole_number
+from clearway.spelling import did_you_mean, unquoted, whole_number
 
 Kind = TypeVar("Kind", bound=Learner)
 
@@ -39,12 +39,18 @@ def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
 
 
 def _parsed(text: str, wanted: Any) -> object:
-    """The value that a text means for a setting of that type. Raises ValueError where it means none."""
+    """The value that a text means for a setting of that type; where that is a text, it may stand in double quotes.
+
+    Raises:
+        ValueError: it means none.
+    """
     if get_origin(wanted) in UNIONS:
-        for one in sorted(get_args(wanted), key=lambda one: one is str):  # last, as any text is one
+        for one in sorted(get_args(wanted), key=_is_text):  # last, as any text is one
             with suppress(ValueError):
                 return _parsed(text, one)
         raise ValueError(text)
+    if _is_text(wanted):
+        text = unquoted(text)
     if wanted is str:
         return text
     if wanted in (int, float):
@@ -53,6 +59,11 @@ def _parsed(text: str, wanted: Any) -> object:
     if text not in words:
         raise ValueError(text)
     return words[text]
+
+
+def _is_text(wanted: Any) -> bool:
+    """The type's values are texts."""
+    return wanted is str or get_origin(wanted) is Literal
 
 
 def _words(wanted: Any) -> dict[str, object]:
