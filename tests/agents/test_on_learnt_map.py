@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from clearway.agents.agent import POSE
-from clearway.agents.on_learnt_map import UNSEEN, MapPlanner, NearestPicture
+from clearway.agents.agent import FEATURES, POSE
+from clearway.agents.on_learnt_map import UNSEEN, WALKERS, MapPlanner, NearestPicture, nearest_pictures, seen_by_walkers
 from clearway.evaluation.episodes import run_episodes
-from clearway.experiments.memory_alone import WALKERS, seen_by_walkers
 from clearway.scenes.actions import Action
 from clearway.world.world import World, make_world
 from helpers.made import grid_scene
@@ -30,6 +29,8 @@ def test_who_sees_pictures_of_a_whole_map_knows_its_pose_by_them(world: World) -
     agent = NearestPicture(world.next_state.numpy(), features + np.float32(1e-3))
     table = run_episodes(world, agent, episodes_per_target=20)
     np.testing.assert_array_equal(table.steps, table.shortest_path_steps)
+    taken_for = nearest_pictures(world.next_state.numpy(), features)
+    np.testing.assert_array_equal(taken_for, np.arange(len(features)))
 
 
 def test_it_goes_only_by_steps_that_were_seen() -> None:
@@ -48,11 +49,14 @@ def test_pictures_that_were_not_seen_are_not_known() -> None:
     seen = np.full((3, 4), UNSEEN)
     seen[0, Action.MOVE_FORWARD] = 1
     features = np.array([[0.0], [1.0], [5.0]], np.float32)
-    agent = NearestPicture(seen, features)
-    state = agent.reset({POSE: np.array([1])}, np.zeros(1, np.int64))
-    assert agent.reset({POSE: np.array([2])}, np.zeros(1, np.int64))["target"].tolist() == [1]
-    decisions, _ = agent.act({POSE: np.array([0])}, state)
-    assert decisions.action.tolist() == [Action.MOVE_FORWARD]
+    assert nearest_pictures(seen, features).tolist() == [0, 1, 1]
+    by_view, by_pose = NearestPicture(seen, features), MapPlanner(seen, nearest_pictures(seen, features))
+    for agent, seen_at in ((by_view, {FEATURES: features}), (by_pose, {POSE: np.arange(3)})):
+        assert agent.sees == tuple(seen_at)
+        state = agent.reset({name: values[[1, 2]] for name, values in seen_at.items()}, np.zeros(2, np.int64))
+        assert state["target"].tolist() == [1, 1]
+        decisions, _ = agent.act({name: values[[0, 0]] for name, values in seen_at.items()}, state)
+        assert decisions.action.tolist() == [Action.MOVE_FORWARD] * 2
 
 
 def test_walkers_see_as_many_steps_as_there_are_frames_and_no_others(world: World) -> None:

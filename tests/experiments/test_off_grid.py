@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.agents.by_pose import RandomWalk
+from clearway.agents.on_learnt_map import ENOUGH_A_POSE, MapPlanner, frames_of, nearest_pictures, seen_by_walkers
 from clearway.errors import RunError
+from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import columns, quotients
-from clearway.experiments import off_grid
+from clearway.experiments import live_trial, off_grid
 from clearway.experiments.correction import corrected
 from clearway.experiments.job import do, is_done, trial_path
 from clearway.experiments.live_trial import COLUMNS, FIGURES, nearest_poses, read_live
@@ -80,7 +83,7 @@ def test_a_trial_s_file_says_what_live_evaluation_says(setting: Setting) -> None
     found = read_live(path, SETTINGS, 2)
     assert found.shape == (2, 2, len(FIGURES))
     agent = load_network(path.parents[1])
-    with stages({"a": agent}, setting.scenes, agent.record.targets) as places:
+    with stages(setting.scenes, agent.record.targets, "pose") as places:
         for number, one in enumerate(SETTINGS):
             ((table,),) = walk_setting(places, {"a": agent}, one, LiveProtocol(2, 4, 3, "sampled")).tables.values()
             own = quotients(*columns(table, METRICS), table.target, 2)
@@ -92,6 +95,55 @@ def test_a_trial_s_file_says_what_live_evaluation_says(setting: Setting) -> None
             share = [np.concatenate(ends[2 * target : 2 * target + 2]).mean() for target in range(2)]
             np.testing.assert_allclose(found[number, :, -1], share, atol=1e-6)
     assert (found[0] != found[1]).any()
+
+
+@pytest.mark.parametrize("walker", ["nearest picture", "random walk"])
+def test_who_needs_no_training_walks_beside_a_run_s_agent(
+    setting: Setting, monkeypatch: pytest.MonkeyPatch, walker: str
+) -> None:
+    def never(folder: Path) -> None:
+        raise AssertionError(f"{folder}: its agent was loaded")
+
+    monkeypatch.setattr(live_trial, "load_network", never)
+    run = setting.runs(setting.learners["paper"], COLLISION_AWARE)[0]
+    trials = [LiveTrial(SETTINGS, 2, 40, seed, walker) for seed in (3, 3, 4)]
+    paths = [setting.out / f"{number}.json" for number in range(3)]
+    for path, trial in zip(paths, trials, strict=True):
+        live_trial.walk_live(path, setting.out / "run", setting.scenes, run, trial)
+    figures, again, others = (read_live(path, SETTINGS, 2) for path in paths)
+    np.testing.assert_array_equal(figures, again)
+    assert (figures != others).any()
+    world = setting.world()
+    seen = seen_by_walkers(world, frames_of(world, ENOUGH_A_POSE), 3)
+    by_pose = (
+        RandomWalk() if walker == "random walk" else MapPlanner(seen, nearest_pictures(seen, world.features.numpy()))
+    )
+    on_grid = run_episodes(world, by_pose, episodes_per_target=2, step_limit=40, seed=3)
+    assert 0 < on_grid.reached.sum() < 4  # some poses of this room look the same
+    success = figures[0, :, FIGURES.index("success")]
+    np.testing.assert_array_equal(success, on_grid.reached.reshape(2, 2).mean(1))  # nothing is changed in the room
+    assert json.loads(paths[0].read_text())["about"]["walker"] == walker
+
+
+def test_trials_of_trained_agents_keep_their_names() -> None:
+    """As their files are called in the record that is published."""
+    trial = LiveTrial((Condition("none", Perturbations()),), 2, 4, 3)
+    assert trial.name == "live-1s-18903049aa"
+    assert len({trial.name, *(replace(trial, walker=own).name for own in ("nearest picture", "random walk"))}) == 3
+
+
+def test_tables_hold_who_needs_no_training(setting: Setting) -> None:
+    walked(setting, lambda reward, seed: {"contacts": 1.0 + seed})
+    (table,) = off_grid.section(setting).tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    own = [row for row in rows if row["learner"] in ("nearest picture", "walked")]
+    assert {row["reward"] for row in own} == {"64 frames a pose", "random walk"}
+    assert all((row["seeds"], row["contacts"]) == (5, 3.0) for row in own)
+    assert len(own) == 2 * (1 + len(off_grid.settings(setting)))
+    for job in off_grid.jobs(setting):
+        if job.trials[0].walker == "random walk":
+            trial_path(setting.out, job.run, job.trials[0]).unlink()
+    assert len(off_grid.section(setting).missing) == 5
 
 
 def test_a_damaged_file_is_named(tmp_path: Path) -> None:

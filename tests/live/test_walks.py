@@ -130,6 +130,6 @@ def test_an_encoder_of_depth_is_refused_before_a_room_is_built(agent) -> None:
     scene = replace(corridor_scene(5), encoder=depth_grid.find_record())
     with (
         pytest.raises(RunError, match="corridor: its encoder depth-grid sees depth, and live"),
-        stages({"a": agent}, [scene], {"corridor": (0,)}),
+        stages([scene], {"corridor": (0,)}, "pose"),
     ):
         pass

@@ -13,8 +13,16 @@ from scipy.sparse.csgraph import shortest_path
 
 from clearway.agents.agent import POSE, Decisions, Observation, State
 from clearway.agents.chance import CHANCE, chance_of, drawn
+from clearway.agents.encoded import Encoded
+from clearway.perception.encoder import Encoder
+from clearway.scenes.actions import ACTION_COUNT
+from clearway.world.world import World
 
 UNSEEN = -1
+WALKERS = 100
+"""Random walkers that see a map together."""
+ENOUGH_A_POSE = 64
+"""Frames of all walkers for every pose of a scene: then they have seen every step of the bathroom."""
 
 
 class MapPlanner:
@@ -22,12 +30,14 @@ class MapPlanner:
 
     Args:
         next_state: (S, A) int64, where actions led; `UNSEEN` where they were never taken.
+        taken_for: (S,) int64, the pose that it takes each for, as of `nearest_pictures`; None: it knows them all.
     """
 
     sees: tuple[str, ...] = (POSE,)
 
-    def __init__(self, next_state: np.ndarray) -> None:
+    def __init__(self, next_state: np.ndarray, taken_for: np.ndarray | None = None) -> None:
         self._next_state = next_state
+        self._taken_for = np.arange(len(next_state)) if taken_for is None else taken_for
         self.steps_to_go = steps_to_go(next_state)
 
     def reset(self, target: Observation, seed: np.ndarray) -> State:
@@ -46,29 +56,78 @@ class MapPlanner:
 
     def _pose(self, seen: Observation) -> np.ndarray:
         """(B,) int64."""
-        return seen[POSE]
+        return self._taken_for[seen[POSE]]
 
 
 class NearestPicture(MapPlanner):
-    """A `MapPlanner` that is not told its pose: it holds that it stands where the most similar picture was taken.
-
-    A pose always shows the same picture here: the pose says which one is seen, and is used for nothing else.
+    """A `MapPlanner` off the grid: it holds that it stands where the most similar picture was taken.
 
     Args:
         next_state: (S, A) int64, see `MapPlanner`.
-        features: (S, F) float32, of every pose's picture; of poses that the map lacks they are seen, not remembered.
+        features: (S, F) float32, of every pose's picture; those of poses that were not seen are not looked at.
+        encoder: makes the features of what is seen; None: features themselves are seen.
     """
 
-    def __init__(self, next_state: np.ndarray, features: np.ndarray) -> None:
+    def __init__(self, next_state: np.ndarray, features: np.ndarray, encoder: Encoder | None = None) -> None:
         super().__init__(next_state)
-        seen, pictures = poses_seen(next_state), features.astype(np.float64)
-        remembered = pictures[seen]
-        squares = (remembered**2).sum(axis=1)
-        self._taken_at = seen[(squares - 2 * pictures @ remembered.T).argmin(axis=1)]  # (S,), by Euclidean distance
+        self._seen = poses_seen(next_state)
+        self._pictures = features[self._seen]
+        self._encoded = Encoded(encoder)
+        self.sees = (self._encoded.sees,)
+
+    def reset(self, target: Observation, seed: np.ndarray) -> State:
+        """Begin B episodes; a target's features are taken where they are known. See `Agent.reset`."""
+        return {"target": self._nearest(self._encoded.of_target(target)), CHANCE: chance_of(seed)}
 
     def _pose(self, seen: Observation) -> np.ndarray:
-        """(B,) int64: where the nearest picture of those remembered was taken."""
-        return self._taken_at[seen[POSE]]
+        """(B,) int64."""
+        return self._nearest(self._encoded(seen))
+
+    def _nearest(self, features: np.ndarray) -> np.ndarray:
+        """(B, F) -> (B,) int64 states."""
+        return self._seen[nearest(features, self._pictures)]
+
+
+def nearest_pictures(next_state: np.ndarray, features: np.ndarray) -> np.ndarray:
+    """(S,) int64: of the poses that were seen, the one whose picture is most like each pose's.
+
+    Where a pose always shows the same picture, that is all that who goes by pictures can know of it.
+
+    Args:
+        next_state: (S, A) int64, see `MapPlanner`.
+        features: (S, F) float32, of every pose's picture.
+    """
+    seen = poses_seen(next_state)
+    return seen[nearest(features, features[seen])]
+
+
+def nearest(features: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """(B, F), (P, F) -> (B,) int64, index of the nearest by Euclidean distance, in float64."""
+    own, others = features.astype(np.float64), among.astype(np.float64)
+    return ((others**2).sum(axis=1) - 2 * own @ others.T).argmin(axis=1)
+
+
+def frames_of(world: World, frames_a_pose: int) -> int:
+    """Frames of all walkers together, as many each, in which they take so many for every pose of the world, or more."""
+    return -(-frames_a_pose * world.state_count // WALKERS) * WALKERS
+
+
+def seen_by_walkers(world: World, frames: int, seed: int) -> np.ndarray:
+    """(S, A) int64, where actions led that `WALKERS` random walkers took in so many frames together; else `UNSEEN`.
+
+    Walkers begin in poses from which a target can be reached, and are never put elsewhere.
+    """
+    draws = np.random.default_rng(seed)
+    tables = world.next_state.cpu().numpy()
+    found = np.full(tables.shape, UNSEEN, np.int64)
+    here = draws.choice(np.unique(world.start_state.cpu().numpy()), WALKERS)
+    for first in range(0, frames, WALKERS):
+        walking = slice(0, min(WALKERS, frames - first))
+        action = draws.integers(ACTION_COUNT, size=WALKERS)
+        after = tables[here, action]
+        found[here[walking], action[walking]] = after[walking]
+        here = after
+    return found
 
 
 def steps_to_go(next_state: np.ndarray) -> np.ndarray:

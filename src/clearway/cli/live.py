@@ -96,7 +96,8 @@ def evaluate_live(
     check_seeds(seed=seed)
     paths = [folder] if options.against is None else [folder, options.against]
     agents = _named(paths, [load_network(path, checkpoint if path == folder else None) for path in paths])
-    scenes = run_scenes(next(iter(agents.values())).record, scene_files(scene_paths) if scene_paths else None)
+    record = next(iter(agents.values())).record
+    scenes = run_scenes(record, scene_files(scene_paths) if scene_paths else None)
     _check_rooms_can_be_built()
     from clearway.live.episodes import LiveProtocol
     from clearway.live.result_tables import rich_tables
@@ -107,11 +108,11 @@ def evaluate_live(
     one = Condition(label_of(options.perturbations), options.perturbations)
     protocol = LiveProtocol(episodes, step_limit, seed, options.selection)
     encoder = encoder_names(scenes)
-    targets = chosen_targets(scenes, HELD_OUT, seed) if held_out else next(iter(agents.values())).record.targets
+    targets = chosen_targets(scenes, HELD_OUT, seed) if held_out else record.targets
     name = f"{HELD_OUT}-{LIVE}" if held_out else LIVE
     if held_out:
         say_held_out(targets)
-    with stages(agents, scenes, targets) as places:
+    with stages(scenes, targets, record.zone_level) as places:
         settings = sweep_settings(options.strengths, _reference(places)) if options.sweep else [one]
         outcomes: list[LiveOutcome] = []
         with status_line() as show:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from clearway.world.world import World
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
 
-RANDOM_WALK = "random walk"
+RANDOM_WALK: Final = "random walk"
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def do(out: Path, job: Job, threads: int) -> None:
         if path.exists():
             continue
         if isinstance(trial, LiveTrial):
-            walk_live(path, folder.path, request.scenes, trial)
+            walk_live(path, folder.path, request.scenes, run, trial)
         else:
             _walk_on_grid(path, folder, request.scenes, run, trial)
 

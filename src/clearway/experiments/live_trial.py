@@ -1,4 +1,4 @@
-"""A trained agent in the rooms themselves, setting after setting; what came of every episode is kept in a file.
+"""Agents in the rooms themselves, setting after setting; what came of every episode is kept in a file.
 
 Axis letters: K settings, M targets, E episodes a target, J figures (`FIGURES`).
 """
@@ -12,12 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from clearway.experiments.plan import LiveTrial
+from clearway.agents.agent import Agent
+from clearway.agents.by_features import FeatureAgent
+from clearway.agents.by_pose import RandomWalk
+from clearway.agents.on_learnt_map import ENOUGH_A_POSE, NearestPicture, frames_of, seen_by_walkers
+from clearway.experiments.plan import LiveTrial, PlannedRun
 from clearway.files import read_kept, written_whole
 from clearway.learn.load import load_network
 from clearway.live.conditions import Condition
-from clearway.live.episodes import STEP_S, LiveProtocol, LiveTable
-from clearway.live.walks import stages, walk_setting
+from clearway.live.episodes import STEP_S, LiveProtocol, LiveTable, run_live_episodes
+from clearway.live.walks import LiveScene, stages
 from clearway.scenes.scene import Scene
 from clearway.zones import Zone, scene_zones
 
@@ -29,30 +33,54 @@ FIGURES = ("success", "contacts", "least clearance", "within 10 cm", "within 30 
 DIGITS = 6
 
 
-def walk_live(path: Path, folder: Path, scenes: Sequence[Scene], trial: LiveTrial) -> None:
-    """Walk a run's agent, and write what came of it.
+def walk_live(path: Path, folder: Path, scenes: Sequence[Scene], run: PlannedRun, trial: LiveTrial) -> None:
+    """Walk a run's agent, or another to the run's targets, and write what came of it.
 
     Args:
         path: the file to write.
         folder: of the run.
         scenes: of the run.
-        trial: see there.
+        run, trial: see there.
 
     Raises:
         ClearwayError: the agent has no network, a scene is none of our rooms, or its encoder cannot be had again.
     """
-    agent = load_network(folder)
+    targets = {scene.name: list(own) for scene, own in zip(scenes, run.targets, strict=True)}
     protocol = LiveProtocol(trial.episodes_per_target, trial.step_limit, trial.seed, "sampled")
-    zones = [scene_zones(scene, agent.record.zone_level) for scene in scenes]
+    zones = [scene_zones(scene, run.zone_level) for scene in scenes]
     found: dict[str, list[dict[str, list]]] = {}
-    with stages({"agent": agent}, scenes, agent.record.targets) as places:
+    with stages(scenes, targets, run.zone_level) as places:
+        agents = _walkers(places, folder, trial)
         for setting in trial.settings:
-            (tables,) = walk_setting(places, {"agent": agent}, setting, protocol).tables.values()
+            tables = [
+                run_live_episodes(place.live, place.world, agent, place.camera, setting.perturbations, protocol)
+                for place, agent in zip(places, agents, strict=True)
+            ]
             found[setting.label] = [_columns(*one) for one in zip(tables, scenes, zones, strict=True)]
-    about = {"run": folder.name, "targets": agent.record.targets, "seed": trial.seed, "step_limit": trial.step_limit}
+    about = {"run": folder.name, "targets": targets, "seed": trial.seed, "step_limit": trial.step_limit}
+    if trial.walker != "agent":
+        about["walker"] = trial.walker
     content = {"format_version": FORMAT_VERSION, "about": about, "settings": found}
     with written_whole(path) as part:
         part.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+def _walkers(places: Sequence[LiveScene], folder: Path, trial: LiveTrial) -> list[Agent]:
+    """Who walks in each scene."""
+    if trial.walker == "random walk":
+        return [RandomWalk() for _ in places]
+    if trial.walker == "nearest picture":
+        return [_by_nearest_picture(place, trial.seed) for place in places]
+    network = load_network(folder)
+    return [FeatureAgent(network.in_scene(index), place.encoder) for index, place in enumerate(places)]
+
+
+def _by_nearest_picture(place: LiveScene, seed: int) -> NearestPicture:
+    """Who knows the scene's own pictures, and which follows which, as random walkers on the grid have seen them."""
+    world = place.world
+    assert world.features is not None, "scenes of an experiment have features"
+    seen = seen_by_walkers(world, frames_of(world, ENOUGH_A_POSE), seed)
+    return NearestPicture(seen, world.features.float().cpu().numpy(), place.encoder)
 
 
 def read_live(path: Path, settings: Iterable[Condition], episodes_per_target: int) -> np.ndarray:

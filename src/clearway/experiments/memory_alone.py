@@ -8,10 +8,18 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
-from clearway.agents.on_learnt_map import UNSEEN, MapPlanner, NearestPicture
+from clearway.agents.on_learnt_map import (
+    ENOUGH_A_POSE,
+    WALKERS,
+    MapPlanner,
+    frames_of,
+    nearest_pictures,
+    seen_by_walkers,
+)
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import by_target
 from clearway.experiments.groups import Group, Scores, compared
@@ -22,14 +30,13 @@ from clearway.learn.bc import BC
 from clearway.learn.learner import Learner
 from clearway.learn.q_learning import QLearning
 from clearway.reward import SHORTEST
-from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.world import World
 
 FILE = "memory.json"
-PLANNER, NEAREST = "planner on a learnt map", "nearest picture"
-WALKERS = 100
-FRAMES_A_POSE = (1, 2, 4, 8, 16, 32, 64)
-"""Frames that the walkers take, for every pose of the scenes; the last has seen every step of the bathroom."""
+PLANNER = "planner on a learnt map"
+NEAREST: Final = "nearest picture"
+FRAMES_A_POSE = (1, 2, 4, 8, 16, 32, ENOUGH_A_POSE)
+"""Frames that the walkers take, for every pose of the scenes."""
 ABOUT_MAPS = (
     f"Maps hold where the actions of {WALKERS} random walkers led, in so many frames of all together. The {PLANNER} "
     f"takes shortest ways over them and is told its pose; '{NEAREST}' is told its picture, and holds that it stands "
@@ -73,7 +80,7 @@ def on_maps(setting: Setting, trial: Trial, frames_a_pose: Sequence[int] = FRAME
     known: dict[str, dict] = kept(path, question, "found") or {}
     world = setting.world(trial.targets)
     for factor in frames_a_pose:
-        frames = -(-factor * world.state_count // WALKERS) * WALKERS
+        frames = frames_of(world, factor)
         for kind in (PLANNER, NEAREST):
             found = []
             for seed in setting.seeds:
@@ -84,24 +91,6 @@ def on_maps(setting: Setting, trial: Trial, frames_a_pose: Sequence[int] = FRAME
                 found.append(known[key])
             scores = Scores(setting.seeds, np.array([each["scores"] for each in found]))
             yield Mapped(kind, frames, scores, tuple(each["exact"] for each in found))
-
-
-def seen_by_walkers(world: World, frames: int, seed: int) -> np.ndarray:
-    """(S, A) int64, where actions led that `WALKERS` random walkers took in so many frames together; else `UNSEEN`.
-
-    Walkers begin in poses from which a target can be reached, and are never put elsewhere.
-    """
-    draws = np.random.default_rng(seed)
-    tables = world.next_state.cpu().numpy()
-    found = np.full(tables.shape, UNSEEN, np.int64)
-    here = draws.choice(np.unique(world.start_state.cpu().numpy()), WALKERS)
-    for first in range(0, frames, WALKERS):
-        walking = slice(0, min(WALKERS, frames - first))
-        action = draws.integers(ACTION_COUNT, size=WALKERS)
-        after = tables[here, action]
-        found[here[walking], action[walking]] = after[walking]
-        here = after
-    return found
 
 
 def other_learners(setting: Setting, targets: TargetSets | None = None) -> list[Group]:
@@ -127,7 +116,7 @@ def _tried(world: World, trial: Trial, kind: str, frames: int, seed: int) -> dic
         planner = MapPlanner(seen)
     else:
         assert world.features is not None, "scenes of an experiment have features"
-        planner = NearestPicture(seen, world.features.float().cpu().numpy())
+        planner = MapPlanner(seen, nearest_pictures(seen, world.features.float().cpu().numpy()))
     table = run_episodes(
         world,
         planner,

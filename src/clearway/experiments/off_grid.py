@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from clearway.agents.on_learnt_map import ENOUGH_A_POSE
 from clearway.errors import ClearwayError
 from clearway.evaluation.across_seeds import mean_estimate
+from clearway.experiments.groups import RANDOM_WALK
 from clearway.experiments.job import is_done, trial_path
 from clearway.experiments.live_trial import FIGURES, read_live
-from clearway.experiments.plan import Job, LiveTrial, PlannedRun
+from clearway.experiments.memory_alone import NEAREST
+from clearway.experiments.plan import Job, LiveTrial, LiveWalker, PlannedRun
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less, judged_more, with_failures
@@ -34,6 +37,11 @@ LOST = 0.05
 """Share of episodes by which one kind may arrive less often and still be told better; few are walked."""
 PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
 TOUCHING = ("contacts", "least clearance")
+UNTRAINED: dict[tuple[str, str], LiveWalker] = {
+    (NEAREST, f"{ENOUGH_A_POSE} frames a pose"): NEAREST,
+    ("walked", RANDOM_WALK): RANDOM_WALK,
+}
+"""Agents that need no training, by what stands for a learner and its reward in a table."""
 STAYING_NEAR = ("within 10 cm", "within 30 cm", "in the collision zone")
 """Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction."""
 
@@ -43,7 +51,7 @@ class Walkers:
     """Agents that differ in their seed alone, and what they are asked.
 
     Attributes:
-        learner, reward: names.
+        learner, reward: names; of agents that need no training what stands for these in a table.
         jobs: one a seed.
     """
 
@@ -73,13 +81,16 @@ def section(setting: Setting) -> Section:
         text=(
             f"Agents that were trained on the pictures of the grid, in the rooms themselves: {EPISODES_PER_TARGET} "
             f"episodes a target, {STEP_LIMIT} steps at most, under each setting of a sweep at full strength. Agents of "
-            "one seed have the same starts and chances. Claims are of means over the settings."
+            "one seed have the same starts and chances. Claims are of means over the settings. Who goes by the nearest "
+            "picture knows those of the grid as it was built, and where the actions of random walkers led there."
             if groups
             else f"Nothing was walked. {_hindrance(setting)}"
         ),
         tables=(_table(setting, found),) if groups else (),
         claims=tuple(replace(claim, further=True) for claim in _claims(setting, found)) if groups else (),
-        missing=tuple(job.run.name for group in groups for job in group.jobs if not is_done(setting.out, job)),
+        missing=tuple(
+            dict.fromkeys(job.run.name for group in groups for job in group.jobs if not is_done(setting.out, job))
+        ),
     )
 
 
@@ -97,16 +108,18 @@ def _hindrance(setting: Setting) -> str | None:
 def _groups(setting: Setting) -> list[Walkers]:
     if _hindrance(setting):
         return []
-    return [
-        Walkers(name, reward.name, tuple(_job(setting, run) for run in setting.runs(learner, reward)))
+    trained = [
+        Walkers(name, reward.name, _jobs(setting, setting.runs(learner, reward), "agent"))
         for name, learner in setting.learners.items()
         for reward in REWARDS
     ]
+    beside = setting.runs(next(iter(setting.learners.values())), REWARDS[0])  # theirs are the targets, not the agents
+    return [*trained, *(Walkers(*kind, _jobs(setting, beside, walker)) for kind, walker in UNTRAINED.items())]
 
 
-def _job(setting: Setting, run: PlannedRun) -> Job:
-    episodes = min(EPISODES_PER_TARGET, setting.budget.episodes_per_target)
-    return Job(run, (LiveTrial(tuple(settings(setting)), episodes, STEP_LIMIT, run.seed),))
+def _jobs(setting: Setting, runs: Sequence[PlannedRun], walker: LiveWalker) -> tuple[Job, ...]:
+    episodes, asked = min(EPISODES_PER_TARGET, setting.budget.episodes_per_target), tuple(settings(setting))
+    return tuple(Job(run, (LiveTrial(asked, episodes, STEP_LIMIT, run.seed, walker),)) for run in runs)
 
 
 def _scores(setting: Setting, group: Walkers) -> np.ndarray:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from clearway.choices import ZoneLevel
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
@@ -18,6 +19,8 @@ from clearway.reward import Reward
 
 TargetSets = tuple[tuple[int, ...], ...]
 """Targets of each scene, in the scenes' order; states in the scene's own numbering."""
+
+LiveWalker: TypeAlias = Literal["agent", "nearest picture", "random walk"]
 
 DIGEST_LENGTH = 10
 
@@ -105,17 +108,22 @@ class LiveTrial:
         settings: what is changed in the room, by label; see `live.conditions`.
         episodes_per_target, step_limit: of each setting.
         seed: of starts, sampled actions and chances.
+        walker: the run's agent, or one that needs no training and is walked beside it.
     """
 
     settings: tuple[Condition, ...]
     episodes_per_target: int
     step_limit: int
     seed: int = 0
+    walker: LiveWalker = "agent"
 
     @property
     def name(self) -> str:
         """Name of its file in the run's folder."""
-        return f"live-{len(self.settings)}s-{_digest(asdict(self))}"
+        content = asdict(self)
+        if self.walker == "agent":  # trials planned before keep their names
+            del content["walker"]
+        return f"live-{len(self.settings)}s-{_digest(content)}"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from clearway.agents.by_features import FeatureAgent
+from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.evaluation.episodes import run_episodes
 from clearway.files import json_text, written_whole
@@ -74,23 +75,22 @@ def check_alike(agents: Mapping[str, TrainedNetwork]) -> None:
 
 @contextmanager
 def stages(
-    agents: Mapping[str, TrainedNetwork], scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]]
+    scenes: Sequence[Scene], targets: Mapping[str, Sequence[int]], zone_level: ZoneLevel
 ) -> Iterator[list[LiveScene]]:
-    """Build the rooms of the agents' scenes, with targets by scene name, and open a camera in each, for the block.
+    """Build the rooms of some scenes, with targets by scene name, and open a camera in each, for the block.
 
     Raises:
         SceneError: a scene is none of our rooms.
         EncoderError: an encoder cannot be had again.
         RunError: an encoder is unknown, or takes no colour pictures.
     """
-    record = next(iter(agents.values())).record
     with ExitStack() as opened:
         found = []
         for scene in scenes:
             made_by = _encoder_record(scene)  # before the seconds that the room takes
             live = live_room(scene)
             encoder = encoder_from_record(made_by)
-            world = make_world([scene], {scene.name: targets[scene.name]}, record.zone_level)
+            world = make_world([scene], {scene.name: targets[scene.name]}, zone_level)
             lens = live.lens(*_size_px(scene), fast=taken_fast(scene.made_by.notes))
             found.append(LiveScene(live, world, encoder, opened.enter_context(studio(live.model, lens))))
         yield found
