@@ -15,7 +15,7 @@ import pytest
 from clearway.experiments import fig5, fig6
 from clearway.experiments.convergence import mark_steps, settled_row
 from clearway.experiments.generalisation import Tried, tried
-from clearway.experiments.memory_alone import FRAMES_A_POSE, NEAREST, PLANNER, on_maps
+from clearway.experiments.learnt_maps import FRAMES_A_POSE, NEAREST, PLANNER, on_maps
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting

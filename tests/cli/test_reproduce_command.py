@@ -114,7 +114,7 @@ def test_a_second_experiment_joins_the_report(clearway, first, out: Path) -> Non
     changed = "--set", "lr_start=0.002"
     alone = clearway("reproduce", "fig4", *first.words, "--learners", "default", *changed, "--out", out)
     assert names(alone) == ["fig4"]  # another question: a report of its own
-    assert alone.json["warning"].endswith("Changed in every learner: lr_start=0.002.")
+    assert alone.json["warning"].endswith("Changed in every learner compared: lr_start=0.002.")
     assert "(PAPER_A2C)" not in alone.json["facts"]["learners"] and ", changed, " in alone.json["facts"]["learners"]
     rates = [RunFolder(run).read_record().learner.lr_start for run in (out / "runs").iterdir()]
     assert rates.count(0.002) == 2 and len(rates) == 4  # two rewards, trained anew

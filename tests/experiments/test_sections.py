@@ -22,7 +22,7 @@ from clearway.experiments import (
     hard_tables,
     hard_targets,
     job,
-    memory_alone,
+    learnt_maps,
     navigation_tables,
     off_grid,
     table1,
@@ -418,7 +418,7 @@ def test_a_failed_target_is_counted_named_and_listed_first(setting: Setting, fai
     assert [row[3:] for row in rows] == [(2, "1 of 10")] * 2
     assert [row[4] for row in table.rows if row[1:3] == ("paper", "bump")] == ["0 of 10"] * 2
     assert f"Failed, paper, shortest: {failing[0]} {failing[1]} (seed 1)." in table.notes
-    lost = [row[:5] for row in by_target.rows if row[2] != memory_alone.NEAREST]  # made pictures are too alike for it
+    lost = [row[:5] for row in by_target.rows if row[2] != learnt_maps.NEAREST]  # made pictures are too alike for it
     assert lost[0] == (*failing, "paper", "shortest", 1)
     told = [
         claim.evidence for claim in section.claims if claim.text.startswith("paper: fewer collisions than with the")
@@ -462,7 +462,7 @@ def test_memory_says_what_a_map_holds_of_the_frames_it_was_learnt_in(sections: d
     (line,) = figure.series
     assert list(line.x) == sorted(line.x) and line.y[0] < line.y[-1] == 1.0
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
-    by_frames = [row["steps"] for row in rows if row["agent"] == memory_alone.PLANNER]
+    by_frames = [row["steps"] for row in rows if row["agent"] == learnt_maps.PLANNER]
     best = min(row["steps"] for row in rows)
     assert by_frames[-1] == best and by_frames[0] > best  # nobody takes fewer than the shortest paths
     assert {"q-learning", "bc", "default", "paper", "random walk"} < {row["agent"] for row in rows}

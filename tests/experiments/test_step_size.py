@@ -3,21 +3,21 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from clearway.experiments import step_size
+from clearway.experiments import convergence, step_size
 from clearway.experiments.correction import corrected
+from clearway.experiments.groups import Group
 from clearway.experiments.reproduce import planned
 from clearway.experiments.setting import Setting
-from clearway.experiments.step_size import ALL, PUBLISHED, StepSize
+from clearway.experiments.step_size import ALL, AS_IT_IS, LARGER, StepSize
 from clearway.learn.presets import DEFAULT, PAPER_A2C
 from clearway.learn.q_learning import QLearning
 from helpers.small_setting import small_setting
 
 
 def test_a_step_size_changes_rates_and_whitening_alone() -> None:
-    assert PUBLISHED.of(PAPER_A2C) == PAPER_A2C
+    assert AS_IT_IS.of(PAPER_A2C) == PAPER_A2C
     assert StepSize(1.0, whitened=True).of(DEFAULT) == DEFAULT
     larger = StepSize(4.0, whitened=True).of(DEFAULT)
     assert (larger.lr_start, larger.lr_end) == (4 * DEFAULT.lr_start, 4 * DEFAULT.lr_end)
@@ -36,12 +36,19 @@ def test_the_rates_are_those_that_the_audit_asks_for() -> None:
 
 def test_every_step_size_is_trained_under_both_rewards(tmp_path: Path) -> None:
     setting = small_setting(tmp_path)
-    own = replace(setting, learners={"paper": setting.learners["paper"], "q": QLearning()})  # it has no such steps
+    whole = replace(setting.budget, whole_grid=True)
+    learners = {**setting.learners, "q": QLearning()}  # one whitens as it is, one has no such steps
+    own = replace(setting, learners=learners, budget=whole)
     runs = [job.run for job in planned(own, [step_size.NAME])]
     assert len({run.name for run in runs}) == len(runs) == 8 * 2 * 2
     assert {run.learner.algorithm for run in runs} == {"a2c"}
     table1 = {job.run.name for job in planned(own, ["table1"])}
     assert len(table1 & {run.name for run in runs}) == 2 * 2  # the learner as it is
+
+
+def test_a_smoke_run_trains_what_single_claims_are_of(tmp_path: Path) -> None:
+    runs = [job.run for job in planned(small_setting(tmp_path), [step_size.NAME])]
+    assert len(runs) == (1 + len(LARGER)) * 2 * 2
 
 
 def test_learners_without_steps_give_an_empty_section(tmp_path: Path) -> None:
@@ -54,13 +61,31 @@ def settled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Setting:
     """Five seeds; zones halve the frames at every step size, four times the rate halves them too."""
     setting = small_setting(tmp_path, seeds=5)
 
-    def frames(out: Path, group: object, mark: float) -> tuple[np.ndarray, int]:
+    def frames(out: Path, group: Group, mark: float) -> dict[int, float | None]:
         learner = group.runs[0].learner
         base = 1000.0 / (2 if learner.lr_start > 2.5e-3 else 1) / (2 if group.agent == "collision-aware" else 1)
-        return base + np.arange(5.0)[:, None], 5
+        return {run.seed: base + run.seed for run in group.runs}
 
-    monkeypatch.setattr(step_size, "frames_until_settled", frames)
-    return replace(setting, learners={"paper": PAPER_A2C})
+    for module in (step_size, convergence):
+        monkeypatch.setattr(module, "settled_by_seed", frames)
+    return replace(setting, learners={"paper": PAPER_A2C}, budget=replace(setting.budget, whole_grid=True))
+
+
+def test_seeds_are_not_mixed_where_a_run_is_missing(settled: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lacking(out: Path, group: Group, mark: float) -> dict[int, float | None]:
+        found: dict[int, float | None] = {run.seed: 1000.0 * run.seed for run in group.runs}
+        if group.runs[0].learner.lr_start > 2.5e-3:
+            del found[0]
+        else:
+            found[3] = None
+        return found
+
+    monkeypatch.setattr(step_size, "settled_by_seed", lacking)
+    arms = [group for group in step_size._groups(settled) if group.agent == "shortest"]
+    together = step_size._together(settled.out, arms, mark=1.0)
+    assert together.shape == (4, 8)
+    assert together[[0, 1, 3]].tolist() == [[1000.0 * seed] * 8 for seed in (1, 2, 4)]
+    assert sorted(set(together[2])) == [3000.0, PAPER_A2C.frames]
 
 
 def test_claims_are_six_and_each_compares_what_it_says(settled: Setting) -> None:

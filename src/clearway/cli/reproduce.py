@@ -31,7 +31,8 @@ class Reproduce:
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Some of table1, fig3, fig4, table2, table3, fig5, fig6, analysis, memory, zones-or-step, shuffles, step-size,
-    zone-levels, ablations, off-grid; all: each of these; or experiments of installed packages (clearway plugins)."""
+    zone-time, zone-levels, ablations, off-grid; all: each of these; or experiments of installed packages (clearway
+    plugins)."""
     out: Path = Path("reproduction")
     """Folder of scenes, runs and the report."""
     budget: BudgetName = "smoke"
@@ -131,7 +132,7 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
         f"{name}: {ABOUT_LEARNERS[name]}{', changed' * bool(found.changes)}, {learner.frames:,} frames"
         for name, learner in setting.learners.items()
     )
-    changed = f"Changed in every learner: {', '.join(found.changes)}." if found.changes else ""
+    changed = f"Changed in every learner compared: {', '.join(found.changes)}." if found.changes else ""
     warning = " ".join(filter(None, (budget.warning, changed)))
     facts = {
         "commands": "; ".join(found.commands),

@@ -19,6 +19,7 @@ from clearway.experiments import (
     step_size,
     table1,
     zone_levels,
+    zone_time,
     zones_or_step,
 )
 from clearway.experiments.experiment import Experiment
@@ -38,6 +39,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "zones-or-step": Experiment(zones_or_step.jobs, zones_or_step.section),
     "shuffles": Experiment(shuffles.jobs, shuffles.section),
     "step-size": Experiment(step_size.jobs, step_size.section),
+    "zone-time": Experiment(zone_time.jobs, zone_time.section),
     "zone-levels": Experiment(zone_levels.jobs, zone_levels.section),
     "ablations": Experiment(ablations.jobs, ablations.section),
     "off-grid": Experiment(off_grid.jobs, off_grid.section),

@@ -88,15 +88,22 @@ def settling_table(name: str, setting: Setting, groups: Sequence[Group]) -> Repo
 
 def frames_until_settled(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
     """Frames until each complete run of a group whose metrics are there had settled (R, 1), and how many have."""
-    frames, settled = [], 0
+    found = settled_by_seed(out, group, mark)
+    most = {run.seed: float(run.learner.frames) for run in group.runs}
+    frames = [most[seed] if own is None else own for seed, own in found.items()]
+    return np.array(frames, dtype=np.float64).reshape(-1, 1), sum(own is not None for own in found.values())
+
+
+def settled_by_seed(out: Path, group: Group, mark: float) -> dict[int, float | None]:
+    """Frames until each such run had settled, by its seed; None where it has not."""
+    found: dict[int, float | None] = {}
     for run in group.runs:
         table, metrics = episodes_of(out, run, group.trial), run_folder(out, run).metrics()
         if table is None or not metrics:
             continue
         row = settled_row(metrics, mark) if table.reached.all() else None
-        settled += row is not None
-        frames.append(run.learner.frames if row is None else row["frames"])
-    return np.array(frames, dtype=np.float64).reshape(-1, 1), settled
+        found[run.seed] = None if row is None else row["frames"]
+    return found
 
 
 def _until_settled(setting: Setting, groups: Sequence[Group]) -> dict[tuple[str, str], tuple[np.ndarray, int]]:

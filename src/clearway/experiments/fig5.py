@@ -18,7 +18,7 @@ from clearway.experiments.generalisation import (
     tried,
 )
 from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, random_walk
-from clearway.experiments.memory_alone import ABOUT_MAPS, on_maps
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value

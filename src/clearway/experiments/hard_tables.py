@@ -11,8 +11,8 @@ from clearway.experiments.convergence import settling
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.hard_targets import hard_targets
 from clearway.experiments.kept import keep, kept
-from clearway.experiments.memory_alone import other_learners
 from clearway.experiments.navigation_tables import navigation_tables
+from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_2, TABLE_3, PaperRow
 from clearway.experiments.plan import Job, TargetSets
 from clearway.experiments.section import Claim, Section

@@ -9,14 +9,14 @@ import numpy as np
 
 from clearway.evaluation.across_seeds import failed_targets, mean_estimate
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, all_jobs, all_missing, compared, random_walk
-from clearway.experiments.memory_alone import (
+from clearway.experiments.learnt_maps import (
     ABOUT_MAPS,
     FRAMES_A_POSE,
     PLANNER,
     Mapped,
     on_maps,
-    other_learners,
 )
+from clearway.experiments.other_learners import other_learners
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting

@@ -1,4 +1,7 @@
-"""The paper's kind of table: steps and collisions by scene and on average, agents beside exact references."""
+"""The paper's kind of table: steps and collisions by scene and on average, agents beside references.
+
+These are exact figures, a random walk, agents on learnt maps and, where an experiment has them, other learners.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
-from clearway.experiments.memory_alone import ABOUT_MAPS, on_maps
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
+from clearway.experiments.other_learners import ABOUT_OTHERS
 from clearway.experiments.paper_numbers import THE_PAPER, PaperRow, reminder
 from clearway.experiments.plan import TargetSets
 from clearway.experiments.section import ReportTable, Value
@@ -51,8 +55,11 @@ def navigation_tables(
     """
     world = setting.world(targets)
     found: list[Found] = [
-        ((group.learner, group.agent), group.scores(setting.out, world.target_count)) for group in (*groups, *others)
+        ((group.learner, group.agent), group.scores(setting.out, world.target_count)) for group in groups
     ]
+    for group in others:
+        frames = f"{group.runs[0].learner.frames:,} frames"
+        found.append(((group.learner, frames), group.scores(setting.out, world.target_count)))
     of_paper = [paper.get(group.runs[0].reward.name) for group in groups]
     rewards = list(dict.fromkeys(group.runs[0].paid for group in groups))
     trial = setting.trial(targets)
@@ -80,6 +87,7 @@ def navigation_tables(
         f"{SOFT_FIXED_POINT.capitalize()}: where the published loss comes to rest, exactly (entropy weight 0.01; "
         "rewards clipped unless it says otherwise). Exact figures are means over the starts of all agents.",
         ABOUT_MAPS,
+        *([ABOUT_OTHERS] if others else []),
     )
     return ReportTable(name, title, headings, tuple(rows), notes), _target_table(name, title, world, found)
 

@@ -12,8 +12,8 @@ from clearway.errors import ClearwayError
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.groups import RANDOM_WALK
 from clearway.experiments.job import is_done, trial_path
+from clearway.experiments.learnt_maps import NEAREST
 from clearway.experiments.live_trial import FIGURES, read_live
-from clearway.experiments.memory_alone import NEAREST
 from clearway.experiments.plan import Job, LiveTrial, LiveWalker, PlannedRun
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting

@@ -6,12 +6,19 @@ most six claims of a table after Holm's correction, so there are six.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 
-from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settling_table
+from clearway.experiments.convergence import (
+    ONE_TARGET,
+    frames_until_settled,
+    mark_steps,
+    settled_by_seed,
+    settling_table,
+)
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.plan import Job
@@ -51,7 +58,7 @@ class StepSize:
 
 LARGEST = 4.0
 ALL = tuple(StepSize(rate, whitened) for whitened in (False, True) for rate in (0.5, 1.0, 2.0, LARGEST))
-PUBLISHED = StepSize(1.0, whitened=False)
+AS_IT_IS = StepSize(1.0, whitened=False)
 LARGER = (StepSize(LARGEST, whitened=False), StepSize(1.0, whitened=True), StepSize(LARGEST, whitened=True))
 """Of which claims are made one by one."""
 
@@ -81,12 +88,17 @@ def section(setting: Setting) -> Section:
 
 
 def _learners(setting: Setting) -> dict[str, Learner]:
-    """Those that have such settings."""
-    return {
-        name: learner
-        for name, learner in setting.learners.items()
-        if set(CHANGED) <= {field.name for field in fields(learner)}
-    }
+    """Those that have such settings, and do not whiten as they are."""
+    found = {}
+    for name, learner in setting.learners.items():
+        if set(CHANGED) <= {field.name for field in fields(learner)} and AS_IT_IS.of(learner) == learner:
+            found[name] = learner
+    return found
+
+
+def _steps(setting: Setting) -> tuple[StepSize, ...]:
+    """All; of a smoke run those of which claims are made one by one."""
+    return ALL if setting.budget.whole_grid else (AS_IT_IS, *LARGER)
 
 
 def _called(learner: str, step: StepSize) -> str:
@@ -94,31 +106,40 @@ def _called(learner: str, step: StepSize) -> str:
 
 
 def _groups(setting: Setting) -> list[Group]:
-    learners = {_called(name, step): step.of(own) for name, own in _learners(setting).items() for step in ALL}
+    learners = {
+        _called(name, step): step.of(own) for name, own in _learners(setting).items() for step in _steps(setting)
+    }
     return compared(replace(setting, learners=learners), PAIR)
 
 
 def _claims(setting: Setting, groups: list[Group]) -> Iterator[Claim]:
     """Zones settle sooner at every step size; without them a larger step settles sooner than zones as published."""
-    mark = mark_steps(setting, setting.targets)
-    frames = {(group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0] for group in groups}
+    mark, out = mark_steps(setting, setting.targets), setting.out
+    frames = {(group.learner, group.agent): frames_until_settled(out, group, mark)[0] for group in groups}
     zones, none = COLLISION_AWARE.name, SHORTEST.name
     for learner in _learners(setting):
-        ours, theirs = (_together(learner, reward, frames) for reward in (zones, none))
+        own = [
+            [g for g in groups if g.learner.startswith(f"{learner}, ") and g.agent == name] for name in (zones, none)
+        ]
+        ours, theirs = (_together(out, arms, mark) for arms in own)
         text = f"{learner}: {zones} settles sooner than {none}"
         what = "frames until settled"
-        yield judged_less(f"{text}, mean of all step sizes", what, ours, theirs, np.zeros(len(ALL), np.int64))
+        yield judged_less(f"{text}, mean of all step sizes", what, ours, theirs, np.zeros(len(own[0]), np.int64))
         for step in LARGER:
             ours, theirs = (frames[_called(learner, step), reward] for reward in (zones, none))
             yield judged_less(f"{text}, {step}", what, ours, theirs, ONE_TARGET)
-        published = frames[_called(learner, PUBLISHED), zones]
+        published = frames[_called(learner, AS_IT_IS), zones]
         for step in LARGER[:2]:
-            text = f"{learner}: {none} with {step}, settles sooner than {zones} with {PUBLISHED}"
+            text = f"{learner}: {none} with {step}, settles sooner than {zones} with {AS_IT_IS}"
             yield judged_less(text, what, frames[_called(learner, step), none], published, ONE_TARGET)
 
 
-def _together(learner: str, reward: str, frames: Mapping[tuple[str, str], np.ndarray]) -> np.ndarray:
-    """(R, 8) frames at all step sizes, of as many seeds as are complete at each."""
-    found = [frames[_called(learner, step), reward] for step in ALL]
-    complete = min(map(len, found))
-    return np.concatenate([own[:complete] for own in found], axis=1)
+def _together(out: Path, arms: Sequence[Group], mark: float) -> np.ndarray:
+    """(R, N) frames until settled in N arms, of the R seeds that are complete in each."""
+    found = [settled_by_seed(out, arm, mark) for arm in arms]
+    rows = []
+    for run in arms[0].runs:
+        if all(run.seed in own for own in found):
+            settled = [own[run.seed] for own in found]
+            rows.append([run.learner.frames if frames is None else frames for frames in settled])
+    return np.array(rows, dtype=np.float64).reshape(-1, len(arms))

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
-from clearway.experiments.memory_alone import other_learners
 from clearway.experiments.navigation_tables import navigation_tables
+from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
@@ -39,7 +39,7 @@ def section(setting: Setting) -> Section:
         text=(
             "Agents trained on the paper's targets, one network for all scenes, walk from random starts. Published "
             "learners clip rewards to [-1, 1], as the paper's code base does; unclipped, the target is worth 10. "
-            "Beside them stand agents that solve by memory alone."
+            "Beside them stand agents on learnt maps, and learners that are told more than pictures."
         ),
         tables=tables,
         maps=maps(setting, groups),

@@ -1,13 +1,10 @@
-"""What memory alone solves: agents on maps that random walkers have seen; learners told more than pictures.
-
-They stand in the tables of other experiments, and make one of their own (`memory`).
-"""
+"""Agents that learn nothing but where random walkers were led, on the trials of other experiments' agents."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -22,14 +19,10 @@ from clearway.agents.on_learnt_map import (
 )
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import by_target
-from clearway.experiments.groups import Group, Scores, compared
+from clearway.experiments.groups import Scores
 from clearway.experiments.kept import keep, kept
-from clearway.experiments.plan import TargetSets, Trial
+from clearway.experiments.plan import Trial
 from clearway.experiments.setting import Setting
-from clearway.learn.bc import BC
-from clearway.learn.learner import Learner
-from clearway.learn.q_learning import QLearning
-from clearway.reward import SHORTEST
 from clearway.world.world import World
 
 FILE = "memory.json"
@@ -42,7 +35,6 @@ ABOUT_MAPS = (
     f"takes shortest ways over them and is told its pose; '{NEAREST}' is told its picture, and holds that it stands "
     "where the most similar one was taken. Where no way is known both act at random. Their seeds are the walkers'."
 )
-LEARNERS: tuple[Learner, ...] = (QLearning(), BC())
 
 
 @dataclass(frozen=True)
@@ -86,27 +78,12 @@ def on_maps(setting: Setting, trial: Trial, frames_a_pose: Sequence[int] = FRAME
             for seed in setting.seeds:
                 key = json.dumps([trial.name, kind, frames, seed])
                 if key not in known:
-                    known[key] = _tried(world, trial, kind, frames, seed)
+                    known = {**known, key: _tried(world, trial, kind, frames, seed)}
+                    known |= kept(path, question, "found") or {}  # a report may be written beside a reproduction
                     keep(path, question, {"found": known})
                 found.append(known[key])
             scores = Scores(setting.seeds, np.array([each["scores"] for each in found]))
             yield Mapped(kind, frames, scores, tuple(each["exact"] for each in found))
-
-
-def other_learners(setting: Setting, targets: TargetSets | None = None) -> list[Group]:
-    """Tabular Q-learning, which is told poses, and behaviour cloning, which is told shortest paths: a group each.
-
-    They are trained for their own frames, or the budget's where these are fewer.
-
-    Args:
-        setting: see there.
-        targets: to be trained and tried on; None: the paper's.
-    """
-    most = setting.budget.default_frames
-    learners = {
-        each.algorithm: each if most is None else replace(each, frames=min(each.frames, most)) for each in LEARNERS
-    }
-    return compared(replace(setting, learners=learners), (SHORTEST,), targets=targets)
 
 
 def _tried(world: World, trial: Trial, kind: str, frames: int, seed: int) -> dict:

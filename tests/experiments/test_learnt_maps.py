@@ -5,12 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from clearway.experiments import fig5, fig6, hard_tables, memory_alone, table1
+from clearway.experiments import fig5, fig6, hard_tables, learnt_maps, table1
 from clearway.experiments.groups import all_jobs
-from clearway.experiments.memory_alone import NEAREST, PLANNER, on_maps, other_learners
+from clearway.experiments.learnt_maps import NEAREST, PLANNER, on_maps
+from clearway.experiments.other_learners import other_learners
 from clearway.experiments.section import ReportTable, Section
 from clearway.experiments.setting import Setting
 from helpers.small_setting import do_here, small_setting
+
+MOST = "7,500 frames"
 
 
 @pytest.fixture
@@ -35,6 +38,8 @@ def test_the_paper_s_tables_hold_agents_on_maps_and_other_learners(setting: Sett
     for learner in (PLANNER, NEAREST, "q-learning", "bc"):
         assert found[learner]["seeds"] == 2
         assert found[learner]["the paper's average of these scenes"] is None
+        frames = "2,400 frames" if learner in ("q-learning", "bc") else MOST
+        assert found[learner]["agent"] == frames
     (shortest,) = [row["average"] for row in steps if row["agent"] == "shortest path"]
     assert found[PLANNER]["average"] == pytest.approx(shortest)
     exact = [row["agent"] for row in steps if row["learner"] == "exact"]
@@ -52,12 +57,16 @@ def test_other_learners_are_missing_until_they_are_trained(setting: Setting) -> 
 
 
 def test_a_map_knows_targets_that_nobody_was_given(setting: Setting) -> None:
-    for experiment, count in ((fig5, 5), (fig6, 1)):
+    for experiment, count in ((fig5, 5), (fig6, 2)):
         section = experiment.section(setting)
         own = [row for row in rows(section.tables[0]) if str(row["learner"]).startswith(PLANNER)]
-        assert [row["SPL"] for row in own] == pytest.approx([1.0] * count)
-        (line,) = [line for line in section.figures[0].series if line.label.startswith(PLANNER)]
-        assert line.y == pytest.approx([1.0] * len(line.y))
+        assert len(own) == count
+        assert [row["SPL"] for row in own if row["agent" if experiment is fig5 else "learner"].endswith(MOST)] == (
+            pytest.approx([1.0] * (5 if experiment is fig5 else 1))
+        )
+        lines = {line.label: line.y for line in section.figures[0].series if line.label.startswith(PLANNER)}
+        assert lines[f"{PLANNER}, {MOST}"] == pytest.approx([1.0] * len(lines[f"{PLANNER}, {MOST}"]))
+    assert 0.9 < own[0]["SPL"] < 1  # fewer frames are not enough
 
 
 def test_agents_on_maps_walk_each_trial_once(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,7 +77,7 @@ def test_agents_on_maps_walk_each_trial_once(setting: Setting, monkeypatch: pyte
     def never(*_: object, **__: object) -> None:
         raise AssertionError("walked again")
 
-    monkeypatch.setattr(memory_alone, "run_episodes", never)
+    monkeypatch.setattr(learnt_maps, "run_episodes", never)
     again = [each for trial in trials for each in on_maps(setting, trial)]
     for one, other in zip(first, again, strict=True):
         assert (one.called, one.exact) == (other.called, other.exact)
