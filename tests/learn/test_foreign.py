@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import torch
 
 import clearway
 from clearway.api.training import chosen_learner
@@ -331,6 +332,26 @@ def test_an_agent_of_a_package_that_cannot_be_exported_is_one_line(tmp_path, mon
     with pytest.raises(PluginError, match=rf"^{SOURCE}: {told}.*\. Ask its authors") as caught:
         export_onnx(chosen, tmp_path / "agent.onnx", with_encoder=False)
     assert "\n" not in str(caught.value) and not (tmp_path / "agent.onnx").exists()
+
+
+NORMED = """
+    def in_scene(self, index):
+        if not hasattr(self, "normed"):
+            self.normed = super().in_scene(index)
+            norm, plain = torch.nn.BatchNorm1d(12), self.normed.forward
+            self.normed.add_module("norm", norm)
+            self.normed.forward = lambda history, target: plain(history, norm(target))
+        return self.normed
+"""
+
+
+def test_an_export_leaves_a_package_s_network_as_it_is(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(NORMED))
+    before = {name: tensor.clone() for name, tensor in chosen.policy.state_dict().items()}
+    export_onnx(chosen, tmp_path / "agent.onnx", with_encoder=False)
+    after = chosen.policy.state_dict()
+    assert "norm.running_var" in before and before.keys() == after.keys()
+    assert all(torch.equal(tensor, after[name]) for name, tensor in before.items())
 
 
 def test_what_a_package_s_agent_tells_of_its_network_is_guarded_too(tmp_path, monkeypatch) -> None:

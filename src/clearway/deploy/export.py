@@ -64,7 +64,7 @@ def export_onnx(
         axes = {"picture": {0: batch, 1: height, 2: width}, "start": {0: batch}, **axes}
         outputs, graph = [*outputs, "history_after"], AgentGraph(policy, encoder)
     with faults_of_agent(chosen.trained, "its network"), torch.no_grad():
-        policy(history, history[:, 0])
+        policy.eval()(history, history[:, 0])  # else layers such as BatchNorm1d would learn from it
     _write(path, card, graph, inputs, outputs, axes, faults_of_agent(chosen.trained, "translating its network"))
 
 
