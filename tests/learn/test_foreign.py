@@ -1,16 +1,21 @@
 """Trainers and agents of other packages: every fault in one line, and no folder of a run that could not act."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 
 import clearway
 from clearway.api.training import chosen_learner
 from clearway.cli.goals import check_knows_any_room
+from clearway.deploy import export
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import RunInScene, load_run_in_scene
+from clearway.deploy.onnx_graph import AgentGraph
 from clearway.errors import AgentError, PluginError, RunError
 from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
@@ -23,6 +28,10 @@ from clearway.learn.recurrent import TrainedRecurrent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest, train_part
+from clearway.model.policy import ScenePolicy
+from clearway.perception import Encoder, encoder_from_record
+from clearway.perception.preprocess import Preprocessing
+from clearway.perception.random_resnet import ResNetShape, fit_record
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene, grid_scene
@@ -361,18 +370,48 @@ def test_what_a_package_s_agent_tells_of_its_network_is_guarded_too(tmp_path, mo
         chosen.card(None)
 
 
-def test_a_network_that_cannot_be_translated_is_its_package_s_unless_it_is_ours(tmp_path, monkeypatch) -> None:
-    def refuses(*_: object, **__: object) -> None:
-        raise ValueError("no such operator")
+def translator(refuses: tuple[type, ...]) -> Callable[..., SimpleNamespace]:
+    """A translator to ONNX that knows everything but modules of these kinds."""
 
-    monkeypatch.setattr("torch.onnx.export", refuses)
-    source = OWN_NETWORK.format("pass")
+    def export(module: torch.nn.Module, *_: object, **__: object) -> SimpleNamespace:
+        if isinstance(module, refuses):
+            raise ValueError("no such operator")
+        return SimpleNamespace(model_proto=None)
+
+    return export
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_package_s_network_that_cannot_be_translated_is_its_fault(tmp_path, monkeypatch, inside) -> None:
+    monkeypatch.setattr("torch.onnx.export", translator((ScenePolicy, AgentGraph)))
+    monkeypatch.setattr(export, "exportable_encoder", lambda _: tiny_encoder())
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("pass"))
     with pytest.raises(PluginError, match=rf"^{SOURCE}: translating its network failed \(ValueError: no such op"):
-        export_onnx(in_corridor(tmp_path / "theirs", monkeypatch, source), tmp_path / "a.onnx", with_encoder=False)
-    forget_algorithm(tmp_path / "theirs" / "site", monkeypatch)
-    of_ours = source.partition("    def agent")[0]
-    with pytest.raises(ValueError, match="no such operator"):
-        export_onnx(in_corridor(tmp_path / "ours", monkeypatch, of_ours), tmp_path / "a.onnx", with_encoder=False)
+        export_onnx(chosen, tmp_path / "a.onnx", with_encoder=inside)
+
+
+@pytest.mark.parametrize("refuses", [AgentGraph, torch.nn.Module])
+def test_what_else_cannot_be_translated_is_not(tmp_path, monkeypatch, refuses) -> None:
+    """An operator of our encoder's, or the translator itself."""
+    monkeypatch.setattr("torch.onnx.export", translator((refuses,)))
+    monkeypatch.setattr(export, "exportable_encoder", lambda _: tiny_encoder())
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("pass"))
+    with pytest.raises(ValueError, match=r"^no such operator"):
+        export_onnx(chosen, tmp_path / "a.onnx")
+
+
+def test_nor_is_a_network_of_ours(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("torch.onnx.export", translator((ScenePolicy,)))
+    of_ours = OWN_NETWORK.partition("    def agent")[0].format("pass")
+    with pytest.raises(ValueError, match=r"^no such operator"):
+        export_onnx(in_corridor(tmp_path, monkeypatch, of_ours), tmp_path / "a.onnx", with_encoder=False)
+
+
+def tiny_encoder() -> Encoder:
+    """One of ours to 12 features."""
+    pictures = [np.random.default_rng(0).integers(0, 256, (32, 12, 16, 3), np.uint8)]
+    shape = ResNetShape(8, (12,), (1,), "basic")
+    return encoder_from_record(fit_record(pictures, shape=shape, preprocessing=Preprocessing(16, 20)))
 
 
 def recurrent_run(folder: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> clearway.TrainResult:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import replace
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,11 @@ from clearway.deploy.onnx_file import CARD_KEY, CHECKSUM_KEY, NO_DIGEST, sealed
 from clearway.deploy.onnx_graph import AgentGraph
 from clearway.errors import DeployError, install_hint
 from clearway.files import written_whole
-from clearway.learn.foreign_agent import faults_of_agent
+from clearway.learn.foreign_agent import faults_of_agent, is_ours
+from clearway.learn.load import TrainedNetwork
 from clearway.mapping.settings import MappingSettings
+from clearway.model.policy import ScenePolicy
+from clearway.perception.encoder import NetworkEncoder
 from clearway.perception.eyes import EyesEncoder
 from clearway.version import __version__
 
@@ -43,29 +46,24 @@ def export_onnx(
     Raises:
         DeployError: the packages of the extra `onnx` are not installed.
         EncoderError: the encoder that made the scene's features cannot be had.
-        PluginError: the agent is another package's, and fails, or cannot be translated.
+        PluginError: the agent is another package's, and its network fails, or cannot be translated.
     """
     check_can_export()
     encoder = exportable_encoder(chosen) if with_encoder else None
     if on_begin is not None:
         on_begin()
-    policy = chosen.policy
-    card = chosen.card(encoder)
-    history = torch.zeros(2, card.history_length, card.feature_count)
-    batch = torch.export.Dim("batch", min=1)
-    inputs: dict[str, torch.Tensor] = {"history": history, "target": history[:, 0].clone()}
-    axes: dict[str, dict[int, Any]] = {"history": {0: batch}, "target": {0: batch}}
-    outputs = ["probabilities", "value"]
-    graph: torch.nn.Module = policy
-    if encoder is not None:
-        height, width = torch.export.Dim("height", min=1), torch.export.Dim("width", min=1)
-        picture = torch.zeros(2, *EXAMPLE_SIDES, 3, dtype=torch.uint8)
-        inputs = {"picture": picture, "start": torch.zeros(2, dtype=torch.bool), **inputs}
-        axes = {"picture": {0: batch, 1: height, 2: width}, "start": {0: batch}, **axes}
-        outputs, graph = [*outputs, "history_after"], AgentGraph(policy, encoder)
+    policy, card = chosen.policy, chosen.card(encoder)
+    alone = _of_policy(policy, card)
     with faults_of_agent(chosen.trained, "its network"), torch.no_grad():
-        policy.eval()(history, history[:, 0])  # else layers such as BatchNorm1d would learn from it
-    _write(path, card, graph, inputs, outputs, axes, faults_of_agent(chosen.trained, "translating its network"))
+        policy.eval()(*alone.inputs.values())  # in training, layers such as BatchNorm1d would learn from it
+    graph = alone if encoder is None else _of_pictures(policy, encoder, alone)
+    try:
+        model = _translated(graph)
+    except (Exception, SystemExit):  # whose fault it is, a second translation tells
+        if not is_ours(chosen.trained):
+            _check_translates(chosen.trained, alone)
+        raise
+    _write(path, card, model)
 
 
 def export_generalist(encoder: EyesEncoder, settings: MappingSettings, path: Path) -> None:
@@ -87,7 +85,8 @@ def export_generalist(encoder: EyesEncoder, settings: MappingSettings, path: Pat
         "first": {0: pairs},
         "second": {0: pairs},
     }
-    _write(path, card, EyesGraph(encoder.eyes), inputs, ["features", "stands", "whereabouts"], axes)
+    graph = _Graph(EyesGraph(encoder.eyes), inputs, ("features", "stands", "whereabouts"), axes)
+    _write(path, card, _translated(graph))
 
 
 def check_can_export() -> None:
@@ -99,34 +98,75 @@ def check_can_export() -> None:
         raise DeployError(f"export needs {fault.name}. {install_hint('onnx')}") from fault
 
 
-def _write(
-    path: Path,
-    card: Card,
-    graph: torch.nn.Module,
-    inputs: dict[str, torch.Tensor],
-    outputs: list[str],
-    axes: dict[str, dict[int, Any]],
-    guard: AbstractContextManager[None] | None = None,
-) -> None:
-    """Write a graph with its card, sealed; it is translated behind the guard, where there is one."""
-    with guard or nullcontext():
-        model = _translated(graph.eval(), inputs, outputs, axes)
+@dataclass(frozen=True)
+class _Graph:
+    """What is translated.
+
+    Attributes:
+        module: computes it.
+        inputs: examples, by the names of its arguments.
+        outputs: their names.
+        axes: those of any length, by input.
+    """
+
+    module: torch.nn.Module
+    inputs: dict[str, torch.Tensor]
+    outputs: tuple[str, ...]
+    axes: dict[str, dict[int, Any]]
+
+
+def _of_policy(policy: ScenePolicy, card: Card) -> _Graph:
+    """The policy alone: history (B, K, F) and target (B, F) to probabilities and value."""
+    history = torch.zeros(2, card.history_length, card.feature_count)
+    batch = torch.export.Dim("batch", min=1)
+    inputs = {"history": history, "target": history[:, 0].clone()}
+    return _Graph(policy, inputs, ("probabilities", "value"), {name: {0: batch} for name in inputs})
+
+
+def _of_pictures(policy: ScenePolicy, encoder: NetworkEncoder, alone: _Graph) -> _Graph:
+    """The policy behind the encoder, see `AgentGraph`.
+
+    Args:
+        policy, encoder: of the agent.
+        alone: the policy's own graph.
+    """
+    batch = alone.axes["history"][0]
+    height, width = torch.export.Dim("height", min=1), torch.export.Dim("width", min=1)
+    picture = torch.zeros(2, *EXAMPLE_SIDES, 3, dtype=torch.uint8)
+    inputs = {"picture": picture, "start": torch.zeros(2, dtype=torch.bool), **alone.inputs}
+    axes = {"picture": {0: batch, 1: height, 2: width}, "start": {0: batch}, **alone.axes}
+    return _Graph(AgentGraph(policy, encoder), inputs, (*alone.outputs, "history_after"), axes)
+
+
+def _check_translates(trained: TrainedNetwork, alone: _Graph) -> None:
+    """Find whether another package's policy is why its graph cannot be translated.
+
+    Raises:
+        PluginError: the policy alone cannot be translated.
+        Exception: the translator's own; not even a plain layer can be.
+    """
+    plain = torch.nn.Linear(1, 1)
+    _translated(_Graph(plain, {"input": torch.zeros(2, 1)}, ("output",), {"input": {0: torch.export.Dim("batch")}}))
+    with faults_of_agent(trained, "translating its network"):
+        _translated(alone)
+
+
+def _write(path: Path, card: Card, model: Any) -> None:
+    """Write a model with its card, sealed."""
     _sign(model, {CARD_KEY: card.to_json(), CHECKSUM_KEY: NO_DIGEST.decode()})
     with written_whole(path) as part:
         part.write_bytes(sealed(model.SerializeToString(deterministic=True)))
 
 
-def _translated(
-    graph: torch.nn.Module, inputs: dict[str, torch.Tensor], outputs: list[str], axes: dict[str, dict[int, Any]]
-) -> Any:
+def _translated(graph: _Graph) -> Any:
     """The graph as an ONNX model (a protocol buffer)."""
     with _quiet(), torch.no_grad():
         program = torch.onnx.export(
-            graph,
-            tuple(inputs.values()),
-            input_names=list(inputs),
-            output_names=outputs,
-            dynamic_shapes=axes,
+            graph.module.eval(),
+            tuple(graph.inputs.values()),
+            input_names=list(graph.inputs),
+            output_names=list(graph.outputs),
+            dynamic_shapes=graph.axes,
             opset_version=OPSET,
             dynamo=True,
             verbose=False,

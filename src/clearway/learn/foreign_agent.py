@@ -36,7 +36,7 @@ def made_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) ->
     with faults_of(learner, "agent", (LookupError, RuntimeError, ValueError)):
         agent = learner.agent(record, tensors, frames)
     plugin = find_plugin("algorithms", learner.algorithm)
-    if plugin is None or _is_ours(agent):
+    if plugin is None or is_ours(agent):
         return agent
     with faults_of(learner, "agent"):
         lacks = [name for name in OFFERED if not hasattr(agent, name)]
@@ -46,7 +46,7 @@ def made_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) ->
     return ForeignRecurrent(agent, plugin) if isinstance(agent, TrainedRecurrent) else ForeignTrained(agent, plugin)
 
 
-def _is_ours(agent: TrainedAgent) -> bool:
+def is_ours(agent: TrainedAgent) -> bool:
     """It is of a class of clearway's, which needs no guard."""
     return type(agent).__module__.startswith("clearway.")
 
@@ -58,7 +58,7 @@ def faults_of_agent(agent: TrainedAgent, what: str) -> Iterator[None]:
     Raises:
         PluginError: it failed.
     """
-    with nullcontext() if _is_ours(agent) else faults_of(agent.record.learner, what):
+    with nullcontext() if is_ours(agent) else faults_of(agent.record.learner, what):
         yield
 
 
