@@ -12,6 +12,7 @@ from clearway.errors import RunError
 from clearway.learn.presets import PAPER_A2C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import RunRecord, record_of
+from clearway.learn.train import check_can_begin
 from clearway.reward import BUMP
 from clearway.scenes.digest import scene_digest
 from helpers.made import corridor_scene
@@ -223,6 +224,27 @@ def test_half_written_files_of_a_killed_process_are_swept(tmp_path: Path) -> Non
     (tmp_path / "mine.part").write_text("the user's")
     with folder.held():
         assert {path.name for path in tmp_path.iterdir()} == {".lock", "run.json", "mine.part"}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_to_check_that_a_run_can_begin_or_go_on_leaves_nothing_behind(tmp_path: Path) -> None:
+    request = small_request()
+    folder = RunFolder(tmp_path / "run")
+    check_can_begin(request, folder.path, resume=True, copy_to=None)
+    assert not folder.path.exists()
+    folder.path.mkdir()
+    folder.write_record(record_of(request))
+    (folder.path / ".run.json.x7_a.part").write_text("half")
+    before = contents(folder.path)
+    check_can_begin(request, folder.path, resume=True, copy_to=None)
+    with pytest.raises(RunError, match=r"run: holds a run already\. Give --resume"):
+        check_can_begin(request, folder.path, resume=False, copy_to=None)
+    assert contents(folder.path) == before
+    with folder.held(), pytest.raises(RunError, match="another process trains here"):
+        check_can_begin(request, folder.path, resume=True, copy_to=None)
 
 
 def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:

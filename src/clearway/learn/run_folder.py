@@ -59,11 +59,24 @@ class RunFolder:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Keep other processes from training in this folder.
+        """Keep other processes from training in this folder, and remove what one that was killed left unfinished.
 
         Raises:
             RunError: another process trains here, or the folder cannot be made or written to.
         """
+        with self._locked():
+            self.clear_parts()
+            yield
+
+    def check_not_held(self) -> None:
+        """Raise RunError where another process trains here. Nothing is left behind."""
+        if (self.path / LOCK_FILE).exists():  # else nobody does, and to lock would make it
+            with self._locked():
+                pass
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Have the folder's lock. Raises as `held`."""
         from filelock import FileLock, Timeout
 
         lock = FileLock(self.path / LOCK_FILE, timeout=0)
@@ -75,7 +88,6 @@ class RunFolder:
         except OSError as error:
             raise RunError(f"{self.path}: not a folder to write to ({error}). Choose another with --out") from error
         try:
-            self.clear_parts()
             yield
         finally:
             lock.release()
@@ -116,14 +128,12 @@ class RunFolder:
             None for a run that begins; else `RunRecord.other_bits` of the one to go on with.
 
         Raises:
-            RunError: the folder holds a run already (and resume is off), or another experiment, or a run that is not
-                finished and was to have other frames.
+            RunError: as of `check_begin`.
         """
-        if not (self.exists and resume):
-            self.check_free()
+        before = self.check_begin(record, resume)
+        if before is None:
             self.write_record(record)
             return None
-        before = self.gone_on_with(record)
         if not before.same_experiment(record):
             before = self._lengthened(before, record.learner.frames)
         if not any(self.checkpoints.glob("frames-*")):
@@ -132,25 +142,34 @@ class RunFolder:
             return None
         return before.other_bits(record)
 
-    def gone_on_with(self, record: RunRecord) -> RunRecord:
-        """The record of the run here, with which a training of `record` can go on.
+    def check_begin(self, record: RunRecord, resume: bool) -> RunRecord | None:
+        """Refuse what `begin` would. Nothing is written.
+
+        Returns:
+            The record of the run here to go on with; None where one begins.
 
         Raises:
-            RunError: it is another experiment; or it was to have other frames, and is not finished or has trained so
-                many already.
+            RunError: the folder holds a run already (and resume is off), or another experiment, or a run that was to
+                have other frames, and is not finished or has trained so many already.
         """
-        before, frames = self.read_record(), record.learner.frames
-        if not before.with_frames(frames).same_experiment(record):
+        if not (self.exists and resume):
+            self.check_free()
+            return None
+        before = self.read_record()
+        if not before.with_frames(record.learner.frames).same_experiment(record):
             problem = f"{self.path}: holds another experiment (see its {RUN_FILE})"
             raise RunError(f"{problem}. Give the same settings, or another --out")
-        if before.same_experiment(record):
-            return before
-        begun, trained = before.learner.frames, self._trained_frames()
+        if not before.same_experiment(record):
+            self._check_lengthens(before.learner.frames, record.learner.frames)
+        return before
+
+    def _check_lengthens(self, begun: int, frames: int) -> None:
+        """Raise RunError where a run begun for so many frames cannot go on to `frames`."""
+        trained = self._trained_frames()
         if trained < begun or frames <= trained:
             problem = f"{self.path}: was started for {begun} frames, and its schedules end there"
             remedy = f"Give --frames {begun}" if trained < begun else f"Give --frames {begun}, more than {trained}"
             raise RunError(f"{problem}. {remedy}, or another --out")
-        return before
 
     def check_place(self) -> None:
         """Raise RunError where there can be no folder: a file is there, or on the way, or nothing can be written."""

@@ -259,11 +259,8 @@ def check_can_begin(request: RunRequest, out: Path, *, resume: bool, copy_to: st
     """
     folder, record = RunFolder(out), record_of(request)
     folder.check_place()
-    if resume and folder.exists:
-        with folder.held():
-            folder.gone_on_with(record)
-    else:
-        folder.check_free()
+    folder.check_not_held()
+    folder.check_begin(record, resume)
     copy = _checked_copy(copy_to, folder, resume)
     if copy is not None and not folder.exists:
         copy.check_is_of(record)
