@@ -220,10 +220,21 @@ def test_another_experiment_is_told_of_before_pictures_are_taken(corridor, tmp_p
     elsewhere = {**asked, "out": tmp_path / "elsewhere", "copy_to": "s3://rooms/runs/one"}
     with pytest.raises(ClearwayError, match=r"s3://rooms/runs/one: holds another experiment .* another --copy-to"):
         clearway.train(corridor, **{**elsewhere, "seed": 1})
+    with pytest.raises(ClearwayError, match=r"s3://rooms/runs/one: was started for 800 .* 800, or another --copy-to"):
+        clearway.train(corridor, **{**elsewhere, "frames": 1600})
+    (tmp_path / "holds").mkdir()
+    (tmp_path / "holds" / "notes.txt").touch()
+    with pytest.raises(ClearwayError, match="holds: exists and is no empty folder"):
+        clearway.train(corridor, **{**elsewhere, "out": tmp_path / "holds"})
     with pytest.raises(ClearwayError, match=r"s3://rooms/runs/one: holds a run already\. Give --resume"):
         clearway.train(corridor, **{**elsewhere, "resume": False})
     with pytest.raises(Taken):
         clearway.train(corridor, **elsewhere)
+    s3("runs/one/checkpoints/frames-000000000800/checkpoint.json", b"{}")
+    with pytest.raises(ClearwayError, match=r"s3://rooms/runs/one: was started for 800 .*, more than 800, or another"):
+        clearway.train(corridor, **{**elsewhere, "frames": 400})
+    with pytest.raises(Taken):
+        clearway.train(corridor, **{**elsewhere, "frames": 1600})
     assert not (tmp_path / "elsewhere").exists()
 
 

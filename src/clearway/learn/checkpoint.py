@@ -163,6 +163,11 @@ def is_name(name: str) -> bool:
     return _NAME.fullmatch(name) is not None
 
 
+def frames_in(name: str) -> int:
+    """How far training had come by the name of a checkpoint's folder, see `is_name`."""
+    return int(name.removeprefix("frames-"))
+
+
 def _checked_manifest(path: Path) -> dict:
     try:
         manifest = read_json(path / MANIFEST_FILE)

@@ -16,9 +16,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from clearway.errors import ClearwayError, RunError
-from clearway.files import folder_written_whole
-from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints, is_name
-from clearway.learn.run_folder import CHECKPOINTS, COPIED, METRICS_FILE, RUN_FILE, SETTINGS_FILE, RunFolder
+from clearway.files import check_free, folder_written_whole
+from clearway.learn.checkpoint import KEPT, MANIFEST_FILE, NETWORK_FILE, TRAINING_FILE, checkpoints, frames_in, is_name
+from clearway.learn.run_folder import (
+    CHECKPOINTS,
+    COPIED,
+    METRICS_FILE,
+    RUN_FILE,
+    SETTINGS_FILE,
+    RunFolder,
+    check_goes_on,
+)
 from clearway.learn.run_record import RunRecord
 from clearway.remote.address import address_of
 from clearway.remote.store import WRITABLE, Store
@@ -55,25 +63,33 @@ class RunCopy:
         if not self.holds_a_run:
             return
         ours = folder.read_record()
-        if not self._is_of(ours):
+        if not self._record().with_frames(ours.learner.frames).same_experiment(ours):
             raise RunError(f"{self.address}: holds another experiment than {folder.path}. Give another --copy-to")
         here = [path.name for path in checkpoints(folder.checkpoints)]
         if (there := self._checkpoints()) and (not here or there[-1] > here[-1]):
             problem = f"{self.address}: has come further than {folder.path}, to {there[-1]}"
             raise RunError(f"{problem}. Go on from it with an empty --out, or give another --copy-to")
 
-    def check_is_of(self, record: RunRecord) -> None:
-        """Raise ClearwayError where the store holds a run of another experiment, or cannot be read."""
-        if self.holds_a_run and not self._is_of(record):
-            problem = f"{self.address}: holds another experiment (see its {RUN_FILE})"
-            raise RunError(f"{problem}. Give the same settings, or another --copy-to")
+    def check_goes_on(self, folder: Path, record: RunRecord) -> None:
+        """Refuse what would be refused once the run was fetched: to fetch it, or to go on with it. Nothing is fetched.
 
-    def _is_of(self, record: RunRecord) -> bool:
-        """Whether the run there is of the same experiment, of however many frames."""
+        Raises:
+            ClearwayError: the folder holds something, the run cannot become one of `record`, or the store cannot be
+                read.
+        """
+        if self.holds_a_run:
+            check_free(folder)
+            check_goes_on(self._record(), record, self._trained_frames, self.address, "--copy-to")
+
+    def _record(self) -> RunRecord:
+        """Of the run there."""
         with tempfile.TemporaryDirectory() as part:
             self._fetch(Path(part), RUN_FILE)
-            theirs = RunFolder(Path(part)).read_record()
-        return theirs.with_frames(record.learner.frames).same_experiment(record)
+            return RunFolder(Path(part)).read_record()
+
+    def _trained_frames(self) -> int:
+        """Frames of the newest whole checkpoint; 0 without one."""
+        return max(map(frames_in, self._checkpoints()), default=0)
 
     def check_writable(self) -> None:
         """Write a file and remove it, before hours of training. Raises ClearwayError where that cannot be done."""

@@ -14,7 +14,7 @@ import json
 import os
 import shutil
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -156,20 +156,8 @@ class RunFolder:
             self.check_free()
             return None
         before = self.read_record()
-        if not before.with_frames(record.learner.frames).same_experiment(record):
-            problem = f"{self.path}: holds another experiment (see its {RUN_FILE})"
-            raise RunError(f"{problem}. Give the same settings, or another --out")
-        if not before.same_experiment(record):
-            self._check_lengthens(before.learner.frames, record.learner.frames)
+        check_goes_on(before, record, self._trained_frames, str(self.path), "--out")
         return before
-
-    def _check_lengthens(self, begun: int, frames: int) -> None:
-        """Raise RunError where a run begun for so many frames cannot go on to `frames`."""
-        trained = self._trained_frames()
-        if trained < begun or frames <= trained:
-            problem = f"{self.path}: was started for {begun} frames, and its schedules end there"
-            remedy = f"Give --frames {begun}" if trained < begun else f"Give --frames {begun}, more than {trained}"
-            raise RunError(f"{problem}. {remedy}, or another --out")
 
     def check_place(self) -> None:
         """Raise RunError where there can be no folder: a file is there, or on the way, or nothing can be written."""
@@ -278,3 +266,27 @@ class RunFolder:
         if not self.metrics_path.exists() or read_text(self.metrics_path, MAX_METRICS_BYTES) != text:
             with written_whole(self.metrics_path) as part:
                 part.write_text(text)
+
+
+def check_goes_on(before: RunRecord, record: RunRecord, trained: Callable[[], int], place: str, option: str) -> None:
+    """Refuse to go on with a run where a training of `record` is none that it can become.
+
+    Args:
+        before: of the run.
+        record: of what is asked for.
+        trained: frames of the run's newest checkpoint; 0 without one.
+        place: where the run is.
+        option: names another place.
+
+    Raises:
+        RunError: it is another experiment; or it was to have other frames, and is not finished or has trained so many
+            already.
+    """
+    begun, frames = before.learner.frames, record.learner.frames
+    if not before.with_frames(frames).same_experiment(record):
+        problem = f"{place}: holds another experiment (see its {RUN_FILE})"
+        raise RunError(f"{problem}. Give the same settings, or another {option}")
+    if not before.same_experiment(record) and ((done := trained()) < begun or frames <= done):
+        problem = f"{place}: was started for {begun} frames, and its schedules end there"
+        remedy = f"Give --frames {begun}" if done < begun else f"Give --frames {begun}, more than {done}"
+        raise RunError(f"{problem}. {remedy}, or another {option}")

@@ -255,15 +255,15 @@ def check_can_begin(request: RunRequest, out: Path, *, resume: bool, copy_to: st
 
     Raises:
         RunError: as of `train`, by its run folder.
-        ClearwayError: as of `opened_copy`, or the copy to go on with is of another experiment.
+        ClearwayError: as of `opened_copy`, or as of `train` by what its copy holds.
     """
     folder, record = RunFolder(out), record_of(request)
     folder.check_place()
     folder.check_not_held()
     folder.check_begin(record, resume)
     copy = _checked_copy(copy_to, folder, resume)
-    if copy is not None and not folder.exists:
-        copy.check_is_of(record)
+    if copy is not None and resume and not folder.exists:
+        copy.check_goes_on(out, record)
 
 
 def opened_copy(address: str | None, folder: RunFolder, resume: bool) -> RunCopy | None:
