@@ -1,10 +1,11 @@
-"""Words as users write them: whole numbers, texts in quotes, and names that are nearly right."""
+"""Words as users write them: whole numbers, the text null in quotes, and names that are nearly right."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from decimal import Decimal, InvalidOperation
 
+NULL = "null"  # None
 MOST_DIGITS = 18  # of a whole number; 1e999999999 would fill the memory
 
 
@@ -28,9 +29,15 @@ def whole_number(text: str) -> int:
     return int(number)
 
 
+def quoted(text: str) -> str:
+    """The text so that `unquoted` gives it again, and that it is not `null`."""
+    return f'"{text}"' if text == NULL or text != unquoted(text) else text
+
+
 def unquoted(text: str) -> str:
-    """What stands in double quotes; another text as it is."""
-    return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
+    """The text `null` in double quotes, one pair or more, without one pair; another text as it is."""
+    quotes = '"' * (len(text) - len(text.lstrip('"')))
+    return text[1:-1] if quotes and text == f"{quotes}{NULL}{quotes}" else text
 
 
 def nearest(word: object, names: Iterable[str]) -> str | None:

@@ -44,6 +44,7 @@ class Odd(QLearning):
 """
 OPTIONAL = f"""{CLASS}
     note: str | None = None
+    plain: str = "x"
     limit: int | float | None = None
     temperature: float = 1
     style: Literal["plain", "loud"] | None = "plain"

@@ -1,6 +1,7 @@
 """Classes of other packages' algorithms: their settings, what is refused, and whose faults are told."""
 
 from inspect import signature
+from pathlib import Path
 
 import pytest
 import yaml
@@ -11,6 +12,7 @@ from clearway.cli.config import with_config
 from clearway.cli.main import Command
 from clearway.errors import ArgumentError, PluginError, RunError
 from clearway.learn.algorithms import algorithm
+from clearway.learn.learner import Learner
 from clearway.learn.plugged import ARGUMENTS, faults_of
 from clearway.learn.ppo import PPO
 from clearway.learn.settings import with_settings
@@ -78,8 +80,17 @@ def optional(tmp_path, monkeypatch):
         ('note="null"', "null"),
         ('note=""null""', '"null"'),
         ('note="', '"'),
-        ('note=""', ""),
-        ('style="loud"', "loud"),
+        ('note=""', '""'),
+        ('note="x"', '"x"'),
+        ('note=""null"', '""null"'),
+        ("note=" + '"' * 10_000, '"' * 10_000),
+        ('plain="a"', '"a"'),
+        ('plain="a" or "b"', '"a" or "b"'),
+        ('plain="a","b"', '"a","b"'),
+        ('plain=""', '""'),
+        ("plain=", ""),
+        ("plain=null", "null"),
+        ('limit="null"', None),
         ("limit=3", 3),
         ("limit=2.5", 2.5),
         ("limit=null", None),
@@ -95,11 +106,26 @@ def test_words_are_read_by_the_types_of_settings(optional, word, expected) -> No
     assert found == expected and type(found) is type(expected)
 
 
-@pytest.mark.parametrize("note", [None, "null", '"null"', '"', "", "x", "3"])
-def test_a_run_s_settings_give_its_texts_again(optional, tmp_path, note) -> None:
-    (tmp_path / "set.yaml").write_text(yaml.safe_dump({"set": {"note": note}}))
-    *_, word = with_config(["train", "x.h5", "--config", str(tmp_path / "set.yaml")], Command)
-    assert with_settings(optional, [word]).note == note
+def of_file(optional: Learner, folder: Path, name: str, value: object) -> object:
+    """The value of a setting that a file gives so."""
+    (folder / "set.yaml").write_text(yaml.safe_dump({"set": {name: value}}))
+    *_, word = with_config(["train", "x.h5", "--config", str(folder / "set.yaml")], Command)
+    return getattr(with_settings(optional, [word]), name)
+
+
+TEXTS = ["null", '"null"', '""null""', '""null"', '"', '""', '"x"', '"a" or "b"', '"a","b"', "", "x", "3", " null "]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_run_s_settings_give_its_texts_again(optional, tmp_path, text) -> None:
+    assert of_file(optional, tmp_path, "note", text) == text
+    assert of_file(optional, tmp_path, "plain", text) == text
+
+
+def test_null_in_a_file_is_none_and_in_quotes_where_there_is_no_text(optional, tmp_path) -> None:
+    assert of_file(optional, tmp_path, "note", None) is None
+    assert of_file(optional, tmp_path, "limit", None) is None
+    assert of_file(optional, tmp_path, "limit", "null") is None
 
 
 @pytest.mark.parametrize(
@@ -107,7 +133,10 @@ def test_a_run_s_settings_give_its_texts_again(optional, tmp_path, note) -> None
     [
         ('limit="3"', "expected a whole number or a number or null"),
         ("limit=many", "expected a whole number or a number or null"),
+        ('limit=""null""', "expected a whole number or a number or null"),
         ("style=soft", "expected plain or loud or null"),
+        ('style="loud"', "expected plain or loud or null"),
+        ('temperature="null"', "expected a number"),
         ("temperature=null", "expected a number"),
         ("known=3", "expected name=value with a name among odd's settings"),
     ],

@@ -11,7 +11,7 @@ from clearway.errors import RunError
 from clearway.learn.kinds import UNIONS, field_types
 from clearway.learn.learner import Learner
 from clearway.learn.plugged import faults_of
-from clearway.spelling import did_you_mean, unquoted, whole_number
+from clearway.spelling import NULL, did_you_mean, unquoted, whole_number
 
 Kind = TypeVar("Kind", bound=Learner)
 
@@ -39,18 +39,22 @@ def with_settings(learner: Kind, words: Sequence[str]) -> Kind:
 
 
 def _parsed(text: str, wanted: Any) -> object:
-    """The value that a text means for a setting of that type; where that is a text, it may stand in double quotes.
+    """The value that a text means for a setting of that type; `null` in quotes is that text, else None, see `unquoted`.
 
     Raises:
         ValueError: it means none.
     """
-    if get_origin(wanted) in UNIONS:
-        for one in sorted(get_args(wanted), key=_is_text):  # last, as any text is one
-            with suppress(ValueError):
-                return _parsed(text, one)
-        raise ValueError(text)
-    if _is_text(wanted):
+    kinds = sorted(get_args(wanted) if get_origin(wanted) in UNIONS else [wanted], key=_is_text)
+    if not _is_text(kinds[-1]):
         text = unquoted(text)
+    for one in kinds:  # texts last, as anything is one
+        with suppress(ValueError):
+            return _value(unquoted(text) if _is_text(one) else text, one)
+    raise ValueError(text)
+
+
+def _value(text: str, wanted: Any) -> object:
+    """The value that a text means for a type that is no union. Raises ValueError where it means none."""
     if wanted is str:
         return text
     if wanted in (int, float):
@@ -68,7 +72,7 @@ def _is_text(wanted: Any) -> bool:
 
 def _words(wanted: Any) -> dict[str, object]:
     """The words of a type that has no others, with what they mean."""
-    known: dict[Any, dict[str, object]] = {bool: {"true": True, "false": False}, type(None): {"null": None}}
+    known: dict[Any, dict[str, object]] = {bool: {"true": True, "false": False}, type(None): {NULL: None}}
     return known.get(wanted) or {choice: choice for choice in get_args(wanted)}
 
 
