@@ -55,6 +55,8 @@ def test_every_command_tells_of_it_and_takes_all_its_options(clearway, words):
         ("frames:\nset: {lr_end: 1.0e-05}", "x.h5", "x.h5 --set lr_end=1e-05"),
         ("set: {note: null, limit: 3}", "x.h5", "x.h5 --set note=null limit=3"),
         ("set: {note: 'null', style: x}", "x.h5", 'x.h5 --set note="null" style=x'),
+        ("set: {note: [a, 'null'], plain: '\"a\"'}", "x.h5", 'x.h5 --set note=a,null plain="a"'),
+        ("targets: {a: 'null'}", "x.h5", "x.h5 --targets a=null"),
     ],
 )
 def test_the_file_s_options_become_words_and_the_command_line_s_go_before(config, text, words, expected):

@@ -126,6 +126,7 @@ def test_null_in_a_file_is_none_and_in_quotes_where_there_is_no_text(optional, t
     assert of_file(optional, tmp_path, "note", None) is None
     assert of_file(optional, tmp_path, "limit", None) is None
     assert of_file(optional, tmp_path, "limit", "null") is None
+    assert of_file(optional, tmp_path, "plain", ["a", "null", '"b"']) == 'a,null,"b"'
 
 
 @pytest.mark.parametrize(

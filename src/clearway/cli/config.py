@@ -16,7 +16,7 @@ import tyro
 from clearway.cli.known import command_of, options
 from clearway.cli.reading import without_none
 from clearway.errors import ClearwayError
-from clearway.spelling import did_you_mean, unquoted, whole_number
+from clearway.spelling import NULL, did_you_mean, quoted, whole_number
 
 CONFIG = "config"
 ADDED_TO = ("set",)  # options of single settings: the file's come first, and those of the command line change them
@@ -165,19 +165,19 @@ def _checked(path: Path, content: Mapping[str, Any], known: Mapping[str, _Option
         if value is None:
             continue  # as where it is left out
         try:
-            told[name] = list(_words(known[name].kind, value))
+            told[name] = list(_words(known[name], value))
         except ValueError as fault:
             end = "" if str(fault).endswith("?") else "."
             raise ClearwayError(f"{path}: {key}: {fault}{end} Correct the file") from fault
     return told
 
 
-def _words(kind: Any, value: object) -> Iterator[str]:
+def _words(option: _Option, value: object) -> Iterator[str]:
     """A value as words. Raises ValueError, which says what was expected."""
-    if get_origin(kind) is tuple:
-        inner, *others = get_args(kind)
+    if get_origin(option.kind) is tuple:
+        inner, *others = get_args(option.kind)
         if isinstance(value, dict):
-            yield from _named_values(inner, value)
+            yield from _named_values(inner, value, are_settings=option.name in ADDED_TO)
             return
         values = value if isinstance(value, list) else [value]
         if others[-1] is not ... and len(values) != 1 + len(others):
@@ -188,24 +188,28 @@ def _words(kind: Any, value: object) -> Iterator[str]:
                 raise ValueError(f"found {_shown(word)}, which reads as an option")
             yield word
     else:
-        yield _word(kind, value)
+        yield _word(option.kind, value)
 
 
-def _named_values(inner: Any, value: Mapping[Any, object]) -> Iterator[str]:
-    """A mapping, {envs: 200}, as words such as envs=200, for options that take such words."""
+def _named_values(inner: Any, value: Mapping[Any, object], *, are_settings: bool) -> Iterator[str]:
+    """A mapping, {envs: 200}, as words such as envs=200, for options that take such words.
+
+    The text null of a setting stands in quotes, as `learn.settings` reads it, which knows whether it can be a text.
+    """
     if inner is not str:
         raise ValueError("found a mapping, expected a list")
     for name, each in value.items():
-        parts = each if isinstance(each, list) else [each]
-        yield f"{_word(str, name)}={','.join(_bare(part) for part in parts)}"
+        if are_settings and isinstance(each, str):
+            yield f"{_word(str, name)}={quoted(each)}"
+        else:
+            parts = each if isinstance(each, list) else [each]
+            yield f"{_word(str, name)}={','.join(map(_bare, parts))}"
 
 
 def _bare(value: object) -> str:
-    """A value as `learn.settings` reads it: the text null, and one in quotes, stand in quotes."""
+    """A value as the part of a word."""
     if value is None:
-        return "null"
-    if isinstance(value, str) and (value == "null" or value != unquoted(value)):
-        return f'"{value}"'
+        return NULL
     return str(value).lower() if isinstance(value, bool) else _word(str, value)
 
 
