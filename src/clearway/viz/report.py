@@ -29,6 +29,8 @@ HTML, MARKDOWN, JSON, TABLES, FIGURES = "report.html", "report.md", "report.json
 LONG_TEXT = 60  # letters; a column with more is broken into lines
 MAX_PICTURE_BYTES = 64 * 1024**2  # of a figure
 SHOWN_ROWS = 60  # of a table in the page and in Markdown; its CSV has all
+SUMMARY, VERDICTS = "summary", "claims"
+WHOLE = (SUMMARY, VERDICTS)  # tables that have no CSV
 
 
 def write_report(
@@ -111,13 +113,17 @@ def _summary(sections: Sequence[Section]) -> list[ReportTable]:
         claims = [(claim, section.title) for section in sections for claim in section.claims]
         rows = tuple((claim.text, claim.verdict, where) for claim, where in claims if claim.further == further)
         if rows:
-            tables.append(ReportTable("summary", title, ("claim", "verdict", "evidence in"), rows))
+            tables.append(ReportTable(SUMMARY, title, ("claim", "verdict", "evidence in"), rows))
     return tables
 
 
 def _verdict_rows(claims: Sequence[Claim]) -> ReportTable:
     rows = tuple((claim.text, claim.verdict, claim.evidence) for claim in claims)
-    return ReportTable("claims", "Verdicts", ("claim", "verdict", "evidence"), rows)
+    return ReportTable(VERDICTS, "Verdicts", ("claim", "verdict", "evidence"), rows)
+
+
+def _shown_rows(table: ReportTable) -> Sequence[Sequence[Value]]:
+    return table.rows if table.name in WHOLE else table.rows[:SHOWN_ROWS]
 
 
 def _missing_text(section: Section) -> str:
@@ -127,7 +133,7 @@ def _missing_text(section: Section) -> str:
 
 def _table_notes(table: ReportTable) -> tuple[str, ...]:
     """Where the rows are that are not shown, then the table's own notes."""
-    more = len(table.rows) - SHOWN_ROWS
+    more = len(table.rows) - len(_shown_rows(table))
     rest = f"{more:,} more rows in {TABLES}/{table.name}.csv" if more > 0 else ""
     return tuple(note for note in (rest, *table.notes) if note)
 
@@ -156,7 +162,7 @@ def _markdown(title: str, sections: Sequence[Section], facts: Mapping[str, str],
 
 
 def _markdown_table(table: ReportTable) -> list[str]:
-    rows = [[value_text(value) for value in row] for row in table.rows[:SHOWN_ROWS]]
+    rows = [[value_text(value) for value in row] for row in _shown_rows(table)]
     notes = [f"{note}  " for note in _table_notes(table)]
     return [*table_lines(table.headings, rows), "", *notes, ""]
 
@@ -219,7 +225,7 @@ def _shown(table: ReportTable) -> ShownTable:
         title=table.title,
         headings=table.headings,
         looks=tuple(_look([row[column] for row in table.rows]) for column in range(len(table.headings))),
-        rows=tuple(tuple(map(value_text, row)) for row in table.rows[:SHOWN_ROWS]),
+        rows=tuple(tuple(map(value_text, row)) for row in _shown_rows(table)),
         notes=_table_notes(table),
         folded=table.folded,
     )
