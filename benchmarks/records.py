@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import re
 import sys
 import tarfile
 import tempfile
@@ -58,8 +59,9 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
 
 
 def _by_its_name(path: Path, folder: Path) -> bytes:
-    """What a file holds, without where on this machine the folder lies."""
-    return path.read_bytes().replace(f"{folder.resolve().parent}/".encode(), b"")
+    """What a file holds, without where on this machine the folder and the command lie."""
+    content = path.read_bytes().replace(f"{folder.resolve().parent}/".encode(), b"")
+    return re.sub(rb'"/[^"]*/clearway"', b'"clearway"', content)
 
 
 def _without_pictures(path: Path) -> bytes:

@@ -13,12 +13,15 @@ import pytest
 
 from clearway.agents.on_learnt_map import ENOUGH_A_POSE
 from clearway.experiments import fig5, fig6, zone_time
-from clearway.experiments.convergence import mark_steps, settled_row
+from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settled_row
+from clearway.experiments.correction import holm
 from clearway.experiments.generalisation import Tried, tried
+from clearway.experiments.groups import PAIR, compared
 from clearway.experiments.learnt_maps import NEAREST, PLANNER, on_maps
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less
 from clearway.learn.run_folder import RunFolder
 from clearway.reward import COLLISION_AWARE
 from helpers.published import DOCS, assert_written, numbers
@@ -310,6 +313,67 @@ def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
             assert rows[agent][3:5] == (count, mean * 1e6)
             assert f"`{agent}` after {mean:.2f} M" in page
     assert compared == 8
+
+
+@pytest.mark.slow
+def test_the_bedroom_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))["unpack"](
+        DOCS / "records" / "bedroom-fresh.tar.xz", tmp_path / "bedroom"
+    )
+    found = gather(tmp_path / "bedroom")
+    (section,) = found.sections
+    assert not section.missing
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### The bedroom, of fresh seeds")[2]
+    page = page.partition("\n### ")[0]
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    ends, late = section.tables[:2]
+    for _, agent, frames, _, failed, steps, between, collisions, between_collisions in ends.rows:
+        ((*_, shown, bumps, lost),) = [line for line in lines if line[:2] == [agent, f"{frames / 1e6:g} M"]]
+        for cell, value, interval in ((shown, steps, between), (bumps, collisions, between_collisions)):
+            mean, *low_high = numbers(cell.replace(",", ""))
+            assert_written(mean, value, cell)
+            for written, end in zip(low_high, numbers(interval.replace(",", "")), strict=True):
+                assert_written(written, float(end), cell)
+        assert lost == failed
+    for _, agent, _, settled, frames, interval in late.rows:
+        ((*_, told, _, _, _),) = [line for line in lines if line[:2] == [agent, "5 M"]]
+        assert told == f"{frames:,.0f} ({interval.replace(' to ', '-')}), {settled} of 5"
+        results = rf"`{agent}`[^`]* after {frames / 1e6:.2f} M(?: frames)? \({'-'.join(numbers(millions(interval)))}\)"
+        assert re.search(results, RESULTS), results
+    # the question's own two claims
+    setting, groups = found.setting, {group.agent: group for group in compared(found.setting, PAIR)}
+    world, mark = setting.world(), mark_steps(setting, setting.targets)
+    settled = {agent: frames_until_settled(setting.out, group, mark)[0] for agent, group in groups.items()}
+    scores = {agent: group.scores(setting.out, world.target_count) for agent, group in groups.items()}
+    bumps = [scores[agent].of("collisions") for agent in ("collision-aware", "shortest")]
+    claims = [
+        judged_less("sooner", "frames", settled["shortest"], settled["collision-aware"], ONE_TARGET),
+        judged_less("fewer", "collisions", *bumps, world.target_scene.numpy()),
+    ]
+    told = [line for line in lines if line[-1] in ("holds", "undecided")]
+    for claim, p_of_both, (_, difference, p, corrected, verdict) in zip(
+        claims, holm([claim.p for claim in claims]), told, strict=True
+    ):
+        apart = claim.numbers["difference"]
+        ends = re.findall(r"-?\d[\d,.]*", difference)
+        for written, value in zip(ends, (apart.value, *apart.interval), strict=True):
+            assert float(written.replace(",", "")) == pytest.approx(value, rel=0.01)
+        assert_written(p, claim.p, verdict)
+        assert_written(corrected, p_of_both, verdict)
+        assert verdict == claim.verdict
+    assert settled["shortest"].max() < settled["collision-aware"].min()
+    aware, shortest = (np.sort(own.mean(1)) for own in bumps)
+    assert aware[3] < shortest[0]
+    assert "have 0.046 to 0.092 collisions, fewer than all of `shortest` (0.228 to 0.296)" in page
+    for written, value in (("0.046", aware[0]), ("0.092", aware[3]), ("6.8", aware[4]), ("0.228", shortest[0])):
+        assert_written(written, value, "collisions")
+    seconds = [run.metrics()[-1]["seconds"] for run in map(RunFolder, (tmp_path / "bedroom" / "runs").iterdir())]
+    assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
+
+
+def millions(interval: str) -> str:
+    """Frames of an interval, in millions."""
+    return " ".join(f"{int(end) / 1e6:.2f}" for end in numbers(interval.replace(",", "")))
 
 
 @pytest.mark.slow
