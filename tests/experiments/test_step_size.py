@@ -61,10 +61,10 @@ def settled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Setting:
     """Five seeds; zones halve the frames at every step size, four times the rate halves them too."""
     setting = small_setting(tmp_path, seeds=5)
 
-    def frames(out: Path, group: Group, mark: float) -> dict[int, float | None]:
+    def frames(out: Path, group: Group, mark: float) -> dict[int, tuple[float, bool]]:
         learner = group.runs[0].learner
         base = 1000.0 / (2 if learner.lr_start > 2.5e-3 else 1) / (2 if group.agent == "collision-aware" else 1)
-        return {run.seed: base + run.seed for run in group.runs}
+        return {run.seed: (base + run.seed, True) for run in group.runs}
 
     for module in (step_size, convergence):
         monkeypatch.setattr(module, "settled_by_seed", frames)
@@ -72,12 +72,12 @@ def settled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Setting:
 
 
 def test_seeds_are_not_mixed_where_a_run_is_missing(settled: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
-    def lacking(out: Path, group: Group, mark: float) -> dict[int, float | None]:
-        found: dict[int, float | None] = {run.seed: 1000.0 * run.seed for run in group.runs}
+    def lacking(out: Path, group: Group, mark: float) -> dict[int, tuple[float, bool]]:
+        found = {run.seed: (1000.0 * run.seed, True) for run in group.runs}
         if group.runs[0].learner.lr_start > 2.5e-3:
             del found[0]
         else:
-            found[3] = None
+            found[3] = (float(PAPER_A2C.frames), False)
         return found
 
     monkeypatch.setattr(step_size, "settled_by_seed", lacking)

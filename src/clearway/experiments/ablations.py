@@ -15,7 +15,8 @@ from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less, with_failures
+from clearway.experiments.verdicts import further, judged_less, with_failures
+from clearway.experiments.zones_or_step import with_zones
 from clearway.learn.learner import Learner
 from clearway.learn.settings import with_settings
 from clearway.reward import COLLISION_AWARE, Reward, Zones
@@ -29,11 +30,11 @@ SHARED = "one head"
 
 def rewards() -> tuple[Reward, ...]:
     """With the penalty of the collision zone alone, and with that of the precollision zone alone."""
-    time, _, arrival = COLLISION_AWARE.terms
     penalties = COLLISION_AWARE.parameters
-    beta = Reward(BETA, (time, Zones(beta=penalties["beta"]), arrival))
-    gamma = Reward(GAMMA, (time, Zones(gamma=penalties["gamma"]), arrival))
-    return (beta, gamma)
+    return (
+        with_zones(BETA, Zones(beta=penalties["beta"])),
+        with_zones(GAMMA, Zones(gamma=penalties["gamma"])),
+    )
 
 
 def arms(name: str, learner: Learner, scenes: int) -> dict[str, Learner]:
@@ -68,7 +69,7 @@ def section(setting: Setting) -> Section:
             f"collision zone's, {GAMMA} the precollision zone's."
         ),
         tables=(*tables, settling_table(NAME, setting, groups)),
-        claims=tuple(replace(claim, further=True) for claim in _claims(setting, groups)),
+        claims=further(_claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
 

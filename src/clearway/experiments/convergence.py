@@ -88,21 +88,20 @@ def settling_table(name: str, setting: Setting, groups: Sequence[Group]) -> Repo
 
 def frames_until_settled(out: Path, group: Group, mark: float) -> tuple[np.ndarray, int]:
     """Frames until each complete run of a group whose metrics are there had settled (R, 1), and how many have."""
-    found = settled_by_seed(out, group, mark)
-    most = {run.seed: float(run.learner.frames) for run in group.runs}
-    frames = [most[seed] if own is None else own for seed, own in found.items()]
-    return np.array(frames, dtype=np.float64).reshape(-1, 1), sum(own is not None for own in found.values())
+    found = settled_by_seed(out, group, mark).values()
+    frames = np.array([frames for frames, _ in found], dtype=np.float64)
+    return frames.reshape(-1, 1), sum(settled for _, settled in found)
 
 
-def settled_by_seed(out: Path, group: Group, mark: float) -> dict[int, float | None]:
-    """Frames until each such run had settled, by its seed; None where it has not."""
-    found: dict[int, float | None] = {}
+def settled_by_seed(out: Path, group: Group, mark: float) -> dict[int, tuple[float, bool]]:
+    """Frames until each such run had settled, by its seed, and whether it has: one that has not counts with all."""
+    found: dict[int, tuple[float, bool]] = {}
     for run in group.runs:
         table, metrics = episodes_of(out, run, group.trial), run_folder(out, run).metrics()
         if table is None or not metrics:
             continue
         row = settled_row(metrics, mark) if table.reached.all() else None
-        found[run.seed] = None if row is None else row["frames"]
+        found[run.seed] = (float(run.learner.frames), False) if row is None else (row["frames"], True)
     return found
 
 

@@ -28,7 +28,7 @@ from clearway.scenes.targets import TARGETS_PER_SCENE, target_order
 
 TRAINED = (5, 15, 25, 35, 45)
 HELD_OUT = TARGETS_PER_SCENE
-FEW_A_POSE = 8  # frames of random walkers: maps need no more, see the experiment memory
+FEW_A_POSE = 8  # frames of random walkers: such maps lead everywhere, not always by a shortest way
 ORDER_SEED = 6  # of the order in which states become held-out, then training targets
 
 

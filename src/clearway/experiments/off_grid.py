@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from clearway.experiments.live_trial import FIGURES, read_live
 from clearway.experiments.plan import Job, LiveTrial, LiveWalker, PlannedRun
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less, judged_more, with_failures
+from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
 from clearway.live.conditions import Condition, sweep_settings
 from clearway.live.live_room import check_is_room
 from clearway.live.walks import encoder_of
@@ -87,7 +87,7 @@ def section(setting: Setting) -> Section:
             else f"Nothing was walked. {_hindrance(setting)}"
         ),
         tables=(_table(setting, found),) if groups else (),
-        claims=tuple(replace(claim, further=True) for claim in _claims(setting, found)) if groups else (),
+        claims=further(_claims(setting, found)) if groups else (),
         missing=tuple(
             dict.fromkeys(job.run.name for group in groups for job in group.jobs if not is_done(setting.out, job))
         ),

@@ -16,8 +16,8 @@ from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less, with_failures
-from clearway.experiments.zones_or_step import with_shuffled
+from clearway.experiments.verdicts import further, judged_less, with_failures
+from clearway.experiments.zones_or_step import with_shuffled, with_zones
 from clearway.reward import COLLISION_AWARE, SHORTEST, Moves, Reward, Zones
 
 NAME = "shuffles"
@@ -41,10 +41,9 @@ class OwnShuffle(Zones):
 
 def reward(shuffle: int) -> Reward:
     """The collision-aware reward with the zones of poses shuffled."""
-    time, _, arrival = COLLISION_AWARE.terms
     penalties = COLLISION_AWARE.parameters
     zones = OwnShuffle(beta=penalties["beta"], gamma=penalties["gamma"], shuffle=shuffle)
-    return Reward(f"shuffle-{shuffle}", (time, zones, arrival))
+    return with_zones(f"shuffle-{shuffle}", zones)
 
 
 def jobs(setting: Setting) -> list[Job]:
@@ -66,7 +65,7 @@ def section(setting: Setting) -> Section:
             *navigation_tables(NAME, "Steps and collisions", setting, setting.targets, groups, TABLE_1),
             settling_table(NAME, setting, groups),
         ),
-        claims=tuple(replace(claim, further=True) for claim in _claims(setting, groups)),
+        claims=further(_claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
 

@@ -24,7 +24,7 @@ from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less
+from clearway.experiments.verdicts import further, judged_less
 from clearway.learn.learner import Learner
 from clearway.learn.settings import with_settings
 from clearway.reward import COLLISION_AWARE, SHORTEST
@@ -82,7 +82,7 @@ def section(setting: Setting) -> Section:
             "soon as zones do without, such a step does as much."
         ),
         tables=(*tables, settling_table(NAME, setting, groups)) if groups else (),
-        claims=tuple(replace(claim, further=True) for claim in _claims(setting, groups)),
+        claims=further(_claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
 
@@ -115,16 +115,17 @@ def _groups(setting: Setting) -> list[Group]:
 def _claims(setting: Setting, groups: list[Group]) -> Iterator[Claim]:
     """Zones settle sooner at every step size; without them a larger step settles sooner than zones as published."""
     mark, out = mark_steps(setting, setting.targets), setting.out
-    frames = {(group.learner, group.agent): frames_until_settled(out, group, mark)[0] for group in groups}
+    arms = {(group.learner, group.agent): group for group in groups}
+    frames = {kind: frames_until_settled(out, arm, mark)[0] for kind, arm in arms.items()}
     zones, none = COLLISION_AWARE.name, SHORTEST.name
+    steps = _steps(setting)
     for learner in _learners(setting):
-        own = [
-            [g for g in groups if g.learner.startswith(f"{learner}, ") and g.agent == name] for name in (zones, none)
-        ]
-        ours, theirs = (_together(out, arms, mark) for arms in own)
+        ours, theirs = (
+            _together(out, [arms[_called(learner, step), reward] for step in steps], mark) for reward in (zones, none)
+        )
         text = f"{learner}: {zones} settles sooner than {none}"
         what = "frames until settled"
-        yield judged_less(f"{text}, mean of all step sizes", what, ours, theirs, np.zeros(len(own[0]), np.int64))
+        yield judged_less(f"{text}, mean of all step sizes", what, ours, theirs, np.zeros(len(steps), np.int64))
         for step in LARGER:
             ours, theirs = (frames[_called(learner, step), reward] for reward in (zones, none))
             yield judged_less(f"{text}, {step}", what, ours, theirs, ONE_TARGET)
@@ -137,9 +138,5 @@ def _claims(setting: Setting, groups: list[Group]) -> Iterator[Claim]:
 def _together(out: Path, arms: Sequence[Group], mark: float) -> np.ndarray:
     """(R, N) frames until settled in N arms, of the R seeds that are complete in each."""
     found = [settled_by_seed(out, arm, mark) for arm in arms]
-    rows = []
-    for run in arms[0].runs:
-        if all(run.seed in own for own in found):
-            settled = [own[run.seed] for own in found]
-            rows.append([run.learner.frames if frames is None else frames for frames in settled])
-    return np.array(rows, dtype=np.float64).reshape(-1, len(arms))
+    complete = [seed for seed in found[0] if all(seed in own for own in found)]
+    return np.array([[own[seed][0] for own in found] for seed in complete], np.float64).reshape(-1, len(arms))

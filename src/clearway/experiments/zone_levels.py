@@ -14,7 +14,7 @@ from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
+from clearway.experiments.verdicts import further, judged_less, judged_no_more, with_failures
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
 NAME = "zone-levels"
@@ -41,7 +41,7 @@ def section(setting: Setting) -> Section:
             *navigation_tables(NAME, "Steps and collisions", setting, setting.targets, groups, TABLE_1),
             settling_table(NAME, setting, groups),
         ),
-        claims=tuple(replace(claim, further=True) for claim in _claims(setting, groups)),
+        claims=further(_claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.groups import RANDOM_WALK, Group, Scores, all_jobs, all_missing, compared, random_walk
@@ -12,7 +11,7 @@ from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.table1 import REWARDS
-from clearway.experiments.verdicts import judged_less, with_failures
+from clearway.experiments.verdicts import further, judged_less, with_failures
 from clearway.reward import BUMP, COLLISION_AWARE, SHORTEST
 
 NAME = "zone-time"
@@ -45,7 +44,7 @@ def section(setting: Setting) -> Section:
             "back is blocked, and in the precollision zone beside it. The target's pose is in no zone."
         ),
         tables=(_table(setting, groups),),
-        claims=tuple(replace(claim, further=True) for claim in _claims(setting, groups)),
+        claims=further(_claims(setting, groups)),
         missing=all_missing(groups, setting.out),
     )
 

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less
+from clearway.experiments.verdicts import further, judged_less
 from clearway.reward import COLLISION_AWARE, SHORTEST, Moves, Reward, Zones
 
 NAME = "zones-or-step"
@@ -43,11 +43,16 @@ def with_shuffled(moves: Moves, seed: int) -> Moves:
 
 def rewards(setting: Setting) -> tuple[Reward, ...]:
     """The two of the paper and their two controls."""
-    time, _, arrival = COLLISION_AWARE.terms
     penalties = COLLISION_AWARE.parameters
     zones = ShuffledZones(beta=penalties["beta"], gamma=penalties["gamma"])
     dearer = Reward(DEARER, SHORTEST.with_changes(alpha=mean_cost(setting)).terms)
-    return (SHORTEST, COLLISION_AWARE, dearer, Reward(SHUFFLED, (time, zones, arrival)))
+    return (SHORTEST, COLLISION_AWARE, dearer, with_zones(SHUFFLED, zones))
+
+
+def with_zones(name: str, zones: Zones) -> Reward:
+    """The collision-aware reward with other zones, or other prices of them."""
+    time, _, arrival = COLLISION_AWARE.terms
+    return Reward(name, (time, zones, arrival))
 
 
 def mean_cost(setting: Setting) -> float:
@@ -82,7 +87,7 @@ def section(setting: Setting) -> Section:
             "sooner than both; if dear steps are, the controls settle as soon."
         ),
         tables=(*tables, settled),
-        claims=tuple(replace(claim, further=True) for claim in (*sooner, *_claims(setting, groups))),
+        claims=further((*sooner, *_claims(setting, groups))),
         missing=all_missing(groups, setting.out),
     )
 
