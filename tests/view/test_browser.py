@@ -215,6 +215,7 @@ def test_play_at_the_end_starts_over(opened: Callable[..., Page]) -> None:
     page.get_by_role("button", name="Play").click()
     expect(page.locator("#position")).to_have_text(re.compile(rf"^[01] / {end}$"))
     expect(page.locator("body.playing")).to_be_visible()
+    assert int(end) > 1  # it was elsewhere before
 
 
 LONG = {"aware": "bathroom-collision-aware-ppo-s0", "plain": "bathroom-shortest-ppo-s0"}
@@ -251,6 +252,7 @@ def test_long_names_take_one_line_and_the_views_stand_level(opened: Callable[...
 def test_the_page_says_who_walks_where(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=8", viewport=PHONE)
     expect(page.locator("h1")).to_contain_text("corridor: aware and plain, to where the target's picture was taken")
+    assert page.locator("h1").count() == 1
 
 
 def test_an_agent_has_one_colour_whatever_the_order(opened: Callable[..., Page]) -> None:
@@ -337,6 +339,7 @@ def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Cal
     expect(page).to_have_url(re.compile("scene=corridor&.*walk="))
     expect(page.locator("#scene")).to_have_value("corridor")
     expect(page.locator("#legend")).to_contain_text("value")
+    assert page.locator("#scene").input_value() == "corridor"
 
 
 def test_a_browser_that_keeps_no_more_addresses_shows_the_steps_nevertheless(opened: Callable[..., Page]) -> None:
@@ -361,12 +364,14 @@ def test_choosing_a_target_by_keyboard_keeps_the_focus(opened: Callable[..., Pag
     page.keyboard.press("Enter")
     expect(page.locator("#goal-where")).to_contain_text("pose 8,")
     expect(page.get_by_role("button", name="Target pose 8,")).to_be_focused()
+    assert "target=8" in page.url
 
 
 def test_one_page_too_many_is_told_to_close_another(browser: Browser, full: str) -> None:
     with closing(browser.new_page()) as page:
         page.goto(full)
         expect(page.locator("#status")).to_have_text("16 pages are open. Close one, then load this one again")
+        assert page.locator("#position").inner_text() == "0 / 0"  # nothing is walked for it
 
 
 def test_a_film_that_fails_is_said_and_can_be_tried_again(opened: Callable[..., Page]) -> None:
@@ -376,6 +381,7 @@ def test_a_film_that_fails_is_said_and_can_be_tried_again(opened: Callable[..., 
     button.click()
     expect(page.locator("#status")).to_have_text("The viewer failed. Its terminal says why")
     expect(button).to_be_enabled()
+    assert button.inner_text() == "Save MP4"  # not "Stop", or whatever it is while it films
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
