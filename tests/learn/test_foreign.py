@@ -58,40 +58,30 @@ class Learnt:
 """
 
 
-OWN_NETWORK = """
+def own_agent(agent: str, learner: str, part: str) -> str:
+    """A learner whose agents are of a class of its own, derived from ours; what else is in that class is left open."""
+    return f"""
 from clearway.learn.load import TrainedNetwork
 from clearway.learn.ppo import PPO
-
-
-class Mine(TrainedNetwork):
-    {}
-
-
-@dataclass(frozen=True)
-class Odd(PPO):
-    algorithm: ClassVar[str] = "odd"
-
-    def agent(self, record, tensors, frames):
-        found = super().agent(record, tensors, frames)
-        return Mine(record, found.network, found.feature_map, frames)
-"""
-
-OWN_RECURRENT = """
 from clearway.learn.recurrent import Recurrent, TrainedRecurrent
 
 
-class Mine(TrainedRecurrent):
-    {}
+class Mine({agent}):
+    {{}}
 
 
 @dataclass(frozen=True)
-class Odd(Recurrent):
+class Odd({learner}):
     algorithm: ClassVar[str] = "odd"
 
     def agent(self, record, tensors, frames):
         found = super().agent(record, tensors, frames)
-        return Mine(record, found.network, found.pairs, frames)
+        return Mine(record, found.network, found.{part}, frames)
 """
+
+
+OWN_NETWORK = own_agent("TrainedNetwork", "PPO", "feature_map")
+OWN_RECURRENT = own_agent("TrainedRecurrent", "Recurrent", "pairs")
 
 
 def trained(out: Path | None = None, **settings):
