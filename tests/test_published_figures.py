@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clearway.agents.on_learnt_map import ENOUGH_A_POSE
-from clearway.experiments import fig5, fig6, zone_time
+from clearway.agents.on_learnt_map import MOST_A_POSE
+from clearway.evaluation.across_seeds import mean_estimate
+from clearway.experiments import fig5, fig6, table1, zone_time
 from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settled_row
 from clearway.experiments.correction import holm
 from clearway.experiments.generalisation import Tried, tried
 from clearway.experiments.groups import PAIR, compared
-from clearway.experiments.learnt_maps import NEAREST, PLANNER, on_maps
+from clearway.experiments.learnt_maps import PLANNER, on_maps
+from clearway.experiments.plan import NEAREST
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
@@ -82,7 +84,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
     page = (DOCS / "evidence.md").read_text(encoding="utf-8")
     part = page.partition("### Figure 6: more training targets")[2].partition("\n### ")[0].splitlines()
     shown, found = 0, {}
-    for mapped in on_maps(setting, group.trial, (fig6.FEW_A_POSE, ENOUGH_A_POSE)):
+    for mapped in on_maps(setting, group.trial, (fig6.FEW_A_POSE, MOST_A_POSE)):
         cells = Tried(mapped.scores, scenes).cells()
         found[mapped.called] = cells
         for line in (line for line in part if line.startswith(f"| {', '.join(mapped.called)} |")):
@@ -99,7 +101,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
         assert all(abs(one - other) < 0.005 for one, other in pairs)
     success, *_, spl, ends = found[PLANNER, "1,500 frames"]
     low, high = map(float, numbers(ends))
-    row = f"| a map, 1,500 frames | {success:.0%} held-out | {spl:.0%} ({100 * low:.0f}-{high:.0%}) | | |"
+    row = f"| pose-told planner, 1,500 frames | {success:.0%} held-out | {spl:.0%} ({100 * low:.0f}-{high:.0%}) | | |"
     assert row.replace("%", " %").replace(" %)", ")") in RESULTS
     for steps in fig5.DISTANCES:
         (trial,) = {group.trial for group in fig5._groups(setting, steps)}
@@ -558,6 +560,30 @@ def test_a_record_does_not_say_where_its_folder_lay(record: Path) -> None:
             assert file is not None and not re.search(rb'(?:"| )/\w', file.read()), member.name
 
 
+def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> None:
+    """What the pages say of each kind of agent: steps, collisions, and when its trainings settled."""
+    world, mark = setting.world(), mark_steps(setting, setting.targets)
+    scenes = world.target_scene.numpy()
+    for group in table1.all_groups(setting):
+        name = group.agent + group.learner.removeprefix("paper")
+        ((_, *cells, lost),) = [row for row in rows if row[0] == name]
+        scores, frames = group.scores(setting.out, world.target_count), frames_until_settled(setting.out, group, mark)
+        estimates = [mean_estimate(scores.of(figure), scenes) for figure in ("steps", "collisions")]
+        for cell, found in zip(cells, (*estimates, mean_estimate(frames[0], ONE_TARGET)), strict=True):
+            mean, *ends = numbers(cell.replace(",", ""))
+            assert_written(mean, found.value, cell)
+            for written, end in zip(ends, numbers(found.ends.replace(",", "")), strict=True):
+                assert_written(written, float(end), cell)
+        assert lost == "0 of 25" and frames[1] == 5
+    settled = {
+        (group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0]
+        for group in table1.all_groups(setting)
+    }
+    early, late = settled["paper, unclipped", "shortest"], settled["paper", "collision-aware"]
+    assert early.max() < late.min()
+    assert f"settles sooner ({early.mean():,.0f} frames)" in RESULTS
+
+
 @pytest.mark.slow
 def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
@@ -575,6 +601,7 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
         assert f": {own} against {other}, difference {apart}; " in claim.evidence, text
         assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence, text
     assert sum(row[1:2] in (["holds"], ["undecided"], ["does not hold"]) for row in rows) == len(claims) == 15
+    check_the_agents_of_fresh_seeds(gather(tmp_path / "paper").setting, rows)
     ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "paper").glob("runs/*/metrics.jsonl")]
     seconds = [json.loads(end)["seconds"] for end in ends]
     assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page

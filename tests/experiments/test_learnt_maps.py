@@ -7,8 +7,9 @@ import pytest
 
 from clearway.experiments import fig5, fig6, hard_tables, learnt_maps, table1
 from clearway.experiments.groups import all_jobs
-from clearway.experiments.learnt_maps import NEAREST, PLANNER, on_maps
+from clearway.experiments.learnt_maps import PLANNER, on_maps
 from clearway.experiments.other_learners import other_learners
+from clearway.experiments.plan import NEAREST
 from clearway.experiments.section import ReportTable, Section
 from clearway.experiments.setting import Setting
 from helpers.small_setting import do_here, small_setting

@@ -1,8 +1,15 @@
 """Zones of shuffled poses, each seed's in its own way."""
 
+from dataclasses import replace
 from pathlib import Path
 
-from clearway.experiments import shuffles
+import numpy as np
+import pytest
+
+from clearway.evaluation.metrics import METRIC_NAMES
+from clearway.experiments import convergence, shuffles
+from clearway.experiments.correction import corrected
+from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import run_folder
 from clearway.experiments.reproduce import planned
 from clearway.learn.load import load_network
@@ -40,3 +47,25 @@ def test_three_claims_are_made_of_each_learner(tmp_path: Path) -> None:
     assert all(claim.further for claim in section.claims) and len(section.claims) == 6
     agents = {row[2] for row in section.tables[0].rows}
     assert {"own shuffle", "soft fixed point (shuffle-0, unclipped)"} < agents
+
+
+def test_each_claim_compares_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    setting = small_setting(tmp_path, seeds=5)
+    setting = replace(setting, learners={"paper": setting.learners["paper"]})
+    places = {"collision-aware": 1.0, "own shuffle": 2.0, "shortest": 3.0}
+
+    def settled(out: Path, group: Group, mark: float) -> dict[int, tuple[float, bool]]:
+        return {run.seed: (1000 * places[group.agent] + run.seed, True) for run in group.runs}
+
+    def scores(group: Group, out: Path, count: int) -> Scores:
+        values = np.ones((5, count, len(METRIC_NAMES)))
+        values[:, :, METRIC_NAMES.index("collisions")] = places[group.agent] + 0.01 * np.arange(5)[:, None]
+        values[:, :, METRIC_NAMES.index("steps")] = 9.0 - places[group.agent]
+        return Scores(tuple(range(5)), values)
+
+    monkeypatch.setattr(convergence, "settled_by_seed", settled)
+    monkeypatch.setattr(Group, "scores", scores)
+    claims = corrected(shuffles.section(setting)).claims
+    means = [[claim.numbers[name].value for name in ("first", "second")] for claim in claims]
+    assert means == [pytest.approx(pair) for pair in ([1002, 2002], [2002, 3002], [1.02, 2.02])]
+    assert [claim.verdict for claim in claims] == ["holds"] * 3

@@ -28,7 +28,7 @@ def test_a_step_size_changes_rates_and_whitening_alone() -> None:
     assert replace(raw, **changed, whiten_features=True, centre_features=True) == DEFAULT
 
 
-def test_the_rates_are_those_that_the_audit_asks_for() -> None:
+def test_rates_are_half_once_twice_and_four_times_the_published_one() -> None:
     rates = sorted({step.of(PAPER_A2C).lr_start for step in ALL})
     assert rates == pytest.approx([3.5e-4, 7e-4, 1.4e-3, 2.8e-3])
     assert len(ALL) == len(set(ALL)) == 8

@@ -1,8 +1,10 @@
 """How long agents stay in the zones."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from clearway.evaluation.metrics import METRIC_NAMES
@@ -11,6 +13,7 @@ from clearway.experiments.correction import corrected
 from clearway.experiments.groups import Group, Scores
 from clearway.experiments.job import episodes_of
 from clearway.experiments.reproduce import planned
+from clearway.experiments.section import Claim
 from clearway.experiments.setting import Setting
 from clearway.zones import Zone
 from helpers.small_setting import do_here, small_setting
@@ -43,23 +46,38 @@ def test_shares_are_those_of_the_episodes(setting: Setting) -> None:
     assert {"shortest", "bump", "collision-aware", "7,500 frames", "random walk"} == set(rows)
 
 
-def test_four_claims_are_judged_of_each_learner(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
-    do_here(setting.out, planned(setting, [zone_time.NAME]), threads=1)
-    whole = Group.scores
+@pytest.fixture
+def stays(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], list[Claim]]:
+    """The claims where shares fall from reward to reward, visits rise, and the last arrives as often as it is told."""
 
-    def scores(group: Group, out: Path, count: int) -> Scores:
-        found = whole(group, out, count)
-        values = found.values.copy()
-        stays = {"shortest": 0.3, "bump": 0.2, "collision-aware": 0.1}[group.agent]
-        for number, seed in enumerate(found.seeds):
-            values[number, :, METRIC_NAMES.index("share_collision")] = stays + 0.001 * seed
-            values[number, :, METRIC_NAMES.index("success")] = 1.0
-        return Scores(found.seeds, values)
+    def claims(arrives: float) -> list[Claim]:
+        def scores(group: Group, out: Path, count: int) -> Scores:
+            place = ("shortest", "bump", "collision-aware").index(group.agent)
+            values = np.ones((5, count, len(METRIC_NAMES)))
+            apart = 0.001 * np.arange(5)[:, None]
+            values[:, :, METRIC_NAMES.index("share_collision")] = 0.3 - 0.1 * place + apart
+            values[:, :, METRIC_NAMES.index("collision_visits")] = 1.0 + place + apart
+            values[:, :, METRIC_NAMES.index("success")] = arrives if group.agent == "collision-aware" else 1.0
+            return Scores(tuple(range(5)), values)
 
-    monkeypatch.setattr(Group, "scores", scores)
-    claims = {claim.text: claim for claim in corrected(zone_time.section(setting)).claims}
+        monkeypatch.setattr(Group, "scores", scores)
+        return list(corrected(zone_time.section(setting)).claims)
+
+    return claims
+
+
+def test_each_claim_compares_what_it_says(stays: Callable[[float], list[Claim]]) -> None:
+    claims = {claim.text: claim for claim in stays(1.0)}
     assert len(claims) == 4 and all(claim.further for claim in claims.values())
-    for other in ("shortest", "bump"):
+    for other, share, visits in (("shortest", 0.302, 1.002), ("bump", 0.202, 2.002)):
         begin = "paper: collision-aware,"
-        assert claims[f"{begin} a smaller share of steps in the collision zone than {other}"].verdict == "holds"
-        assert f"{begin} fewer steps in the collision zone than {other}" in claims
+        less = claims[f"{begin} a smaller share of steps in the collision zone than {other}"]
+        fewer = claims[f"{begin} fewer steps in the collision zone than {other}"]
+        assert (less.verdict, fewer.verdict) == ("holds", "does not hold")
+        means = [[claim.numbers[name].value for name in ("first", "second")] for claim in (less, fewer)]
+        assert means == [pytest.approx([0.102, share]), pytest.approx([3.002, visits])]
+
+
+def test_who_arrives_less_often_is_not_told_better(stays: Callable[[float], list[Claim]]) -> None:
+    verdicts = [claim.verdict for claim in stays(0.9)]
+    assert verdicts == ["undecided", "undecided", "does not hold", "does not hold"]

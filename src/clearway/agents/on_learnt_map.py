@@ -21,8 +21,8 @@ from clearway.world.world import World
 UNSEEN = -1
 WALKERS = 100
 """Random walkers that see a map together."""
-ENOUGH_A_POSE = 64
-"""Frames of all walkers for every pose of a scene: then they have seen every step of the bathroom."""
+MOST_A_POSE = 64
+"""Frames of all walkers for every pose: enough for every step of the bathroom; larger maps may lack a pose."""
 
 
 class MapPlanner:
@@ -71,7 +71,7 @@ class NearestPicture(MapPlanner):
     def __init__(self, next_state: np.ndarray, features: np.ndarray, encoder: Encoder | None = None) -> None:
         super().__init__(next_state)
         self._seen = poses_seen(next_state)
-        self._pictures = features[self._seen]
+        self._pictures = features[self._seen].astype(np.float64)
         self._encoded = Encoded(encoder)
         self.sees = (self._encoded.sees,)
 
@@ -85,7 +85,7 @@ class NearestPicture(MapPlanner):
 
     def _nearest(self, features: np.ndarray) -> np.ndarray:
         """(B, F) -> (B,) int64 states."""
-        return self._seen[nearest(features, self._pictures)]
+        return nearest(features, self._seen, self._pictures)
 
 
 def nearest_pictures(next_state: np.ndarray, features: np.ndarray) -> np.ndarray:
@@ -98,13 +98,13 @@ def nearest_pictures(next_state: np.ndarray, features: np.ndarray) -> np.ndarray
         features: (S, F) float32, of every pose's picture.
     """
     seen = poses_seen(next_state)
-    return seen[nearest(features, features[seen])]
+    return nearest(features, seen, features[seen].astype(np.float64))
 
 
-def nearest(features: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """(B, F), (P, F) -> (B,) int64, index of the nearest by Euclidean distance, in float64."""
-    own, others = features.astype(np.float64), among.astype(np.float64)
-    return ((others**2).sum(axis=1) - 2 * own @ others.T).argmin(axis=1)
+def nearest(features: np.ndarray, poses: np.ndarray, pictures: np.ndarray) -> np.ndarray:
+    """(B, F), (P,), (P, F) float64 -> (B,): of some poses that whose picture is nearest, by Euclidean distance."""
+    distance = (pictures**2).sum(axis=1) - 2 * features.astype(np.float64) @ pictures.T  # but for a term of B
+    return poses[distance.argmin(axis=1)]
 
 
 def frames_of(world: World, frames_a_pose: int) -> int:

@@ -17,10 +17,10 @@ from clearway.experiments.generalisation import (
     told_of_own_goals,
     tried,
 )
-from clearway.experiments.groups import PAIR, RANDOM_WALK, Group, Scores, all_jobs, all_missing, random_walk
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
-from clearway.experiments.plan import Job, TargetSets
+from clearway.experiments.plan import RANDOM_WALK, Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_more

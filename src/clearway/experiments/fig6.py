@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clearway.agents.on_learnt_map import ENOUGH_A_POSE
+from clearway.agents.on_learnt_map import MOST_A_POSE
 from clearway.errors import SceneError
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.generalisation import (
@@ -17,9 +17,9 @@ from clearway.experiments.generalisation import (
     told_of_own_goals,
     tried,
 )
-from clearway.experiments.groups import RANDOM_WALK, Group, all_jobs, random_walk
+from clearway.experiments.groups import Group, all_jobs, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
-from clearway.experiments.plan import Job, TargetSets
+from clearway.experiments.plan import RANDOM_WALK, Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_more
@@ -49,7 +49,7 @@ def section(setting: Setting) -> Section:
     target_scene = world.target_scene.numpy()
     trial = _groups(setting, TRAINED[0])[0].trial
     walked = Tried(random_walk(world, trial), target_scene)
-    mapped = on_maps(setting, trial, (FEW_A_POSE, ENOUGH_A_POSE))
+    mapped = on_maps(setting, trial, (FEW_A_POSE, MOST_A_POSE))
     on_map = {own.called: Tried(own.scores, target_scene) for own in mapped}
     rows: list[tuple[Value, ...]] = []
     by_target: list[tuple[Value, ...]] = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -20,8 +19,6 @@ from clearway.world.world import World
 
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
-
-RANDOM_WALK: Final = "random walk"
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from clearway.agents.on_learnt_map import (
-    ENOUGH_A_POSE,
+    MOST_A_POSE,
     WALKERS,
     MapPlanner,
     frames_of,
@@ -21,14 +20,13 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.metrics import by_target
 from clearway.experiments.groups import Scores
 from clearway.experiments.kept import keep, kept
-from clearway.experiments.plan import Trial
+from clearway.experiments.plan import NEAREST, Trial
 from clearway.experiments.setting import Setting
 from clearway.world.world import World
 
 FILE = "memory.json"
 PLANNER = "planner on a learnt map"
-NEAREST: Final = "nearest picture"
-FRAMES_A_POSE = (1, 2, 4, 8, 16, 32, ENOUGH_A_POSE)
+FRAMES_A_POSE = (1, 2, 4, 8, 16, 32, MOST_A_POSE)
 """Frames that the walkers take, for every pose of the scenes."""
 ABOUT_MAPS = (
     f"Maps hold where the actions of {WALKERS} random walkers led, in so many frames of all together. The {PLANNER} "

@@ -15,8 +15,8 @@ import numpy as np
 from clearway.agents.agent import Agent
 from clearway.agents.by_features import FeatureAgent
 from clearway.agents.by_pose import RandomWalk
-from clearway.agents.on_learnt_map import ENOUGH_A_POSE, NearestPicture, frames_of, seen_by_walkers
-from clearway.experiments.plan import LiveTrial, PlannedRun
+from clearway.agents.on_learnt_map import MOST_A_POSE, NearestPicture, frames_of, seen_by_walkers
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, LiveTrial, PlannedRun
 from clearway.files import read_kept, written_whole
 from clearway.learn.load import load_network
 from clearway.live.conditions import Condition
@@ -67,9 +67,9 @@ def walk_live(path: Path, folder: Path, scenes: Sequence[Scene], run: PlannedRun
 
 def _walkers(places: Sequence[LiveScene], folder: Path, trial: LiveTrial) -> list[Agent]:
     """Who walks in each scene."""
-    if trial.walker == "random walk":
+    if trial.walker == RANDOM_WALK:
         return [RandomWalk() for _ in places]
-    if trial.walker == "nearest picture":
+    if trial.walker == NEAREST:
         return [_by_nearest_picture(place, trial.seed) for place in places]
     network = load_network(folder)
     return [FeatureAgent(network.in_scene(index), place.encoder) for index, place in enumerate(places)]
@@ -79,7 +79,7 @@ def _by_nearest_picture(place: LiveScene, seed: int) -> NearestPicture:
     """Who knows the scene's own pictures, and which follows which, as random walkers on the grid have seen them."""
     world = place.world
     assert world.features is not None, "scenes of an experiment have features"
-    seen = seen_by_walkers(world, frames_of(world, ENOUGH_A_POSE), seed)
+    seen = seen_by_walkers(world, frames_of(world, MOST_A_POSE), seed)
     return NearestPicture(seen, world.features.float().cpu().numpy(), place.encoder)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from clearway.evaluation.across_seeds import failed_targets, mean_estimate
-from clearway.experiments.groups import RANDOM_WALK, Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.learnt_maps import (
     ABOUT_MAPS,
     FRAMES_A_POSE,
@@ -17,7 +17,7 @@ from clearway.experiments.learnt_maps import (
     on_maps,
 )
 from clearway.experiments.other_learners import other_learners
-from clearway.experiments.plan import Job
+from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less, with_failures

@@ -15,11 +15,11 @@ from clearway.evaluation.across_seeds import failed_targets, mean_estimate
 from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
-from clearway.experiments.groups import RANDOM_WALK, Group, Scores, random_walk
+from clearway.experiments.groups import Group, Scores, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.other_learners import ABOUT_OTHERS
 from clearway.experiments.paper_numbers import THE_PAPER, PaperRow, reminder
-from clearway.experiments.plan import TargetSets
+from clearway.experiments.plan import RANDOM_WALK, TargetSets
 from clearway.experiments.section import ReportTable, Value
 from clearway.experiments.setting import Setting
 from clearway.reward import Reward

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clearway.agents.on_learnt_map import ENOUGH_A_POSE
+from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.errors import ClearwayError
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.groups import RANDOM_WALK
 from clearway.experiments.job import is_done, trial_path
-from clearway.experiments.learnt_maps import NEAREST
 from clearway.experiments.live_trial import FIGURES, read_live
-from clearway.experiments.plan import Job, LiveTrial, LiveWalker, PlannedRun
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, LiveWalker, PlannedRun
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
@@ -37,17 +35,12 @@ LOST = 0.05
 """Share of episodes by which one kind may arrive less often and still be told better; few are walked."""
 PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
 TOUCHING = ("contacts", "least clearance")
-UNTRAINED: dict[tuple[str, str], LiveWalker] = {
-    (NEAREST, f"{ENOUGH_A_POSE} frames a pose"): NEAREST,
-    ("walked", RANDOM_WALK): RANDOM_WALK,
-}
-"""Agents that need no training, by what stands for a learner and its reward in a table."""
 STAYING_NEAR = ("within 10 cm", "within 30 cm", "in the collision zone")
 """Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction."""
 
 
 @dataclass(frozen=True)
-class Walkers:
+class LiveGroup:
     """Agents that differ in their seed alone, and what they are asked.
 
     Attributes:
@@ -105,16 +98,21 @@ def _hindrance(setting: Setting) -> str | None:
     return None
 
 
-def _groups(setting: Setting) -> list[Walkers]:
+def _groups(setting: Setting) -> list[LiveGroup]:
     if _hindrance(setting):
         return []
     trained = [
-        Walkers(name, reward.name, _jobs(setting, setting.runs(learner, reward), "agent"))
+        LiveGroup(name, reward.name, _jobs(setting, setting.runs(learner, reward), "agent"))
         for name, learner in setting.learners.items()
         for reward in REWARDS
     ]
     beside = setting.runs(next(iter(setting.learners.values())), REWARDS[0])  # theirs are the targets, not the agents
-    return [*trained, *(Walkers(*kind, _jobs(setting, beside, walker)) for kind, walker in UNTRAINED.items())]
+    frames = f"{frames_of(setting.world(), MOST_A_POSE):,} frames"
+    return [
+        *trained,
+        LiveGroup(NEAREST, frames, _jobs(setting, beside, NEAREST)),
+        LiveGroup("walked", RANDOM_WALK, _jobs(setting, beside, RANDOM_WALK)),
+    ]
 
 
 def _jobs(setting: Setting, runs: Sequence[PlannedRun], walker: LiveWalker) -> tuple[Job, ...]:
@@ -122,7 +120,7 @@ def _jobs(setting: Setting, runs: Sequence[PlannedRun], walker: LiveWalker) -> t
     return tuple(Job(run, (LiveTrial(asked, episodes, STEP_LIMIT, run.seed, walker),)) for run in runs)
 
 
-def _scores(setting: Setting, group: Walkers) -> np.ndarray:
+def _scores(setting: Setting, group: LiveGroup) -> np.ndarray:
     """(R, K, M, J) of the runs that are complete."""
     found = []
     for job in group.jobs:

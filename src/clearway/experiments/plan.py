@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from clearway.choices import ZoneLevel
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
@@ -21,6 +21,8 @@ TargetSets = tuple[tuple[int, ...], ...]
 """Targets of each scene, in the scenes' order; states in the scene's own numbering."""
 
 LiveWalker: TypeAlias = Literal["agent", "nearest picture", "random walk"]
+NEAREST: Final = "nearest picture"
+RANDOM_WALK: Final = "random walk"
 
 DIGEST_LENGTH = 10
 

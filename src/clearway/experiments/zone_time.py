@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.groups import RANDOM_WALK, Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
-from clearway.experiments.plan import Job
+from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.table1 import REWARDS
@@ -65,7 +65,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     for kind, own in found.items():
         estimates = [mean_estimate(own.of(figure), scenes) if len(own) else None for figure in FIGURES]
         figures = (value for each in estimates for value in ((each.value, each.ends) if each else (None, None)))
-        rows.append((*kind, len(own), *figures))
+        rows.append((*kind, None if kind[1] == RANDOM_WALK else len(own), *figures))
     headings = (heading for words in FIGURES.values() for heading in (words, f"95 % of {words}"))
     return ReportTable(NAME, "Steps in the zones", ("learner", "agent", "seeds", *headings), tuple(rows), (ABOUT_MAPS,))
 
