@@ -1,8 +1,11 @@
 """Every question was written before it was answered, as its page says, and stands there as it was written."""
 
+import json
 import re
 import shutil
 import subprocess
+import tarfile
+from datetime import datetime
 from functools import cache
 from pathlib import Path
 
@@ -21,6 +24,10 @@ ROWS = [
 ]
 NAMES = [questions for questions, *_ in ROWS]
 QUESTION = re.compile(r"^(\d+)\. (.*?)(?=^\d+\. |^\s*$|^#)", re.M | re.S)
+SECTIONS = {part.partition("\n")[0].strip("# "): part for part in re.split(r"^(?=##+ )", PAGE.read_text(), flags=re.M)}
+RECORDS = ROOT / "docs" / "records"
+ASKED_FIRST = {"bedroom-fresh": 38}
+"""Records whose runs tell when they were begun, and the question that they answer."""
 
 
 def git(*words: str) -> subprocess.CompletedProcess[str]:
@@ -57,24 +64,58 @@ def asked(text: str) -> set[tuple[int, str]]:
     return {(int(number), " ".join(words.split())) for number, words in QUESTION.findall(text)}
 
 
+def numbers_of(questions: str) -> set[int]:
+    """Those that a row names."""
+    ranges = re.findall(r"(\d+)(?: to (\d+))?", questions.partition(" of ")[0])
+    return {number for first, last in ranges for number in range(int(first), int(last or first) + 1)}
+
+
 @cache
-def asked_at(commit: str) -> set[tuple[int, str]]:
-    """Those of all pages at a commit."""
-    pages = [
-        page for page in git("ls-tree", "-r", "--name-only", commit, "docs").stdout.split() if page.endswith(".md")
-    ]
-    return {one for page in pages for one in asked(git("show", f"{commit}:{page}").stdout)}
+def pages_at(commit: str) -> tuple[str, ...]:
+    """All pages at a commit."""
+    names = git("ls-tree", "-r", "--name-only", commit, "docs").stdout.split()
+    return tuple(git("show", f"{commit}:{name}").stdout for name in names if name.endswith(".md"))
 
 
 @with_history
 @pytest.mark.parametrize(("questions", "written", "answered"), ROWS, ids=NAMES)
 def test_a_question_stands_as_it_was_written(questions: str, written: list[str], answered: str) -> None:
     del answered
-    ranges = re.findall(r"(\d+)(?: to (\d+))?", questions.partition(" of ")[0])
-    numbers = {number for first, last in ranges for number in range(int(first), int(last or first) + 1)}
     here = asked(PAGE.read_text(encoding="utf-8"))
-    then = {one for commit in written for one in asked_at(commit)}
-    assert {number for number, _ in here & then} >= numbers
+    then = {one for commit in written for page in pages_at(commit) for one in asked(page)}
+    assert {number for number, _ in here & then} >= numbers_of(questions)
+
+
+def commands(text: str) -> list[str]:
+    """What of a page is to be run, however its lines are broken."""
+    return [" ".join(words.split()) for words in re.findall(r"`((?:clearway|python) [^`]+)`", text)]
+
+
+@with_history
+@pytest.mark.parametrize("title", SECTIONS)
+def test_commands_stand_as_they_were_written_with_their_questions(title: str) -> None:
+    numbers = {number for number, _ in asked(SECTIONS[title])}
+    written = {commit for questions, commits, _ in ROWS if numbers_of(questions) & numbers for commit in commits}
+    then = {command for commit in written for page in pages_at(commit) for command in commands(page)}
+    assert not written or set(commands(SECTIONS[title])) <= then
+
+
+def begun(record: Path) -> list[datetime]:
+    """When the runs of a record were begun, of those that tell it."""
+    with tarfile.open(record) as members:
+        files = [members.extractfile(member) for member in members if member.name.endswith("/run.json")]
+        times = [json.load(file).get("begun") for file in files if file]
+    return [datetime.fromisoformat(time) for time in times if time]
+
+
+@with_history
+@pytest.mark.parametrize("record", sorted(path.name for path in RECORDS.glob("*.tar.xz")))
+def test_runs_were_begun_after_their_question_was_written(record: str) -> None:
+    times, question = begun(RECORDS / record), ASKED_FIRST.get(record.partition(".")[0])
+    assert bool(times) == (question is not None), "name the question in ASKED_FIRST"
+    for commit in (commit for questions, commits, _ in ROWS if question in numbers_of(questions) for commit in commits):
+        written = datetime.fromisoformat(git("log", "-1", "--format=%cI", commit).stdout.strip())
+        assert written < min(times)
 
 
 def test_a_changed_question_is_another() -> None:
