@@ -125,7 +125,7 @@ def encode_scenes(
 
     Args:
         scenes: with pictures; those to be trained together are encoded together.
-        encoder: "auto" or "clearway" (the eyes that come along), "resnet50", "random-resnet50" (calibrated on the
+        encoder: "auto" or "clearway" (the shipped eyes), "resnet50", "random-resnet50" (calibrated on the
             scenes), a folder of eyes, a plugin's or a Hugging Face model's name; or an encoder of your own
             (`OwnEncoder`).
         encoder_seed: of "random-resnet50".

@@ -39,7 +39,7 @@ def find_record(
     """The record of the encoder that a user asks for by name.
 
     Args:
-        name: "clearway" or "auto" for the eyes that come along, a folder of eyes (`clearway pretrain`), "resnet50"
+        name: "clearway" or "auto" for the shipped eyes, a folder of eyes (`clearway pretrain`), "resnet50"
             (trained on ImageNet, `microsoft/resnet-50`), "random-resnet50" (calibrated on the scenes), "depth-grid" (of
             depth, without a network), one of another package (`clearway.plugins`), or a vision model on the Hugging
             Face hub or in a folder.

@@ -22,7 +22,7 @@ class Encoding:
     """How pictures become features."""
 
     encoder: str = "auto"
-    """auto or clearway (the eyes that come along), resnet50 (microsoft/resnet-50), random-resnet50, depth-grid (needs
+    """auto or clearway (the shipped eyes), resnet50 (microsoft/resnet-50), random-resnet50, depth-grid (needs
     --sensors rgb depth), a folder of eyes, one of another package (clearway plugins), or a Hugging Face model."""
     encoder_seed: int = 0
     """Seed of random-resnet50."""
