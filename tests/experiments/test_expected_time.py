@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from multiprocessing import active_children
 from pathlib import Path
 
 import pytest
@@ -24,8 +25,6 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
     on_cluster = told_time(jobs, jobs, None, 1)
     assert on_cluster.endswith("to be trained, one after the other: 2 h 00 min of training here")
     assert told_time(jobs, [], 2, 1) == f"{len(jobs)} runs, 0 to be trained: all is there"
-    slow = [replace(jobs[0], run=replace(jobs[0].run, learner=PAPER_A3C)), *jobs]
-    assert told_time(slow, slow, 1, 1).endswith("of training here at least, and 1 of A3C, whose time is not known")
 
 
 def test_each_kind_of_learner_is_tried_once_and_nothing_is_kept(
@@ -51,3 +50,11 @@ def test_a_speed_is_frames_by_seconds(tmp_path: Path, monkeypatch: pytest.Monkey
     began = time.perf_counter()
     speed = frames_per_second(job.run, threads=1)
     assert 0 < speed < job.run.learner.frames / 1e-4 and time.perf_counter() - began < 60
+
+
+def test_asynchronous_workers_are_tried_too_and_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (job, *_) = planned(small_setting(tmp_path), ["fig4"])
+    monkeypatch.setattr(expected_time, "TRIED_S", 0.1)
+    learner = replace(PAPER_A3C, width=8, feature_basis=8, frames=1_000_000)
+    told = told_time([replace(job, run=replace(job.run, learner=learner))] * 2, [job], 1, 1)
+    assert "of training here at least" in told and not active_children()

@@ -10,7 +10,6 @@ from dataclasses import asdict, replace
 
 from clearway.experiments.job import request_of
 from clearway.experiments.plan import Job, PlannedRun
-from clearway.learn.a3c.config import A3C
 from clearway.torch_threads import torch_threads
 
 TRIED_S = 2.0
@@ -27,10 +26,9 @@ def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int | None, thr
     counted = f"{len(jobs)} runs, {len(left)} to be trained"
     if not left:
         return f"{counted}: all is there"
-    known = [job.run for job in left if not isinstance(job.run.learner, A3C)]
     speeds: dict[str, float] = {}
     seconds, longest = 0.0, 0.0
-    for run in known:
+    for run in (job.run for job in left):
         kind = _kind(run)
         if kind not in speeds:
             speeds[kind] = frames_per_second(run, threads)
@@ -38,9 +36,7 @@ def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int | None, thr
         longest = max(longest, run.learner.frames / speeds[kind])
     beside = min(workers or 1, len(left))
     how, least = (f"{beside} at a time", " at least") if workers else ("one after the other", "")
-    unknown = len(left) - len(known)
-    more = f", and {unknown} of A3C, whose time is not known" if unknown else ""
-    return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}{more}"
+    return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}"
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:
