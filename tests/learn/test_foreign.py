@@ -22,12 +22,15 @@ from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.foreign_agent import ForeignTrained
 from clearway.learn.load import load_network
 from clearway.learn.metrics_log import OWN_FIGURES, metrics_row
+from clearway.learn.network_agent import NetworkAgent
 from clearway.learn.peers import ALONE
 from clearway.learn.q_learning import TableTrainer
 from clearway.learn.recurrent import TrainedRecurrent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest, train_part
+from clearway.live.episodes import LiveProtocol
+from clearway.live.walks import walk_on_grid
 from clearway.model.policy import ScenePolicy
 from clearway.perception import Encoder, encoder_from_record
 from clearway.perception.preprocess import Preprocessing
@@ -331,6 +334,22 @@ def test_an_agent_of_a_package_that_cannot_be_exported_is_one_line(tmp_path, mon
     with pytest.raises(PluginError, match=rf"^{SOURCE}: {told}.*\. Ask its authors") as caught:
         export_onnx(chosen, tmp_path / "agent.onnx", with_encoder=False)
     assert "\n" not in str(caught.value) and not (tmp_path / "agent.onnx").exists()
+
+
+def test_a_package_s_network_that_fails_while_walking_is_its_fault(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(OWN_FORWARD))
+    agent = NetworkAgent(chosen.trained, chosen.index)
+    features = {agent.sees[0]: np.asarray(SCENE.features[:1])}
+    state = agent.reset(features, np.zeros(1, np.int64))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: its network failed \(ZeroDivisionError: division by zero\)"):
+        agent.act(features, state)
+
+
+def test_nor_can_it_fail_on_the_grid_before_a_live_walk(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("def on_poses(self, world): 1 / 0"))
+    agents = {"odd": load_network(tmp_path / "run")}
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: on_poses failed \(ZeroDivisionError"):
+        walk_on_grid(agents, [chosen.scene], {SCENE.name: CORRIDOR_TARGETS}, LiveProtocol(1, 5, 0, "sampled"))
 
 
 NORMED = """

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from clearway.agents.arrival import Arrival, fitted_arrival
-from clearway.agents.by_features import FeatureAgent
 from clearway.deploy.card import ARRIVAL, Card
 from clearway.errors import DeployError, EncoderError
 from clearway.learn.foreign_agent import faults_of_agent
 from clearway.learn.learner import OnFeatures
 from clearway.learn.load import TrainedNetwork, load_network, run_scenes
+from clearway.learn.network_agent import NetworkAgent, policy_in
 from clearway.model.policy import ScenePolicy
 from clearway.perception import Encoder, encoder_from_record, eyes
 from clearway.perception.encoder import NetworkEncoder, sensor_of
@@ -50,11 +50,7 @@ class RunInScene:
     @property
     def policy(self) -> ScenePolicy:
         """What decides in the scene, by features. Raises PluginError: another package's agent gives none."""
-        with faults_of_agent(self.trained, "in_scene"):
-            policy: object = self.trained.in_scene(self.index)
-            if not isinstance(policy, ScenePolicy):
-                raise TypeError(f"gives {policy!r:.40}, expected a ScenePolicy (clearway.model.policy)")
-        return policy
+        return policy_in(self.trained, self.index)
 
     @cached_property
     def arrival(self) -> Arrival | None:
@@ -165,7 +161,7 @@ def exportable_encoder(chosen: RunInScene) -> NetworkEncoder:
     return encoder
 
 
-class RunAgent(FeatureAgent):
+class RunAgent(NetworkAgent):
     """The agent of a run folder on PyTorch. Features are those that the project's own encoder makes.
 
     Args:
@@ -173,9 +169,10 @@ class RunAgent(FeatureAgent):
 
     Raises:
         EncoderError: the encoder that made the scene's features cannot be had.
+        PluginError: another package's network fails, then or walking.
     """
 
     def __init__(self, chosen: RunInScene) -> None:
         encoder = picture_encoder(chosen)
-        super().__init__(chosen.policy, encoder, chosen.arrival)
+        super().__init__(chosen.trained, chosen.index, encoder, chosen.arrival)
         self.card: Card = chosen.card(encoder)

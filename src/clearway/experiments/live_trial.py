@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from clearway.agents.agent import Agent
-from clearway.agents.by_features import FeatureAgent
 from clearway.agents.by_pose import RandomWalk
 from clearway.agents.on_learnt_map import MOST_A_POSE, NearestPicture, frames_of, seen_by_walkers
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, LiveTrial, PlannedRun
 from clearway.files import read_kept, written_whole
 from clearway.learn.load import load_network
+from clearway.learn.network_agent import NetworkAgent
 from clearway.live.conditions import Condition
 from clearway.live.episodes import STEP_S, LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.walks import LiveScene, stages
@@ -72,7 +72,7 @@ def _walkers(places: Sequence[LiveScene], folder: Path, trial: LiveTrial) -> lis
     if trial.walker == NEAREST:
         return [_by_nearest_picture(place, trial.seed) for place in places]
     network = load_network(folder)
-    return [FeatureAgent(network.in_scene(index), place.encoder) for index, place in enumerate(places)]
+    return [NetworkAgent(network, index, place.encoder) for index, place in enumerate(places)]
 
 
 def _by_nearest_picture(place: LiveScene, seed: int) -> NearestPicture:

@@ -7,12 +7,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from clearway.agents.by_features import FeatureAgent
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
 from clearway.evaluation.episodes import run_episodes
 from clearway.files import json_text, written_whole
 from clearway.learn.load import TrainedNetwork, run_world
+from clearway.learn.network_agent import NetworkAgent, network_on_grid
 from clearway.live.conditions import Condition
 from clearway.live.episodes import LiveProtocol, LiveTable, run_live_episodes
 from clearway.live.live_room import LiveRoom, live_room
@@ -147,7 +147,7 @@ def walk_setting(
                 run_live_episodes(
                     stage.live,
                     stage.world,
-                    FeatureAgent(agent.in_scene(index), stage.encoder),
+                    NetworkAgent(agent, index, stage.encoder),
                     stage.camera,
                     setting.perturbations,
                     protocol,
@@ -171,7 +171,7 @@ def walk_on_grid(
             world = run_world(agent.record, scenes, targets)
             table = run_episodes(
                 world,
-                agent.on_poses(world),
+                network_on_grid(agent, world),
                 scenes=scenes,
                 selection=protocol.selection,
                 episodes_per_target=protocol.episodes_per_target,

@@ -1,0 +1,61 @@
+"""A run's network as an agent, behind a camera or on the grid; what another package's raises is its fault."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from clearway.agents.agent import Agent, Decisions, Observation, State
+from clearway.agents.arrival import Arrival
+from clearway.agents.by_features import FeatureAgent
+from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, is_ours
+from clearway.model.policy import ScenePolicy
+from clearway.perception.encoder import Encoder
+from clearway.plugins import find_plugin
+from clearway.world.world import World
+
+if TYPE_CHECKING:
+    from clearway.learn.load import TrainedNetwork
+
+
+def policy_in(trained: TrainedNetwork, index: int) -> ScenePolicy:
+    """What decides in one of the run's scenes, by features. Raises PluginError: another package's agent gives none."""
+    with faults_of_agent(trained, "in_scene"):
+        policy: object = trained.in_scene(index)
+        if not isinstance(policy, ScenePolicy):
+            raise TypeError(f"gives {policy!r:.40}, expected a ScenePolicy (clearway.model.policy)")
+    return policy
+
+
+def network_on_grid(trained: TrainedNetwork, world: World) -> Agent:
+    """Its agent on the grid, in a world with the run's scenes.
+
+    Raises:
+        RunError: as of `TrainedNetwork.lookup`.
+        PluginError, AgentError: another package's fails, then or walking.
+    """
+    plugin = None if is_ours(trained) else find_plugin("algorithms", trained.record.learner.algorithm)
+    return trained.on_poses(world) if plugin is None else ForeignTrained(trained, plugin).on_poses(world)
+
+
+class NetworkAgent(FeatureAgent):
+    """Draws its actions by a run's network in one of the run's scenes.
+
+    Args:
+        trained: what the run has learnt.
+        index: of the scene among the run's.
+        encoder, arrival: see `FeatureAgent`.
+
+    Raises:
+        PluginError: another package's network fails, then or walking.
+    """
+
+    def __init__(
+        self, trained: TrainedNetwork, index: int, encoder: Encoder | None = None, arrival: Arrival | None = None
+    ) -> None:
+        super().__init__(policy_in(trained, index), encoder, arrival)
+        self._trained = trained
+
+    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
+        """Actions drawn by the network; see `Agent.act`."""
+        with faults_of_agent(self._trained, "its network"):
+            return super().act(observation, state)
