@@ -193,7 +193,7 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     lines = (DOCS / "results.md").read_text(encoding="utf-8").splitlines()
     for agent, begin in told.items():
         (line,) = [line for line in lines if line.startswith(begin)]
-        _, frames, settled = line.strip("|").split("|")
+        _, frames, settled, *_ = line.strip("|").split("|")
         mean, *interval = numbers(frames.replace(",", ""))
         assert_written(mean, rows[agent]["frames"], agent)
         assert interval == numbers(str(rows[agent]["95 %"]).replace(",", ""))
@@ -232,6 +232,63 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         assert verdict == claim.verdict
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
+
+
+def assert_shown(cell: str, value: float, interval: str, scale: float = 1) -> None:
+    """A cell shows a mean and, where it has brackets, its interval."""
+    mean, *ends = numbers(cell.replace(",", ""))
+    assert_written(mean, scale * value, cell)
+    for written, end in zip(ends, numbers(interval.replace(",", "")), strict=True):
+        assert_written(written, scale * float(end), cell)
+
+
+@pytest.mark.slow
+def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))["unpack"](
+        DOCS / "records" / "shuffles-bathroom.tar.xz", tmp_path / "shuffles"
+    )
+    shuffled, zones = gather(tmp_path / "shuffles").sections
+    assert not shuffled.missing and not zones.missing
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
+    part = page.partition("### Zones shuffled anew")[2].partition("\n### ")[0]
+    lines = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")]
+    table, late = shuffled.tables[0], shuffled.tables[-1]
+    for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+        ((frames, steps, collisions, lost),) = [cells for agent, *cells in lines if agent == row["agent"]]
+        frames, settled = frames.split("), ")
+        assert_shown(frames, row["frames"], row["95 %"])
+        assert settled == f"{row['settled']} of 8"
+        for figure, cell in (("steps", steps), ("collisions", collisions)):
+            (own,) = [r for r in table.rows if r[0] == figure and r[1:3] == ("paper", row["agent"])]
+            found = dict(zip(table.headings, own, strict=True))
+            assert_shown(cell, found["average"], found["95 %"])
+            assert lost == found["failed targets"]
+    assert [claim.verdict for claim in shuffled.claims] == ["undecided", "holds", "holds"]
+
+    time_in = page.partition("### Time in the zones")[2].partition("\n### ")[0]
+    shares = [line.strip("| ").split(" | ") for line in time_in.splitlines() if line.startswith("| ")]
+    (table,) = zones.tables
+    for _, agent, _, share, share_ends, visits, visits_ends, near, near_ends, steps, steps_ends in table.rows:
+        if agent in ("shortest", "bump", "collision-aware"):
+            first, *_ = [cells for name, *cells in shares if name == agent]
+            assert_shown(first[0], share, share_ends, 100)
+            assert_shown(first[1], visits, visits_ends)
+            assert_shown(first[2], near, near_ends, 100)
+            assert_shown(first[3], steps, steps_ends)
+            assert f"{100 * share:.1f} %" in RESULTS.partition("### Time in the zones")[2]
+    assert [claim.verdict for claim in zones.claims] == ["holds"] * 4
+
+    for claim in (*shuffled.claims, *zones.claims):
+        text = claim.text.removeprefix("paper: ").removeprefix("collision-aware, ")
+        ((difference, p, corrected, verdict),) = [
+            cells for name, *cells in (*lines, *shares) if name.removeprefix("collision-aware, ") == text
+        ]
+        assert f"difference {difference.replace('(', '[').replace(')', ']')}; " in claim.evidence
+        assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence
+        assert verdict == claim.verdict
+    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "shuffles").glob("runs/*/metrics.jsonl")]
+    seconds = [json.loads(end)["seconds"] for end in ends]
+    assert len(seconds) == 32 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in part
 
 
 def four_rooms(record: str, folder: Path) -> Iterator[tuple[dict[str, Any], int, dict[str, np.ndarray], str]]:
@@ -342,6 +399,13 @@ def test_the_bedroom_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) 
         assert told == f"{frames:,.0f} ({interval.replace(' to ', '-')}), {settled} of 5"
         results = rf"`{agent}`[^`]* after {frames / 1e6:.2f} M(?: frames)? \({'-'.join(numbers(millions(interval)))}\)"
         assert re.search(results, RESULTS), results
+    for claim in section.claims:
+        text = claim.text.removeprefix("paper: ")
+        ((_, verdict, own, other, p, corrected),) = [line for line in lines if line[0] == text]
+        assert verdict == claim.verdict
+        own, other = (cell.replace("(", "[").replace(")", "]") for cell in (own, other))
+        assert f": {own} against {other}, " in claim.evidence
+        assert f"p = {p}, for 4 claims {corrected} (Holm)" in claim.evidence
     # the question's own two claims
     setting, groups = found.setting, {group.agent: group for group in compared(found.setting, PAIR)}
     world, mark = setting.world(), mark_steps(setting, setting.targets)
@@ -638,7 +702,7 @@ def test_both_sets_together_and_time_in_the_zones_are_what_their_records_come_to
         )
 
     (table,) = zone_time.section(gather(folders[0]).setting).tables
-    part = page.partition("### Time in the zones")[2].partition("\n### ")[0]
+    part = page.partition("### Time in the zones")[2].partition("\n### ")[0].partition("After 2 M frames")[2]
     names = {"11,600 frames": "planner on a learnt map"}
     told = 0
     for learner, agent, _, *figures in table.rows:
