@@ -120,6 +120,26 @@ def test_runs_were_begun_after_their_question_was_written(record: str) -> None:
         assert written < min(times)
 
 
+NAMED = re.compile(r"\[([Qq]uestions? \d[^]()]*) \(([^)]*)\)\]\(")
+VERDICTS = {
+    (path.name, questions, commits)
+    for path in sorted((ROOT / "docs").glob("*.md"))
+    for questions, commits in NAMED.findall(path.read_text(encoding="utf-8"))
+}
+
+
+@pytest.mark.parametrize(("page", "questions", "commits"), sorted(VERDICTS))
+def test_a_verdict_names_the_commit_that_wrote_its_question(page: str, questions: str, commits: str) -> None:
+    last = {written[-1] for rows, written, _ in ROWS if numbers_of(rows) & numbers_of(questions) and " of " not in rows}
+    assert set(commits.split(", ")) == (last or {"not shown"})
+
+
+@pytest.mark.parametrize("page", ["results.md", "evidence.md", "seeing.md", "learning.md"])
+def test_no_verdict_names_a_question_without_its_commit(page: str) -> None:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    assert not re.findall(r"\[[Qq]uestions? \d[^]()]*\]\(registered", text)
+
+
 def test_a_changed_question_is_another() -> None:
     page = "1. Is it so?\n2. Is it\n   so, too?\n\nNot 3.\n"
     assert asked(page) == {(1, "Is it so?"), (2, "Is it so, too?")}
