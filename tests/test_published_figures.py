@@ -13,7 +13,7 @@ import pytest
 
 from clearway.agents.on_learnt_map import MOST_A_POSE
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments import fig5, fig6, table1, zone_time
+from clearway.experiments import fig5, fig6, shuffles, table1, zone_time
 from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settled_row
 from clearway.experiments.correction import holm
 from clearway.experiments.generalisation import Tried, tried
@@ -21,7 +21,7 @@ from clearway.experiments.groups import PAIR, compared
 from clearway.experiments.learnt_maps import PLANNER, on_maps
 from clearway.experiments.plan import NEAREST
 from clearway.experiments.reproduce import REQUEST_FILE, gather
-from clearway.experiments.section import Section
+from clearway.experiments.section import ReportTable, Section
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less
 from clearway.learn.run_folder import RunFolder
@@ -67,6 +67,21 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
             assert_written(mean, row[name], f"{name} after {count} frames")
             recorded = numbers(str(row[f"95 % of {name}"]))
             assert not interval or [*map(float, interval)] == [*map(float, recorded)]
+    evidence = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### What memory alone solves")[2]
+    shown = [line.strip("| ").split(" | ") for line in evidence.partition("\n### ")[0].splitlines()[1:]]
+    maps = [row for row in rows if row["reward"] == "map"]
+    for planner, nearest in zip(maps[::2], maps[1::2], strict=True):
+        ((steps, bumps, spl, own_steps, own_bumps, failed),) = [
+            cells for frames, *cells in shown if cells and frames == f"{planner['frames']:,}"
+        ]
+        for cell, row in ((steps, planner), (own_steps, nearest)):
+            mean, *ends = numbers(cell.replace(",", ""))
+            assert_written(mean, row["steps"], cell)
+            assert not ends or ends == numbers(str(row["95 % of steps"]).replace(",", ""))
+        assert_written(bumps, planner["collisions"], bumps)
+        assert_written(own_bumps.replace(",", ""), nearest["collisions"], own_bumps)
+        assert_written(numbers(spl)[0], 100 * planner["spl"], spl)
+        assert failed == nearest["failed targets"] and planner["failed targets"] == "0 of 25"
     check_targets_that_maps_were_not_given(found.setting)
     mark = mark_steps(found.setting, found.setting.targets)
     runs = [RunFolder(path) for path in (tmp_path / "memory" / "runs").glob("ppo-*")]
@@ -235,11 +250,62 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
 
 
 def assert_shown(cell: str, value: float, interval: str, scale: float = 1) -> None:
-    """A cell shows a mean and, where it has brackets, its interval."""
+    """A cell shows a mean and its interval."""
     mean, *ends = numbers(cell.replace(",", ""))
     assert_written(mean, scale * value, cell)
     for written, end in zip(ends, numbers(interval.replace(",", "")), strict=True):
         assert_written(written, scale * float(end), cell)
+
+
+def ends_of(interval: str) -> list[float]:
+    """Those of an interval in a report."""
+    return [float(end) for end in numbers(interval.replace(",", ""))]
+
+
+def check_results_of_shuffles(table: ReportTable, late: ReportTable) -> None:
+    """The right half of a table of the results."""
+    lines = RESULTS.partition("### Zones, or a larger step?")[2].partition("\n### ")[0].splitlines()
+    begins = {"own shuffle": "| zones of shuffled"}
+    for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+        begin = begins.get(str(row["agent"]), f"| {row['agent']} |")
+        ((*_, frames, collisions),) = [line.strip("| ").split(" | ") for line in lines if line.startswith(begin)]
+        frames, ran = frames.split("), ")
+        exact = row["frames"], *ends_of(row["95 %"])
+        for written, value in zip(numbers(frames.replace(",", "")), exact, strict=True):
+            assert abs(float(written) - value) <= 500
+        assert ran == f"{row['settled']} of 8"
+        (own,) = [r for r in table.rows if r[0] == "collisions" and r[1:3] == ("paper", row["agent"])]
+        found = dict(zip(table.headings, own, strict=True))
+        assert_shown(collisions.partition(", one run")[0], found["average"], found["95 %"])
+
+
+def check_runs_one_by_one(setting: Setting, shuffled: str, time_in: str) -> None:
+    """What the two sections say of single runs, and of those that had settled."""
+    world, mark = setting.world(), mark_steps(setting, setting.targets)
+    groups = {group.agent: group for group in (*shuffles._groups(setting), *compared(setting, table1.REWARDS))}
+    scores = {agent: group.scores(setting.out, world.target_count) for agent, group in groups.items()}
+    settled = {agent: frames_until_settled(setting.out, group, mark) for agent, group in groups.items()}
+    ended = {agent: frames[:, 0] < setting.budget.frames for agent, (frames, _) in settled.items()}
+    assert settled["collision-aware"][0].max() < settled["shortest"][0].min()
+    bumps = {agent: own.of("collisions").mean(1) for agent, own in scores.items()}
+    shuffle, aware, short = np.sort(bumps["own shuffle"]), bumps["collision-aware"], bumps["shortest"]
+    short = short[ended["shortest"]]
+    assert (
+        f"({shuffle[-1]:.1f}); the other seven have {shuffle[0]:.3f} to {shuffle[-2]:.3f}, all of `collision-aware` "
+        f"{aware.min():.3f} to {aware.max():.3f}, the five settled ones of `shortest` {short.min():.3f} to "
+        f"{short.max():.3f}." in shuffled
+    )
+    for agent in ("shortest", "bump", "collision-aware"):
+        line = next(line for line in time_in.splitlines() if line.startswith(f"| {agent} |"))
+        assert line.endswith(f"| {settled[agent][1]} of 8 |")
+    in_zone = {agent: own.of(next(iter(zone_time.FIGURES))).mean(1) * 100 for agent, own in scores.items()}
+    others, own = [in_zone[agent][ended[agent]] for agent in ("shortest", "bump")], in_zone["collision-aware"]
+    ranges = [f"{each.min():.1f} to {each.max():.1f} %" for each in (*others, own)]
+    told = f"Settled runs differ, too: {ranges[0]} under `shortest`, {ranges[1]} under `bump`, against {ranges[2]}"
+    assert told.removesuffix(" %") in time_in
+    assert f"{bumps['bump'].mean():.2f} collisions, `shortest` {bumps['shortest'].mean():.2f}" in time_in
+    assert sum(map(len, others)) == 9 and "settled runs (nine of 16) exceed all of its" in RESULTS
+    assert min(each.min() for each in others) > own.max()
 
 
 @pytest.mark.slow
@@ -264,6 +330,7 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
             assert_shown(cell, found["average"], found["95 %"])
             assert lost == found["failed targets"]
     assert [claim.verdict for claim in shuffled.claims] == ["undecided", "holds", "holds"]
+    check_results_of_shuffles(table, late)
 
     time_in = page.partition("### Time in the zones")[2].partition("\n### ")[0]
     shares = [line.strip("| ").split(" | ") for line in time_in.splitlines() if line.startswith("| ")]
@@ -275,8 +342,15 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
             assert_shown(first[1], visits, visits_ends)
             assert_shown(first[2], near, near_ends, 100)
             assert_shown(first[3], steps, steps_ends)
-            assert f"{100 * share:.1f} %" in RESULTS.partition("### Time in the zones")[2]
+            low, high = (100 * end for end in ends_of(share_ends))
+            assert f"{100 * share:.1f} %" in RESULTS and f"({low:.1f}-{high:.1f})" in RESULTS
+        else:
+            begin = "random walk" if agent == "random walk" else "planner on a learnt map; nearest picture"
+            cells = next(cells for name, *cells in shares if name.startswith(begin))
+            for cell, value in zip(cells, (100 * share, visits, 100 * near, steps), strict=True):
+                assert_written(numbers(cell)[0], value, cell)
     assert [claim.verdict for claim in zones.claims] == ["holds"] * 4
+    check_runs_one_by_one(gather(tmp_path / "shuffles").setting, part.replace("\n", " "), time_in)
 
     for claim in (*shuffled.claims, *zones.claims):
         text = claim.text.removeprefix("paper: ").removeprefix("collision-aware, ")
@@ -639,6 +713,16 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
             for written, end in zip(ends, numbers(found.ends.replace(",", "")), strict=True):
                 assert_written(written, float(end), cell)
         assert lost == "0 of 25" and frames[1] == 5
+    bumps = {
+        group.agent: group.scores(setting.out, world.target_count).of("collisions").mean(1)
+        for group in compared(setting, table1.REWARDS)
+    }
+    ends = [sorted(bumps[agent])[:: len(bumps[agent]) - 1] for agent in ("shortest", "collision-aware", "bump")]
+    (short, aware, bump), page = ends, (DOCS / "evidence.md").read_text(encoding="utf-8").replace("\n", " ")
+    worst = (
+        f"has {short[1]:.3f} collisions under `shortest`, {aware[1]:.3f} under `collision-aware`, {bump[1]:.3f} under"
+    )
+    assert f"{worst} `bump`; the best {short[0]:.3f}, {aware[0]:.3f} and {bump[0]:.3f}." in page
     settled = {
         (group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0]
         for group in table1.all_groups(setting)

@@ -56,5 +56,6 @@ def test_asynchronous_workers_are_tried_too_and_ended(tmp_path: Path, monkeypatc
     (job, *_) = planned(small_setting(tmp_path), ["fig4"])
     monkeypatch.setattr(expected_time, "TRIED_S", 0.1)
     learner = replace(PAPER_A3C, width=8, feature_basis=8, frames=1_000_000)
-    told = told_time([replace(job, run=replace(job.run, learner=learner))] * 2, [job], 1, 1)
+    jobs = [replace(job, run=replace(job.run, learner=learner))] * 2
+    told = told_time(jobs, jobs, 1, 1)
     assert "of training here at least" in told and not active_children()

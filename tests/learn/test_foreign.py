@@ -14,9 +14,10 @@ from clearway.api.training import chosen_learner
 from clearway.cli.goals import check_knows_any_room
 from clearway.deploy import export
 from clearway.deploy.export import export_onnx
-from clearway.deploy.from_run import RunInScene, load_run_in_scene
+from clearway.deploy.from_run import RunAgent, RunInScene, load_run_in_scene
 from clearway.deploy.onnx_graph import AgentGraph
 from clearway.errors import AgentError, PluginError, RunError
+from clearway.experiments import live_trial
 from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.foreign_agent import ForeignTrained
@@ -29,8 +30,9 @@ from clearway.learn.recurrent import TrainedRecurrent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest, train_part
+from clearway.live import walks
+from clearway.live.conditions import Condition, Perturbations
 from clearway.live.episodes import LiveProtocol
-from clearway.live.walks import walk_on_grid
 from clearway.model.policy import ScenePolicy
 from clearway.perception import Encoder, encoder_from_record
 from clearway.perception.preprocess import Preprocessing
@@ -43,6 +45,7 @@ from helpers.small_eyes import seen_by_eyes
 from helpers.small_runs import CORRIDOR_TARGETS, corridor_world
 
 SCENE = corridor_scene(5, feature_count=12)
+PROTOCOL = LiveProtocol(1, 5, 0, "sampled")
 FIGURES = "def update(self): return super().update() and {}"
 TENSORS = "def tensors(self): return {}"
 FURTHER = "def tensors(self): return super().tensors() | ({} if {} else {{}})"
@@ -345,11 +348,52 @@ def test_a_package_s_network_that_fails_while_walking_is_its_fault(tmp_path, mon
         agent.act(features, state)
 
 
-def test_nor_can_it_fail_on_the_grid_before_a_live_walk(tmp_path, monkeypatch) -> None:
+def test_an_encoder_that_fails_is_not_the_package_s_fault(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("pass"))
+    agent = NetworkAgent(chosen.trained, chosen.index)
+    state = agent.reset({agent.sees[0]: np.asarray(SCENE.features[:1])}, np.zeros(1, np.int64))
+    with pytest.raises(KeyError, match=r"^'features'$"):
+        agent.act({}, state)
+
+
+NO_LENGTH = """
+    def in_scene(self, index):
+        class Policy(type(super().in_scene(index))):
+            history_length = property(lambda self: 1 / 0)
+        return Policy(self.network, self.feature_map, index, 1.0)
+"""
+
+
+def test_a_policy_that_cannot_say_its_length_is_its_package_s_fault(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(NO_LENGTH))
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: its network failed \(ZeroDivisionError"):
+        NetworkAgent(chosen.trained, chosen.index)
+
+
+class Taken(Exception):
+    """Who would have walked."""
+
+
+def test_whoever_walks_by_a_run_s_network_is_guarded(tmp_path, monkeypatch) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("pass"))
+    place = SimpleNamespace(encoder=None, live=SimpleNamespace(scene=SCENE), world=None, camera=None)
+    (walker,) = live_trial._walkers([place], tmp_path / "run", SimpleNamespace(walker="agent"))
+    assert isinstance(walker, NetworkAgent) and issubclass(RunAgent, NetworkAgent)
+
+    def taken(live: object, world: object, agent: object, *_: object) -> None:
+        raise Taken(agent)
+
+    monkeypatch.setattr(walks, "run_live_episodes", taken)
+    with pytest.raises(Taken) as caught:
+        walks.walk_setting([place], {"odd": chosen.trained}, Condition("none", Perturbations()), PROTOCOL)
+    assert isinstance(caught.value.args[0], NetworkAgent)
+
+
+def test_one_that_fails_on_the_grid_before_a_live_walk_is_told_of_too(tmp_path, monkeypatch) -> None:
     chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format("def on_poses(self, world): 1 / 0"))
     agents = {"odd": load_network(tmp_path / "run")}
     with pytest.raises(PluginError, match=rf"^{SOURCE}: on_poses failed \(ZeroDivisionError"):
-        walk_on_grid(agents, [chosen.scene], {SCENE.name: CORRIDOR_TARGETS}, LiveProtocol(1, 5, 0, "sampled"))
+        walks.walk_on_grid(agents, [chosen.scene], {SCENE.name: CORRIDOR_TARGETS}, PROTOCOL)
 
 
 NORMED = """

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from clearway.agents import memory
 from clearway.agents.agent import Decisions, Observation, State
@@ -30,6 +31,7 @@ class FeatureAgent:
 
     def __init__(self, policy: ScenePolicy, encoder: Encoder | None = None, arrival: Arrival | None = None) -> None:
         self._policy, self._arrival = policy, arrival
+        self._history_length = policy.history_length
         self._features = Encoded(encoder)
         self.sees: tuple[str, ...] = (self._features.sees,)
 
@@ -40,7 +42,7 @@ class FeatureAgent:
         return {
             "target": features,
             "begun": np.zeros(count, bool),
-            "earlier": np.zeros((count, self._policy.history_length - 1, size), np.float32),
+            "earlier": np.zeros((count, self._history_length - 1, size), np.float32),
             CHANCE: chance_of(seed),
         }
 
@@ -48,9 +50,14 @@ class FeatureAgent:
     def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
         """Actions drawn by the policy; see `Agent.act`."""
         seen = memory.history(state["earlier"], state["begun"], self._features(observation))  # (B, K, F)
-        probabilities, value = self._policy(torch.from_numpy(seen), torch.from_numpy(state["target"]))
+        probabilities, value = self._asked(torch.from_numpy(seen), torch.from_numpy(state["target"]))
         decisions, chance = drawn(probabilities.numpy(), state[CHANCE], value.numpy()[:, 0])
         if self._arrival is not None:
             decisions = replace(decisions, arrived=self._arrival(seen[:, -1], state["target"]))
         after = {"earlier": seen[:, 1:], "begun": np.ones_like(state["begun"]), CHANCE: chance}
         return decisions, {**state, **after}
+
+    def _asked(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+        """What the policy says, see `ScenePolicy`."""
+        probabilities, value = self._policy(history, target)
+        return probabilities, value

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from clearway.agents.agent import Agent, Decisions, Observation, State
+from torch import Tensor
+
+from clearway.agents.agent import Agent
 from clearway.agents.arrival import Arrival
 from clearway.agents.by_features import FeatureAgent
 from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, is_ours
@@ -52,10 +54,12 @@ class NetworkAgent(FeatureAgent):
     def __init__(
         self, trained: TrainedNetwork, index: int, encoder: Encoder | None = None, arrival: Arrival | None = None
     ) -> None:
-        super().__init__(policy_in(trained, index), encoder, arrival)
+        policy = policy_in(trained, index)
+        with faults_of_agent(trained, "its network"):
+            super().__init__(policy, encoder, arrival)
         self._trained = trained
 
-    def act(self, observation: Observation, state: State) -> tuple[Decisions, State]:
-        """Actions drawn by the network; see `Agent.act`."""
+    def _asked(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+        """What the network says, see `ScenePolicy`."""
         with faults_of_agent(self._trained, "its network"):
-            return super().act(observation, state)
+            return super()._asked(history, target)
