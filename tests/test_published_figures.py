@@ -365,6 +365,53 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
     assert len(seconds) == 32 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in part
 
 
+@pytest.mark.slow
+def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))["unpack"](
+        DOCS / "records" / "hard-bathroom.tar.xz", tmp_path / "hard"
+    )
+    sections = gather(tmp_path / "hard").sections
+    assert [section.name for section in sections] == ["fig4", "table2", "table3"]
+    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Hard targets")[2].partition("\n### ")[0]
+    page = page.partition("Seeds 0 to 4")[0]
+    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    for section, frames in zip(sections[1:], ("1 M", "2 M"), strict=True):
+        assert not section.missing
+        table, late = section.tables[0], section.tables[-1]
+        for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+            ((settled, *cells, lost),) = [cells for agent, of, *cells in lines if (agent, of) == (row["agent"], frames)]
+            settled, ran = settled.split("), ")
+            assert_shown(settled, row["frames"], row["95 %"])
+            assert ran == f"{row['settled']} of 5"
+            for figure, cell in zip(("steps", "collisions"), cells, strict=True):
+                (own,) = [r for r in table.rows if r[0] == figure and r[1:3] == ("paper", row["agent"])]
+                found = dict(zip(table.headings, own, strict=True))
+                assert_shown(cell, found["average"], found["95 %"])
+                assert lost == found["failed targets"]
+        solved = {row[1] for row in table.rows if row[0] == "steps" and row[3] == 5 and f"{row[7]:.2f}" == "10.88"}
+        assert solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
+    shown = RESULTS.partition("### Hard targets")[2].partition("\n### ")[0].splitlines()
+    for agent in ("shortest", "bump", "collision-aware"):
+        ((_, *pairs),) = [line.strip("| ").split(" | ") for line in shown if line.startswith(f"| {agent} |")]
+        for pair, section in zip(pairs, sections[1:], strict=True):
+            for figure, written in zip(("steps", "collisions"), pair.split(", "), strict=True):
+                (own,) = [r for r in section.tables[0].rows if r[0] == figure and r[1:3] == ("paper", agent)]
+                assert_written(written.replace(",", ""), own[7], agent)
+    claims = [claim for section in sections for claim in section.claims]
+    for claim in claims:
+        ((verdict, *cells, p, corrected),) = [
+            cells for text, *cells in lines if text == claim.text.removeprefix("paper: ")
+        ]
+        own, other, apart = (cell.replace("(", "[").replace(")", "]") for cell in cells)
+        assert verdict == claim.verdict, claim.text
+        assert f": {own} against {other}, difference {apart}; " in claim.evidence, claim.text
+        assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence, claim.text
+    assert sum(len(line) == 7 for line in lines) == len(claims) + 1
+    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "hard").glob("runs/a2c-*/metrics.jsonl")]
+    seconds = [json.loads(end)["seconds"] for end in ends]
+    assert len(seconds) == 40 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
+
+
 def four_rooms(record: str, folder: Path) -> Iterator[tuple[dict[str, Any], int, dict[str, np.ndarray], str]]:
     """Of each trial of a record: its run, after how many million frames, its episodes, and which targets were lost."""
     records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
