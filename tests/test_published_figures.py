@@ -797,7 +797,13 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
         assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence, text
     assert sum(row[1:2] in (["holds"], ["undecided"], ["does not hold"]) for row in rows) == len(claims) == 15
     check_the_agents_of_fresh_seeds(gather(tmp_path / "paper").setting, rows)
-    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "paper").glob("runs/*/metrics.jsonl")]
+    solved = {
+        row[1]
+        for row in sections[0].tables[0].rows
+        if row[0] == "steps" and row[3:5] == (5, "0 of 25") and f"{row[7]:.2f}" == "8.79"
+    }
+    assert not sections[0].missing and solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
+    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "paper").glob("runs/a2c-*/metrics.jsonl")]
     seconds = [json.loads(end)["seconds"] for end in ends]
     assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
     results = (DOCS / "results.md").read_text(encoding="utf-8")
