@@ -2,7 +2,6 @@
 
 import json
 import re
-import runpy
 import tarfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,9 +25,22 @@ from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less
 from clearway.learn.run_folder import RunFolder
 from clearway.reward import COLLISION_AWARE
-from helpers.published import DOCS, assert_written, numbers
+from helpers.published import (
+    DOCS,
+    EVIDENCE,
+    RESULTS,
+    assert_judged,
+    assert_shown,
+    assert_written,
+    benchmark,
+    ends_of,
+    numbers,
+    rows_of,
+    seconds_of_runs,
+    section_of,
+    unpack,
+)
 
-RESULTS = (DOCS / "results.md").read_text(encoding="utf-8")
 AGENTS = r"collision-aware|dearer|shuffled|shortest"
 
 
@@ -40,14 +52,13 @@ def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
 
 @pytest.mark.slow
 def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "memory-bathroom.tar.xz", tmp_path / "memory")
-    found, page = gather(tmp_path / "memory"), (DOCS / "results.md").read_text(encoding="utf-8")
+    unpack("memory-bathroom", tmp_path / "memory")
+    found = gather(tmp_path / "memory")
     (section,) = found.sections
     assert not section.missing
     (table,) = section.tables
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
-    lines = page.splitlines()
+    lines = RESULTS.splitlines()
     told = [line.strip("|").split("|") for line in lines if line.startswith("| planner on a learnt map")]
     assert len(told) == 3
     for label, agents in (("default recipe | 3,", ["default"]), ("Q-learning, behaviour", ["q-learning", "bc"])):
@@ -67,12 +78,11 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
             assert_written(mean, row[name], f"{name} after {count} frames")
             recorded = numbers(str(row[f"95 % of {name}"]))
             assert not interval or [*map(float, interval)] == [*map(float, recorded)]
-    evidence = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### What memory alone solves")[2]
-    shown = [line.strip("| ").split(" | ") for line in evidence.partition("\n### ")[0].splitlines()[1:]]
+    shown = rows_of(section_of(EVIDENCE, "What memory alone solves"))
     maps = [row for row in rows if row["reward"] == "map"]
     for planner, nearest in zip(maps[::2], maps[1::2], strict=True):
         ((steps, bumps, spl, own_steps, own_bumps, failed),) = [
-            cells for frames, *cells in shown if cells and frames == f"{planner['frames']:,}"
+            cells for frames, *cells in shown if frames == f"{planner['frames']:,}"
         ]
         for cell, row in ((steps, planner), (own_steps, nearest)):
             mean, *ends = numbers(cell.replace(",", ""))
@@ -86,7 +96,7 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     mark = mark_steps(found.setting, found.setting.targets)
     runs = [RunFolder(path) for path in (tmp_path / "memory" / "runs").glob("ppo-*")]
     settled = [settled_row(run.metrics(), mark)["frames"] for run in runs]
-    assert len(settled) == 5 and f"settled after {round(np.mean(settled), -3):,.0f} frames" in page
+    assert len(settled) == 5 and f"settled after {round(np.mean(settled), -3):,.0f} frames" in RESULTS
     verdicts = {claim.text.partition(":")[0]: claim.verdict for claim in section.claims}
     assert verdicts == {"default": "does not hold", "q-learning": "undecided", "bc": "undecided"}
 
@@ -96,8 +106,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
     held_out = fig6.held_out_targets(setting)
     (group,) = tried(setting, (COLLISION_AWARE,), held_out)
     scenes = setting.world(held_out).target_scene.numpy()
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
-    part = page.partition("### Figure 6: more training targets")[2].partition("\n### ")[0].splitlines()
+    part = section_of(EVIDENCE, "Figure 6: more training targets").splitlines()
     shown, found = 0, {}
     for mapped in on_maps(setting, group.trial, (fig6.FEW_A_POSE, MOST_A_POSE)):
         cells = Tried(mapped.scores, scenes).cells()
@@ -110,7 +119,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
                     assert_written(written, 100 * float(end), line)
             shown += 1
     assert shown == 2
-    assert "does as well, within 0.5 points" in page
+    assert "does as well, within 0.5 points" in EVIDENCE
     for frames in ("1,500 frames", "11,600 frames"):
         pairs = zip(found[PLANNER, frames][::2], found[NEAREST, frames][::2], strict=True)
         assert all(abs(one - other) < 0.005 for one, other in pairs)
@@ -126,7 +135,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
 
 def test_own_goals_are_what_their_record_comes_to() -> None:
     record = json.loads((DOCS / "figures" / "own-goals.json").read_text(encoding="utf-8"))
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Own goals")[2].partition("\n### ")[0]
+    page = section_of(EVIDENCE, "Own goals")
     tables = {
         "fig5": [("steps away", "agent"), "| steps from a given target |", 2],
         "fig6": [("targets a scene",), "| given targets |", 1],
@@ -154,8 +163,7 @@ def test_own_goals_are_what_their_record_comes_to() -> None:
 
 def check_zones_of_cells(section: Section) -> None:
     """Rows and claims of its section of the evidence."""
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones of cells")[2]
-    lines = page.partition("\n### ")[0].splitlines()
+    lines = section_of(EVIDENCE, "Zones of cells").splitlines()
     steps, _, settled = section.tables
     for agent in ("shortest", "collision-aware, zones of poses", "collision-aware, zones of cells"):
         (line,) = [line for line in lines if line.startswith(f"| {agent} |")]
@@ -192,8 +200,7 @@ def check_zones_of_cells(section: Section) -> None:
 
 @pytest.mark.slow
 def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> None:
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "zones-or-step-bathroom.tar.xz", tmp_path / "zones")
+    unpack("zones-or-step-bathroom", tmp_path / "zones")
     section, of_cells = gather(tmp_path / "zones").sections
     assert not section.missing and not of_cells.missing
     check_zones_of_cells(of_cells)
@@ -205,7 +212,7 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         "shuffled": "| zones of shuffled",
         "collision-aware": "| collision-aware | 460",
     }
-    lines = (DOCS / "results.md").read_text(encoding="utf-8").splitlines()
+    lines = RESULTS.splitlines()
     for agent, begin in told.items():
         (line,) = [line for line in lines if line.startswith(begin)]
         _, frames, settled, *_ = line.strip("|").split("|")
@@ -213,8 +220,7 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         assert_written(mean, rows[agent]["frames"], agent)
         assert interval == numbers(str(rows[agent]["95 %"]).replace(",", ""))
         assert int(settled.split()[0]) == rows[agent]["settled"]
-    evidence = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Zones, or a larger step?")[2]
-    evidence = evidence.partition("\n### ")[0]
+    evidence = section_of(EVIDENCE, "Zones, or a larger step?")
     seconds = [
         json.loads(path.read_text().splitlines()[-1])["seconds"]
         for path in (tmp_path / "zones").glob("runs/*/metrics.jsonl")
@@ -249,26 +255,13 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
 
 
-def assert_shown(cell: str, value: float, interval: str, scale: float = 1) -> None:
-    """A cell shows a mean and its interval."""
-    mean, *ends = numbers(cell.replace(",", ""))
-    assert_written(mean, scale * value, cell)
-    for written, end in zip(ends, numbers(interval.replace(",", "")), strict=True):
-        assert_written(written, scale * float(end), cell)
-
-
-def ends_of(interval: str) -> list[float]:
-    """Those of an interval in a report."""
-    return [float(end) for end in numbers(interval.replace(",", ""))]
-
-
 def check_results_of_shuffles(table: ReportTable, late: ReportTable) -> None:
     """The right half of a table of the results."""
-    lines = RESULTS.partition("### Zones, or a larger step?")[2].partition("\n### ")[0].splitlines()
-    begins = {"own shuffle": "| zones of shuffled"}
+    lines = rows_of(section_of(RESULTS, "Zones, or a larger step?"))
+    names = {"own shuffle": "zones of shuffled poses"}
     for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
-        begin = begins.get(str(row["agent"]), f"| {row['agent']} |")
-        ((*_, frames, collisions),) = [line.strip("| ").split(" | ") for line in lines if line.startswith(begin)]
+        agent = names.get(str(row["agent"]), row["agent"])
+        ((*_, frames, collisions),) = [line for line in lines if line[0] == agent]
         frames, ran = frames.split("), ")
         exact = row["frames"], *ends_of(row["95 %"])
         for written, value in zip(numbers(frames.replace(",", "")), exact, strict=True):
@@ -310,14 +303,11 @@ def check_runs_one_by_one(setting: Setting, shuffled: str, time_in: str) -> None
 
 @pytest.mark.slow
 def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_to(tmp_path: Path) -> None:
-    runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))["unpack"](
-        DOCS / "records" / "shuffles-bathroom.tar.xz", tmp_path / "shuffles"
-    )
+    unpack("shuffles-bathroom", tmp_path / "shuffles")
     shuffled, zones = gather(tmp_path / "shuffles").sections
     assert not shuffled.missing and not zones.missing
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8")
-    part = page.partition("### Zones shuffled anew")[2].partition("\n### ")[0]
-    lines = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")]
+    part = section_of(EVIDENCE, "Zones shuffled anew")
+    lines = rows_of(part)
     table, late = shuffled.tables[0], shuffled.tables[-1]
     for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
         ((frames, steps, collisions, lost),) = [cells for agent, *cells in lines if agent == row["agent"]]
@@ -332,8 +322,8 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
     assert [claim.verdict for claim in shuffled.claims] == ["undecided", "holds", "holds"]
     check_results_of_shuffles(table, late)
 
-    time_in = page.partition("### Time in the zones")[2].partition("\n### ")[0]
-    shares = [line.strip("| ").split(" | ") for line in time_in.splitlines() if line.startswith("| ")]
+    time_in = section_of(EVIDENCE, "Time in the zones")
+    shares = rows_of(time_in)
     (table,) = zones.tables
     for _, agent, _, share, share_ends, visits, visits_ends, near, near_ends, steps, steps_ends in table.rows:
         if agent in ("shortest", "bump", "collision-aware"):
@@ -357,24 +347,19 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
         ((difference, p, corrected, verdict),) = [
             cells for name, *cells in (*lines, *shares) if name.removeprefix("collision-aware, ") == text
         ]
-        assert f"difference {difference.replace('(', '[').replace(')', ']')}; " in claim.evidence
-        assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence
-        assert verdict == claim.verdict
-    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "shuffles").glob("runs/*/metrics.jsonl")]
-    seconds = [json.loads(end)["seconds"] for end in ends]
+        assert_judged(claim, verdict, p, corrected, difference=difference)
+    seconds = seconds_of_runs(tmp_path / "shuffles")
     assert len(seconds) == 32 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in part
 
 
 @pytest.mark.slow
 def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
-    runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))["unpack"](
-        DOCS / "records" / "hard-bathroom.tar.xz", tmp_path / "hard"
-    )
+    unpack("hard-bathroom", tmp_path / "hard")
     sections = gather(tmp_path / "hard").sections
     assert [section.name for section in sections] == ["fig4", "table2", "table3"]
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Hard targets")[2].partition("\n### ")[0]
+    page = section_of(EVIDENCE, "Hard targets")
     page = page.partition("Seeds 0 to 4")[0]
-    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    lines = rows_of(page)
     for section, frames in zip(sections[1:], ("1 M", "2 M"), strict=True):
         assert not section.missing
         table, late = section.tables[0], section.tables[-1]
@@ -390,9 +375,9 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
                 assert lost == found["failed targets"]
         solved = {row[1] for row in table.rows if row[0] == "steps" and row[3] == 5 and f"{row[7]:.2f}" == "10.88"}
         assert solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
-    shown = RESULTS.partition("### Hard targets")[2].partition("\n### ")[0].splitlines()
+    shown = rows_of(section_of(RESULTS, "Hard targets"))
     for agent in ("shortest", "bump", "collision-aware"):
-        ((_, *pairs),) = [line.strip("| ").split(" | ") for line in shown if line.startswith(f"| {agent} |")]
+        ((_, *pairs),) = [line for line in shown if line[0] == agent]
         for pair, section in zip(pairs, sections[1:], strict=True):
             for figure, written in zip(("steps", "collisions"), pair.split(", "), strict=True):
                 (own,) = [r for r in section.tables[0].rows if r[0] == figure and r[1:3] == ("paper", agent)]
@@ -402,20 +387,15 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
         ((verdict, *cells, p, corrected),) = [
             cells for text, *cells in lines if text == claim.text.removeprefix("paper: ")
         ]
-        own, other, apart = (cell.replace("(", "[").replace(")", "]") for cell in cells)
-        assert verdict == claim.verdict, claim.text
-        assert f": {own} against {other}, difference {apart}; " in claim.evidence, claim.text
-        assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence, claim.text
+        assert_judged(claim, verdict, p, corrected, *cells)
     assert sum(len(line) == 7 for line in lines) == len(claims) + 1
-    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "hard").glob("runs/a2c-*/metrics.jsonl")]
-    seconds = [json.loads(end)["seconds"] for end in ends]
+    seconds = seconds_of_runs(tmp_path / "hard", "a2c-*")
     assert len(seconds) == 40 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
 
 
 def four_rooms(record: str, folder: Path) -> Iterator[tuple[dict[str, Any], int, dict[str, np.ndarray], str]]:
     """Of each trial of a record: its run, after how many million frames, its episodes, and which targets were lost."""
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / f"{record}.tar.xz", folder)
+    unpack(record, folder)
     for trial in sorted(folder.glob("runs/*/trials/*.json")):
         content = json.loads(trial.read_text(encoding="utf-8"))
         run = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
@@ -426,7 +406,7 @@ def four_rooms(record: str, folder: Path) -> Iterator[tuple[dict[str, Any], int,
 
 def row_of(begin: str) -> list[str]:
     """Cells of the row of the evidence that begins so, without commas."""
-    lines = (DOCS / "evidence.md").read_text(encoding="utf-8").splitlines()
+    lines = EVIDENCE.splitlines()
     (line,) = [line for line in lines if line.startswith(begin)]
     return line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
 
@@ -467,9 +447,9 @@ def test_four_rooms_on_the_eyes_are_what_their_record_comes_to(tmp_path: Path) -
 
 @pytest.mark.slow
 def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
-    records, folder = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py")), tmp_path / "bedroom"
-    records["unpack"](DOCS / "records" / "bedroom.tar.xz", folder)
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### The bedroom alone")[2]
+    folder = tmp_path / "bedroom"
+    unpack("bedroom", folder)
+    page = EVIDENCE.partition("### The bedroom alone")[2]
     page = page.partition("\n## ")[0]
     asked = json.loads((folder / REQUEST_FILE).read_text(encoding="utf-8"))
     compared = 0
@@ -497,15 +477,12 @@ def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_bedroom_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> None:
-    runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))["unpack"](
-        DOCS / "records" / "bedroom-fresh.tar.xz", tmp_path / "bedroom"
-    )
+    unpack("bedroom-fresh", tmp_path / "bedroom")
     found = gather(tmp_path / "bedroom")
     (section,) = found.sections
     assert not section.missing
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### The bedroom, of fresh seeds")[2]
-    page = page.partition("\n### ")[0]
-    lines = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    page = section_of(EVIDENCE, "The bedroom, of fresh seeds")
+    lines = rows_of(page)
     ends, late = section.tables[:2]
     for _, agent, frames, _, failed, steps, between, collisions, between_collisions in ends.rows:
         ((*_, shown, bumps, lost),) = [line for line in lines if line[:2] == [agent, f"{frames / 1e6:g} M"]]
@@ -523,10 +500,7 @@ def test_the_bedroom_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) 
     for claim in section.claims:
         text = claim.text.removeprefix("paper: ")
         ((_, verdict, own, other, p, corrected),) = [line for line in lines if line[0] == text]
-        assert verdict == claim.verdict
-        own, other = (cell.replace("(", "[").replace(")", "]") for cell in (own, other))
-        assert f": {own} against {other}, " in claim.evidence
-        assert f"p = {p}, for 4 claims {corrected} (Holm)" in claim.evidence
+        assert_judged(claim, verdict, p, corrected, own, other)
     # the question's own two claims
     setting, groups = found.setting, {group.agent: group for group in compared(found.setting, PAIR)}
     world, mark = setting.world(), mark_steps(setting, setting.targets)
@@ -554,7 +528,7 @@ def test_the_bedroom_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) 
     assert "have 0.046 to 0.092 collisions, fewer than all of `shortest` (0.228 to 0.296)" in page
     for written, value in (("0.046", aware[0]), ("0.092", aware[3]), ("6.8", aware[4]), ("0.228", shortest[0])):
         assert_written(written, value, "collisions")
-    seconds = [run.metrics()[-1]["seconds"] for run in map(RunFolder, (tmp_path / "bedroom" / "runs").iterdir())]
+    seconds = seconds_of_runs(tmp_path / "bedroom")
     assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
 
 
@@ -565,14 +539,12 @@ def millions(interval: str) -> str:
 
 @pytest.mark.slow
 def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "off-grid-bathroom.tar.xz", tmp_path / "off-grid")
+    unpack("off-grid-bathroom", tmp_path / "off-grid")
     (section,) = gather(tmp_path / "off-grid").sections
     assert not section.missing
     (table,) = section.tables
     rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
-    lines = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### Five seeds, published settings")[2]
-    lines = lines.partition("\n### ")[0].splitlines()
+    lines = section_of(EVIDENCE, "Five seeds, published settings").splitlines()
     figures = [heading for heading in table.headings[4:] if not heading.startswith("95 %")]
     means = [row for row in rows if row["setting"] == "all settings, mean"]
     assert len(means) == 6
@@ -610,8 +582,7 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> None:
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "ablations-two-rooms.tar.xz", tmp_path / "ablations")
+    unpack("ablations-two-rooms", tmp_path / "ablations")
     (section,) = gather(tmp_path / "ablations").sections
     assert not section.missing
     told = {
@@ -624,8 +595,8 @@ def test_what_single_parts_bring_is_what_its_record_comes_to(tmp_path: Path) -> 
         "the precollision zone's penalty alone": ("default", "gamma-alone"),
     }
     rows = [dict(zip(table.headings, row, strict=True)) for table in section.tables for row in table.rows]
-    part = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### What single parts bring")[2]
-    lines = part.partition("\n### ")[0].splitlines()
+    part = section_of(EVIDENCE, "What single parts bring")
+    lines = part.splitlines()
     for begin, (learner, agent) in told.items():
         (line,) = [line for line in lines if line.startswith(f"| {begin}") and line.count("|") == 5]
         shown = line.strip("|").split("|")[1:]
@@ -670,9 +641,7 @@ def test_rooms_that_nobody_tuned_on_are_solved_as_their_record_says() -> None:
     assert len(runs) == 6 and all(run["met"]["all"] and run["solved_targets"] == 20 for run in runs)
     first, solved = ([run["first_met"][name]["seconds"] for run in runs] for name in ("all", "solved_targets"))
     columns = [[run[name] for run in runs] for name in ("path_ratio", "worst_path_ratio", "collisions")]
-    (line,) = [
-        line for line in (DOCS / "results.md").read_text(encoding="utf-8").splitlines() if "three times four" in line
-    ]
+    (line,) = [line for line in RESULTS.splitlines() if "three times four" in line]
     for cell, values in zip(line.strip("|").split("|")[1:], [*columns, solved, first], strict=True):
         least, most = numbers(cell)
         assert_written(least, min(values), cell)
@@ -689,7 +658,7 @@ def test_other_encoders_and_rooms_meet_the_criteria_as_their_record_says() -> No
     assert [one["command"].split()[-1] for one in made] == [
         f"{k}{n}.json" for k in ("encoder", "room") for n in range(1, 6)
     ]
-    part = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("**Other encoders, other rooms**")[2]
+    part = EVIDENCE.partition("**Other encoders, other rooms**")[2]
     for first, name in ((0, "| the random ResNet-50"), (5, "| the rooms")):
         runs = [run for one in made[first : first + 5] for run in one["seeds"]]
         assert len(runs) == 5 and all(run["met"]["all"] and run["solved_targets"] == 10 for run in runs)
@@ -705,10 +674,10 @@ def test_other_encoders_and_rooms_meet_the_criteria_as_their_record_says() -> No
 
 
 def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
-    arms = runpy.run_path(str(DOCS.parent / "benchmarks" / "quality_arms.py"))
+    arms = benchmark("quality_arms")
     records = arms["records_in"]([DOCS / "figures" / "history.json"])
     assert [one["learner"]["history_length"] for one in records] == [1, 4]
-    part = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### What single parts bring")[2]
+    part = EVIDENCE.partition("### What single parts bring")[2]
     for name, (*values, p, corrected) in arms["compared"](*records).items():
         (line,) = [line for line in part.splitlines() if line.startswith(f"| {name}")]
         *shown, told, told_of_both = line.replace(",", "").strip("| ").split("|")[1:]
@@ -730,9 +699,8 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
         assert count == f"{sum(run['met']['all'] for run in runs)} of {len(runs)}"
     worst = max(run["worst_path_ratio"] for run in records[1]["seeds"])
     assert f"ends with a target {100 * (worst - 1):.1f} % above" in part
-    results = (DOCS / "results.md").read_text(encoding="utf-8")
     fewest = [float(np.mean([run["collisions"] for run in record["seeds"]])) for record in records]
-    assert "{:.4f} collisions an episode, not {:.4f}".format(*fewest) in results
+    assert "{:.4f} collisions an episode, not {:.4f}".format(*fewest) in RESULTS
 
 
 @pytest.mark.parametrize("record", sorted((DOCS / "records").glob("*.tar.xz")), ids=lambda path: path.name)
@@ -765,7 +733,7 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
         for group in compared(setting, table1.REWARDS)
     }
     ends = [sorted(bumps[agent])[:: len(bumps[agent]) - 1] for agent in ("shortest", "collision-aware", "bump")]
-    (short, aware, bump), page = ends, (DOCS / "evidence.md").read_text(encoding="utf-8").replace("\n", " ")
+    (short, aware, bump), page = ends, EVIDENCE.replace("\n", " ")
     worst = (
         f"has {short[1]:.3f} collisions under `shortest`, {aware[1]:.3f} under `collision-aware`, {bump[1]:.3f} under"
     )
@@ -781,20 +749,16 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
 
 @pytest.mark.slow
 def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
-    records = runpy.run_path(str(DOCS.parent / "benchmarks" / "records.py"))
-    records["unpack"](DOCS / "records" / "paper-bathroom.tar.xz", tmp_path / "paper")
+    unpack("paper-bathroom", tmp_path / "paper")
     sections = gather(tmp_path / "paper").sections
     assert [section.name for section in sections] == ["table1", "fig3", "fig4", "fig5"]
-    page = (DOCS / "evidence.md").read_text(encoding="utf-8").partition("### The paper's claims of fresh seeds")[2]
-    rows = [line.strip("| ").split(" | ") for line in page.partition("\n### ")[0].splitlines()]
+    page = section_of(EVIDENCE, "The paper's claims of fresh seeds")
+    rows = rows_of(page)
     claims = [claim for section in sections for claim in section.claims]
     for claim in claims:
         text = claim.text.removeprefix("paper: ").removeprefix("paper, ")
         ((_, verdict, own, other, apart, p, corrected),) = [row for row in rows if row[0] == text]
-        assert verdict == claim.verdict, text
-        own, other, apart = (cell.replace("(", "[").replace(")", "]") for cell in (own, other, apart))
-        assert f": {own} against {other}, difference {apart}; " in claim.evidence, text
-        assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence, text
+        assert_judged(claim, verdict, p, corrected, own, other, apart)
     assert sum(row[1:2] in (["holds"], ["undecided"], ["does not hold"]) for row in rows) == len(claims) == 15
     check_the_agents_of_fresh_seeds(gather(tmp_path / "paper").setting, rows)
     solved = {
@@ -803,10 +767,8 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
         if row[0] == "steps" and row[3:5] == (5, "0 of 25") and f"{row[7]:.2f}" == "8.79"
     }
     assert not sections[0].missing and solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
-    ends = [path.read_text().splitlines()[-1] for path in (tmp_path / "paper").glob("runs/a2c-*/metrics.jsonl")]
-    seconds = [json.loads(end)["seconds"] for end in ends]
+    seconds = seconds_of_runs(tmp_path / "paper", "a2c-*")
     assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
-    results = (DOCS / "results.md").read_text(encoding="utf-8")
     asked = [claim for claim in claims if not claim.further]
     counts = [sum(claim.verdict == verdict for claim in asked) for verdict in ("holds", "does not hold", "undecided")]
     assert len(asked) == 11
@@ -814,21 +776,19 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
     holds, fails, open_ = (words[count] for count in counts)
     assert (
         f"Of eleven claims asked of fresh seeds, corrected by table, {holds} hold, {fails} do not, {open_} are"
-        in results
+        in RESULTS
     )
 
 
 @pytest.mark.slow
 def test_both_sets_together_and_time_in_the_zones_are_what_their_records_come_to(tmp_path: Path) -> None:
-    benchmarks, page = DOCS.parent / "benchmarks", (DOCS / "evidence.md").read_text(encoding="utf-8")
-    unpack = runpy.run_path(str(benchmarks / "records.py"))["unpack"]
-    both = runpy.run_path(str(benchmarks / "both_sets.py"))
+    both = benchmark("both_sets")
     folders = [tmp_path / name for name in ("paper", "zones")]
     for folder, record in zip(folders, ("paper-bathroom", "zones-or-step-bathroom"), strict=True):
-        unpack(DOCS / "records" / f"{record}.tar.xz", folder)
+        unpack(record, folder)
     sets = [both["figures"](folder) for folder in folders]
-    part = page.partition("**Both sets together.**")[2].partition("\n```")[0]
-    shown = [line.strip("| ").split(" | ") for line in part.splitlines() if line.startswith("| ")][1:]
+    part = EVIDENCE.partition("**Both sets together.**")[2].partition("\n```")[0]
+    shown = rows_of(part)[1:]
     for (name, *cells, p), figure in zip(shown, both["FIGURES"], strict=True):
         scale = 100 if "percent" in name else 1
         for cell, own in zip(cells, sets, strict=True):
@@ -839,7 +799,7 @@ def test_both_sets_together_and_time_in_the_zones_are_what_their_records_come_to
         )
 
     (table,) = zone_time.section(gather(folders[0]).setting).tables
-    part = page.partition("### Time in the zones")[2].partition("\n### ")[0].partition("After 2 M frames")[2]
+    part = section_of(EVIDENCE, "Time in the zones").partition("After 2 M frames")[2]
     names = {"11,600 frames": "planner on a learnt map"}
     told = 0
     for learner, agent, _, *figures in table.rows:
@@ -856,7 +816,7 @@ def test_both_sets_together_and_time_in_the_zones_are_what_their_records_come_to
 
 
 def test_the_stratified_test_counts_every_way_to_deal_runs_out() -> None:
-    both = runpy.run_path(str(DOCS.parent / "benchmarks" / "both_sets.py"))
+    both = benchmark("both_sets")
     apart, alike = (np.array([1.0, 2.0]), np.array([3.0, 4.0])), (np.array([1.0, 4.0]), np.array([2.0, 3.0]))
     assert both["stratified_p"]([apart, apart]) == 2 / 36  # all runs of both sets on their sides, or all changed
     assert both["stratified_p"]([alike, alike]) == 1.0

@@ -1,9 +1,41 @@
 """What pages say, held against what records hold."""
 
+import json
 import re
+import runpy
 from pathlib import Path
+from typing import Any
+
+from clearway.experiments.section import Claim
 
 DOCS = Path(__file__).parents[2] / "docs"
+RESULTS, EVIDENCE = ((DOCS / name).read_text(encoding="utf-8") for name in ("results.md", "evidence.md"))
+
+
+def benchmark(name: str) -> dict[str, Any]:
+    """What a benchmark defines."""
+    return runpy.run_path(str(DOCS.parent / "benchmarks" / f"{name}.py"))
+
+
+def unpack(record: str, folder: Path) -> None:
+    """Write what a record holds to a new folder."""
+    benchmark("records")["unpack"](DOCS / "records" / f"{record}.tar.xz", folder)
+
+
+def section_of(page: str, title: str) -> str:
+    """What stands under the page's first heading that begins so, down to the next of that level."""
+    return page.partition(f"### {title}")[2].partition("\n### ")[0]
+
+
+def rows_of(text: str) -> list[list[str]]:
+    """Cells of all rows of its tables, headings too."""
+    return [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+
+
+def seconds_of_runs(folder: Path, runs: str = "*") -> list[float]:
+    """How long each training of a folder of an experiment took."""
+    ends = [path.read_text(encoding="utf-8").splitlines()[-1] for path in folder.glob(f"runs/{runs}/metrics.jsonl")]
+    return [json.loads(end)["seconds"] for end in ends]
 
 
 def numbers(cell: str) -> list[str]:
@@ -22,3 +54,27 @@ def assert_written(written: str, value: float, what: str) -> None:
     """A figure is written to its last digit."""
     digits = len(written.partition(".")[2])
     assert abs(float(written) - value) <= 0.5001 * 10**-digits, f"{what}: written {written}, recorded {value}"
+
+
+def assert_shown(cell: str, value: float, interval: str, scale: float = 1) -> None:
+    """A cell shows a mean and its interval."""
+    mean, *ends = numbers(cell.replace(",", ""))
+    assert_written(mean, scale * value, cell)
+    for written, end in zip(ends, numbers(interval.replace(",", "")), strict=True):
+        assert_written(written, scale * float(end), cell)
+
+
+def ends_of(interval: str) -> list[float]:
+    """Those of an interval in a report."""
+    return [float(end) for end in numbers(interval.replace(",", ""))]
+
+
+def assert_judged(
+    claim: Claim, verdict: str, p: str, corrected: str, own: str = "", other: str = "", difference: str = ""
+) -> None:
+    """A claim's row shows its verdict, its p and what figures the row has, as the claim's evidence writes them."""
+    own, other, difference = (cell.replace("(", "[").replace(")", "]") for cell in (own, other, difference))
+    assert verdict == claim.verdict, claim.text
+    assert f": {own}" in claim.evidence and f" against {other}" in claim.evidence, claim.text
+    assert f", difference {difference}" in claim.evidence, claim.text
+    assert f"p = {p}, for " in claim.evidence and f" claims {corrected} (Holm)" in claim.evidence, claim.text
