@@ -1,0 +1,326 @@
+"""What the pages say of agents of the published settings is what their records come to."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clearway.evaluation.across_seeds import mean_estimate
+from clearway.experiments import table1
+from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps
+from clearway.experiments.correction import holm
+from clearway.experiments.groups import PAIR, compared
+from clearway.experiments.reproduce import REQUEST_FILE, gather
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import judged_less
+from helpers.published import (
+    EVIDENCE,
+    RESULTS,
+    assert_judged,
+    assert_shown,
+    assert_written,
+    numbers,
+    rows_of,
+    seconds_of_runs,
+    section_of,
+    unpack,
+)
+
+
+@pytest.mark.slow
+def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    unpack("hard-bathroom", tmp_path / "hard")
+    sections = gather(tmp_path / "hard").sections
+    assert [section.name for section in sections] == ["fig4", "table2", "table3"]
+    page = section_of(EVIDENCE, "Hard targets")
+    page = page.partition("Seeds 0 to 4")[0]
+    lines = rows_of(page)
+    for section, frames in zip(sections[1:], ("1 M", "2 M"), strict=True):
+        assert not section.missing
+        table, late = section.tables[0], section.tables[-1]
+        for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+            ((settled, *cells, lost),) = [cells for agent, of, *cells in lines if (agent, of) == (row["agent"], frames)]
+            settled, ran = settled.split("), ")
+            assert_shown(settled, row["frames"], row["95 %"])
+            assert ran == f"{row['settled']} of 5"
+            for figure, cell in zip(("steps", "collisions"), cells, strict=True):
+                (own,) = [r for r in table.rows if r[0] == figure and r[1:3] == ("paper", row["agent"])]
+                found = dict(zip(table.headings, own, strict=True))
+                assert_shown(cell, found["average"], found["95 %"])
+                assert lost == found["failed targets"]
+        solved = {row[1] for row in table.rows if row[0] == "steps" and row[3] == 5 and f"{row[7]:.2f}" == "10.88"}
+        assert solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
+    shown = rows_of(section_of(RESULTS, "Hard targets"))
+    for agent in ("shortest", "bump", "collision-aware"):
+        ((_, *pairs),) = [line for line in shown if line[0] == agent]
+        for pair, section in zip(pairs, sections[1:], strict=True):
+            for figure, written in zip(("steps", "collisions"), pair.split(", "), strict=True):
+                (own,) = [r for r in section.tables[0].rows if r[0] == figure and r[1:3] == ("paper", agent)]
+                assert_written(written.replace(",", ""), own[7], agent)
+    claims = [claim for section in sections for claim in section.claims]
+    for claim in claims:
+        ((verdict, *cells, p, corrected),) = [
+            cells for text, *cells in lines if text == claim.text.removeprefix("paper: ")
+        ]
+        assert_judged(claim, verdict, p, corrected, *cells)
+    assert sum(len(line) == 7 for line in lines) == len(claims) + 1
+    seconds = seconds_of_runs(tmp_path / "hard", "a2c-*")
+    assert len(seconds) == 40 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
+
+
+def four_rooms(record: str, folder: Path) -> Iterator[tuple[dict[str, Any], int, dict[str, np.ndarray], str]]:
+    """Of each trial of a record: its run, after how many million frames, its episodes, and which targets were lost."""
+    unpack(record, folder)
+    for trial in sorted(folder.glob("runs/*/trials/*.json")):
+        content = json.loads(trial.read_text(encoding="utf-8"))
+        run = json.loads((trial.parents[1] / "run.json").read_text(encoding="utf-8"))
+        episodes = {name: np.array(column) for name, column in content["episodes"].items()}
+        lost = set(episodes["target"][~episodes["reached"].astype(bool)].tolist())
+        yield run, 5 if content["about"]["halfway"] else 10, episodes, f"{len(lost)} of 20"
+
+
+def row_of(begin: str) -> list[str]:
+    """Cells of the row of the evidence that begins so, without commas."""
+    lines = EVIDENCE.splitlines()
+    (line,) = [line for line in lines if line.startswith(begin)]
+    return line.removeprefix(begin).replace(",", "").strip(" |").split(" | ")
+
+
+def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    trials = list(four_rooms("four-rooms-otherwise", tmp_path / "four"))
+    assert len(trials) == 8
+    for run, frames, episodes, lost in trials:
+        learner = run["learner"]
+        changed = "whitened" if learner["whiten_features"] else "3 x rate"
+        assert learner["lr_start"] == (0.0007 if changed == "whitened" else 0.0021)
+        begin = f"| {run['reward']['name']}, {changed} | {frames} M | "
+        steps, collisions, failed = row_of(begin)
+        assert_written(steps, episodes["steps"].mean(), begin)
+        assert_written(collisions, episodes["collisions"].mean(), begin)
+        assert failed == lost
+
+
+@pytest.mark.slow
+def test_four_rooms_on_the_eyes_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    trials = list(four_rooms("four-rooms-eyes", tmp_path / "four"))
+    assert len(trials) == 4
+    for run, frames, episodes, lost in trials:
+        assert {scene["encoder"] for scene in run["scenes"]} == {"clearway"}
+        assert [scene["name"] for scene in run["scenes"]] == ["bathroom", "bedroom", "living_room", "kitchen"]
+        begin = f"| {run['reward']['name']}, by the eyes | {frames} M | "
+        *cells, failed = row_of(begin)
+        assert failed == lost
+        room = np.array([number for number, scene in enumerate(run["scenes"]) for _ in scene["targets"]])
+        for number, cell in enumerate(cells):
+            own = room[episodes["target"]] == number
+            steps, collisions, arrive, _ = cell.split()
+            assert_written(steps, episodes["steps"][own].mean(), begin)
+            assert_written(collisions, episodes["collisions"][own].mean(), begin)
+            assert_written(arrive, 100 * episodes["reached"][own].mean(), begin)
+            assert arrive != "100" or episodes["reached"][own].all(), begin
+
+
+@pytest.mark.slow
+def test_the_bedroom_alone_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    folder = tmp_path / "bedroom"
+    unpack("bedroom", folder)
+    page = EVIDENCE.partition("### The bedroom alone")[2]
+    page = page.partition("\n## ")[0]
+    asked = json.loads((folder / REQUEST_FILE).read_text(encoding="utf-8"))
+    compared = 0
+    for millions, settled in (("2.5", []), ("5", [("shortest", 2.3, 3), ("collision-aware", 4.25, 2)])):
+        (folder / REQUEST_FILE).write_text(json.dumps({**asked, "frames": int(float(millions) * 1e6)}))
+        (section,) = gather(folder).sections
+        assert not section.missing
+        ends, late = section.tables[:2]
+        for _, agent, frames, _, failed, steps, between, collisions, between_collisions in ends.rows:
+            begin = f"| {agent} | {frames / 1e6:g} M | {millions} M |"
+            (line,) = [line for line in page.splitlines() if line.startswith(begin)]
+            written = line.removeprefix(begin).strip(" |").split(" | ")
+            for cell, value, interval in zip(written, (steps, collisions), (between, between_collisions), strict=False):
+                mean, _, low_to_high = cell.replace(",", "").partition(" ")
+                assert_written(mean, value, begin)
+                assert low_to_high == f"({interval.replace(',', '').replace(' to ', '-')})", begin
+            assert written[2] == failed
+            compared += 1
+        rows = {row[1]: row for row in late.rows}
+        for agent, mean, count in settled:
+            assert rows[agent][3:5] == (count, mean * 1e6)
+            assert f"`{agent}` after {mean:.2f} M" in page
+    assert compared == 8
+
+
+@pytest.mark.slow
+def test_the_bedroom_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    unpack("bedroom-fresh", tmp_path / "bedroom")
+    found = gather(tmp_path / "bedroom")
+    (section,) = found.sections
+    assert not section.missing
+    page = section_of(EVIDENCE, "The bedroom, of fresh seeds")
+    lines = rows_of(page)
+    ends, late = section.tables[:2]
+    for _, agent, frames, _, failed, steps, between, collisions, between_collisions in ends.rows:
+        ((*_, shown, bumps, lost),) = [line for line in lines if line[:2] == [agent, f"{frames / 1e6:g} M"]]
+        for cell, value, interval in ((shown, steps, between), (bumps, collisions, between_collisions)):
+            mean, *low_high = numbers(cell.replace(",", ""))
+            assert_written(mean, value, cell)
+            for written, end in zip(low_high, numbers(interval.replace(",", "")), strict=True):
+                assert_written(written, float(end), cell)
+        assert lost == failed
+    for _, agent, _, settled, frames, interval in late.rows:
+        ((*_, told, _, _, _),) = [line for line in lines if line[:2] == [agent, "5 M"]]
+        assert told == f"{frames:,.0f} ({interval.replace(' to ', '-')}), {settled} of 5"
+        results = rf"`{agent}`[^`]* after {frames / 1e6:.2f} M(?: frames)? \({'-'.join(numbers(millions(interval)))}\)"
+        assert re.search(results, RESULTS), results
+    for claim in section.claims:
+        text = claim.text.removeprefix("paper: ")
+        ((_, verdict, own, other, p, corrected),) = [line for line in lines if line[0] == text]
+        assert_judged(claim, verdict, p, corrected, own, other)
+    # the question's own two claims
+    setting, groups = found.setting, {group.agent: group for group in compared(found.setting, PAIR)}
+    world, mark = setting.world(), mark_steps(setting, setting.targets)
+    settled = {agent: frames_until_settled(setting.out, group, mark)[0] for agent, group in groups.items()}
+    scores = {agent: group.scores(setting.out, world.target_count) for agent, group in groups.items()}
+    bumps = [scores[agent].of("collisions") for agent in ("collision-aware", "shortest")]
+    claims = [
+        judged_less("sooner", "frames", settled["shortest"], settled["collision-aware"], ONE_TARGET),
+        judged_less("fewer", "collisions", *bumps, world.target_scene.numpy()),
+    ]
+    told = [line for line in lines if line[-1] in ("holds", "undecided")]
+    for claim, p_of_both, (_, difference, p, corrected, verdict) in zip(
+        claims, holm([claim.p for claim in claims]), told, strict=True
+    ):
+        apart = claim.numbers["difference"]
+        ends = re.findall(r"-?\d[\d,.]*", difference)
+        for written, value in zip(ends, (apart.value, *apart.interval), strict=True):
+            assert float(written.replace(",", "")) == pytest.approx(value, rel=0.01)
+        assert_written(p, claim.p, verdict)
+        assert_written(corrected, p_of_both, verdict)
+        assert verdict == claim.verdict
+    assert settled["shortest"].max() < settled["collision-aware"].min()
+    aware, shortest = (np.sort(own.mean(1)) for own in bumps)
+    assert aware[3] < shortest[0]
+    assert "have 0.046 to 0.092 collisions, fewer than all of `shortest` (0.228 to 0.296)" in page
+    for written, value in (("0.046", aware[0]), ("0.092", aware[3]), ("6.8", aware[4]), ("0.228", shortest[0])):
+        assert_written(written, value, "collisions")
+    seconds = seconds_of_runs(tmp_path / "bedroom")
+    assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
+
+
+def millions(interval: str) -> str:
+    """Frames of an interval, in millions."""
+    return " ".join(f"{int(end) / 1e6:.2f}" for end in numbers(interval.replace(",", "")))
+
+
+@pytest.mark.slow
+def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    unpack("off-grid-bathroom", tmp_path / "off-grid")
+    (section,) = gather(tmp_path / "off-grid").sections
+    assert not section.missing
+    (table,) = section.tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    lines = section_of(EVIDENCE, "Five seeds, published settings").splitlines()
+    figures = [heading for heading in table.headings[4:] if not heading.startswith("95 %")]
+    means = [row for row in rows if row["setting"] == "all settings, mean"]
+    assert len(means) == 6
+    names = {"nearest picture": "nearest picture", "walked": "random walk"}
+    for row in means:
+        name = names.get(str(row["learner"]), row["reward"])
+        (line,) = [line for line in lines if line.startswith(f"| {name} |") and line.count("|") == 8]
+        for cell, name in zip(line.strip("|").split("|")[1:], figures, strict=True):
+            scale = 1 if name == "contacts" else 100
+            ends = (float(end) for end in str(row[f"95 % of {name}"]).split(" to "))
+            for written, value in zip(re.findall(r"[\d.]+", cell), (float(str(row[name])), *ends), strict=True):
+                assert abs(float(written) - scale * value) <= (0.0051 if name == "contacts" else 0.051), (
+                    f"{row['reward']}, {name}"
+                )
+    under = [line.strip("| ").split(" | ") for line in lines if line.count("|") == 8 and "%, " in line]
+    assert [label for label, *_ in under] == [str(row["setting"]) for row in rows[6::6]]
+    for number, (label, *cells) in enumerate(under, start=1):
+        for cell, row in zip(cells, rows[6 * number : 6 * number + 6], strict=True):
+            success, contacts = cell.split(" %, ")
+            assert_written(success, 100 * row["success"], label)
+            assert_written(contacts, row["contacts"], label)
+    claims = [
+        line.strip("|").split("|") for line in lines if line.endswith(("undecided |", "holds |", "does not hold |"))
+    ]
+    assert len(claims) == len(section.claims) == 12
+    for (text, difference, p, corrected, verdict), claim in zip(claims, section.claims, strict=True):
+        assert claim.text.endswith(f": {text.strip()}")
+        found = claim.numbers["difference"]
+        assert found.interval is not None
+        told = f"{found.value:.3g} ({found.interval[0]:.3g} to {found.interval[1]:.3g})"
+        assert difference.strip() == told
+        assert f"p = {p.strip()}, for 6 claims {corrected.strip()} (Holm)" in claim.evidence
+        assert verdict.strip() == claim.verdict
+
+
+def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> None:
+    """What the pages say of each kind of agent: steps, collisions, and when its trainings settled."""
+    world, mark = setting.world(), mark_steps(setting, setting.targets)
+    scenes = world.target_scene.numpy()
+    for group in table1.all_groups(setting):
+        name = group.agent + group.learner.removeprefix("paper")
+        ((_, *cells, lost),) = [row for row in rows if row[0] == name]
+        scores, frames = group.scores(setting.out, world.target_count), frames_until_settled(setting.out, group, mark)
+        estimates = [mean_estimate(scores.of(figure), scenes) for figure in ("steps", "collisions")]
+        for cell, found in zip(cells, (*estimates, mean_estimate(frames[0], ONE_TARGET)), strict=True):
+            mean, *ends = numbers(cell.replace(",", ""))
+            assert_written(mean, found.value, cell)
+            for written, end in zip(ends, numbers(found.ends.replace(",", "")), strict=True):
+                assert_written(written, float(end), cell)
+        assert lost == "0 of 25" and frames[1] == 5
+    bumps = {
+        group.agent: group.scores(setting.out, world.target_count).of("collisions").mean(1)
+        for group in compared(setting, table1.REWARDS)
+    }
+    ends = [sorted(bumps[agent])[:: len(bumps[agent]) - 1] for agent in ("shortest", "collision-aware", "bump")]
+    (short, aware, bump), page = ends, EVIDENCE.replace("\n", " ")
+    worst = (
+        f"has {short[1]:.3f} collisions under `shortest`, {aware[1]:.3f} under `collision-aware`, {bump[1]:.3f} under"
+    )
+    assert f"{worst} `bump`; the best {short[0]:.3f}, {aware[0]:.3f} and {bump[0]:.3f}." in page
+    settled = {
+        (group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0]
+        for group in table1.all_groups(setting)
+    }
+    early, late = settled["paper, unclipped", "shortest"], settled["paper", "collision-aware"]
+    assert early.max() < late.min()
+    assert f"settles sooner ({early.mean():,.0f} frames)" in RESULTS
+
+
+@pytest.mark.slow
+def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    unpack("paper-bathroom", tmp_path / "paper")
+    sections = gather(tmp_path / "paper").sections
+    assert [section.name for section in sections] == ["table1", "fig3", "fig4", "fig5"]
+    page = section_of(EVIDENCE, "The paper's claims of fresh seeds")
+    rows = rows_of(page)
+    claims = [claim for section in sections for claim in section.claims]
+    for claim in claims:
+        text = claim.text.removeprefix("paper: ").removeprefix("paper, ")
+        ((_, verdict, own, other, apart, p, corrected),) = [row for row in rows if row[0] == text]
+        assert_judged(claim, verdict, p, corrected, own, other, apart)
+    assert sum(row[1:2] in (["holds"], ["undecided"], ["does not hold"]) for row in rows) == len(claims) == 15
+    check_the_agents_of_fresh_seeds(gather(tmp_path / "paper").setting, rows)
+    solved = {
+        row[1]
+        for row in sections[0].tables[0].rows
+        if row[0] == "steps" and row[3:5] == (5, "0 of 25") and f"{row[7]:.2f}" == "8.79"
+    }
+    assert not sections[0].missing and solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
+    seconds = seconds_of_runs(tmp_path / "paper", "a2c-*")
+    assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
+    asked = [claim for claim in claims if not claim.further]
+    counts = [sum(claim.verdict == verdict for claim in asked) for verdict in ("holds", "does not hold", "undecided")]
+    assert len(asked) == 11
+    words = {2: "two", 4: "four", 5: "five"}
+    holds, fails, open_ = (words[count] for count in counts)
+    assert (
+        f"Of eleven claims asked of fresh seeds, corrected by table, {holds} hold, {fails} do not, {open_} are"
+        in RESULTS
+    )
