@@ -23,12 +23,16 @@ from helpers.published import (
     assert_judged,
     assert_shown,
     assert_written,
+    check_beside,
     numbers,
     rows_of,
     seconds_of_runs,
     section_of,
     unpack,
 )
+
+BESIDE = {"planner on a learnt map", "nearest picture", "shortest path", "random walk"}
+LEARNERS = {"Q-learning", "behaviour cloning"}
 
 
 @pytest.mark.slow
@@ -61,6 +65,11 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
             for figure, written in zip(("steps", "collisions"), pair.split(", "), strict=True):
                 (own,) = [r for r in section.tables[0].rows if r[0] == figure and r[1:3] == ("paper", agent)]
                 assert_written(written.replace(",", ""), own[7], agent)
+    fixed = {f"soft fixed point ({name})" for name in ("shortest", "bump", "collision-aware")}
+    assert check_beside(lines, sections[1].tables[0].rows, 3, 4) == BESIDE | LEARNERS | fixed
+    hard = gather(tmp_path / "hard").setting.out / "hard_targets.json"
+    (found,) = json.loads(hard.read_text(encoding="utf-8"))["found"].values()
+    assert f"hardness {min(found['hardness']):.0f} to {max(found['hardness']):.0f} where" in page
     claims = [claim for section in sections for claim in section.claims]
     for claim in claims:
         ((verdict, *cells, p, corrected),) = [
@@ -312,6 +321,7 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
         for row in sections[0].tables[0].rows
         if row[0] == "steps" and row[3:5] == (5, "0 of 25") and f"{row[7]:.2f}" == "8.79"
     }
+    assert check_beside(rows, sections[0].tables[0].rows, 1, 2) == BESIDE | LEARNERS
     assert not sections[0].missing and solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
     seconds = seconds_of_runs(tmp_path / "paper", "a2c-*")
     assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page

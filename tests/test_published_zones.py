@@ -20,6 +20,7 @@ from helpers.published import (
     assert_shown,
     assert_written,
     benchmark,
+    check_beside,
     ends_of,
     numbers,
     rows_of,
@@ -166,7 +167,10 @@ def check_runs_one_by_one(setting: Setting, shuffled: str, time_in: str) -> None
     ranges = [f"{each.min():.1f} to {each.max():.1f} %" for each in (*others, own)]
     told = f"Settled runs differ, too: {ranges[0]} under `shortest`, {ranges[1]} under `bump`, against {ranges[2]}"
     assert told.removesuffix(" %") in time_in
-    assert f"{bumps['bump'].mean():.2f} collisions, `shortest` {bumps['shortest'].mean():.2f}" in time_in
+    arrived = scores["bump"].of("success")
+    told = f"fails {(arrived < 1).sum()} of 40 targets ({100 * arrived.mean():.2f} % of its episodes arrive) and has "
+    told += f"{bumps['bump'].mean():.2f} collisions, `shortest` {bumps['shortest'].mean():.2f}, `collision-aware` "
+    assert f"{told}{aware.mean():.3f};" in time_in.replace("\n", " ")
     assert sum(map(len, others)) == 9 and "settled runs (nine of 16) exceed all of its" in RESULTS
     assert min(each.min() for each in others) > own.max()
 
@@ -190,6 +194,8 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
             assert_shown(cell, found["average"], found["95 %"])
             assert lost == found["failed targets"]
     assert [claim.verdict for claim in shuffled.claims] == ["undecided", "holds", "holds"]
+    beside = check_beside(lines, table.rows, 2, 3)
+    assert beside == {"planner on a learnt map", "nearest picture", "random walk"}
     check_results_of_shuffles(table, late)
 
     time_in = section_of(EVIDENCE, "Time in the zones")
@@ -207,7 +213,7 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
         else:
             begin = "random walk" if agent == "random walk" else "planner on a learnt map; nearest picture"
             cells = next(cells for name, *cells in shares if name.startswith(begin))
-            for cell, value in zip(cells, (100 * share, visits, 100 * near, steps), strict=True):
+            for cell, value in zip(cells[:4], (100 * share, visits, 100 * near, steps), strict=True):
                 assert_written(numbers(cell)[0], value, cell)
     assert [claim.verdict for claim in zones.claims] == ["holds"] * 4
     check_runs_one_by_one(gather(tmp_path / "shuffles").setting, part.replace("\n", " "), time_in)

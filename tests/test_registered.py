@@ -16,7 +16,7 @@ PAGE = ROOT / "docs" / "registered.md"
 COMMIT = r"[0-9a-f]{7}"
 ROW = re.compile(
     rf"^\| (?P<questions>[^|]+) \| (?P<written>{COMMIT}(, (changed: )?{COMMIT})*)"
-    rf" \| (?P<answered>{COMMIT}|not yet) \|$",
+    rf" \| (?P<answered>{COMMIT}|not yet|never: [^|]+) \|$",
     re.M,
 )
 ROWS = [
@@ -39,7 +39,10 @@ ASKED_FIRST = {
     "paper-bathroom": {51, 52},
     "shuffles-bathroom": {61, 62},
 }
-"""Records whose runs tell when they were begun, and the questions written before all of them."""
+"""Records of which runs tell when they were begun, and the questions written before these.
+
+Of paper-bathroom only Q-learning and cloning tell it, run after the answer: that shows nothing of 51 and 52.
+"""
 
 
 def git(*words: str) -> subprocess.CompletedProcess[str]:
@@ -67,7 +70,7 @@ def test_every_row_names_commits_or_says_why_not() -> None:
 def test_a_question_was_written_before_it_was_answered(questions: str, written: list[str], answered: str) -> None:
     for commit in written:
         assert commit != answered
-        end = "HEAD" if answered == "not yet" else answered
+        end = answered if re.fullmatch(COMMIT, answered) else "HEAD"
         assert git("merge-base", "--is-ancestor", commit, end).returncode == 0, questions
 
 

@@ -49,7 +49,10 @@ def test_three_claims_are_made_of_each_learner(tmp_path: Path) -> None:
     assert {"own shuffle", "soft fixed point (shuffle-0, unclipped)"} < agents
 
 
-def test_each_claim_compares_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("arrives", "verdicts"), [(1.0, ["holds"] * 3), (0.9, ["holds", "holds", "undecided"])])
+def test_each_claim_compares_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arrives: float, verdicts: list[str]
+) -> None:
     setting = small_setting(tmp_path, seeds=5)
     setting = replace(setting, learners={"paper": setting.learners["paper"]})
     places = {"collision-aware": 1.0, "own shuffle": 2.0, "shortest": 3.0}
@@ -61,6 +64,8 @@ def test_each_claim_compares_what_it_says(tmp_path: Path, monkeypatch: pytest.Mo
         values = np.ones((5, count, len(METRIC_NAMES)))
         values[:, :, METRIC_NAMES.index("collisions")] = places[group.agent] + 0.01 * np.arange(5)[:, None]
         values[:, :, METRIC_NAMES.index("steps")] = 9.0 - places[group.agent]
+        if group.agent == "collision-aware":
+            values[:, :, METRIC_NAMES.index("success")] = arrives
         return Scores(tuple(range(5)), values)
 
     monkeypatch.setattr(convergence, "settled_by_seed", settled)
@@ -68,4 +73,4 @@ def test_each_claim_compares_what_it_says(tmp_path: Path, monkeypatch: pytest.Mo
     claims = corrected(shuffles.section(setting)).claims
     means = [[claim.numbers[name].value for name in ("first", "second")] for claim in claims]
     assert means == [pytest.approx(pair) for pair in ([1002, 2002], [2002, 3002], [1.02, 2.02])]
-    assert [claim.verdict for claim in claims] == ["holds"] * 3
+    assert [claim.verdict for claim in claims] == verdicts

@@ -44,6 +44,7 @@ def test_shares_are_those_of_the_episodes(setting: Setting) -> None:
         shares.append((sum(share[:3]) / 3 + sum(share[3:]) / 2) / 2)  # scene by scene
     assert rows["bump"]["share of steps in the collision zone"] == pytest.approx(sum(shares) / 2)
     assert {"shortest", "bump", "collision-aware", "7,500 frames", "random walk"} == set(rows)
+    assert [agent for agent, row in rows.items() if row["seeds"] is None] == ["random walk"]
 
 
 @pytest.fixture

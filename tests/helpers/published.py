@@ -3,6 +3,7 @@
 import json
 import re
 import runpy
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ def section_of(page: str, title: str) -> str:
 
 def rows_of(text: str) -> list[list[str]]:
     """Cells of all rows of its tables, headings too."""
-    return [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    lines = [line for line in text.splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
 
 
 def seconds_of_runs(folder: Path, runs: str = "*") -> list[float]:
@@ -69,10 +71,45 @@ def ends_of(interval: str) -> list[float]:
     return [float(end) for end in numbers(interval.replace(",", ""))]
 
 
+UNTRAINED = {"q-learning": "Q-learning", "bc": "behaviour cloning"}
+
+
+def check_beside(rows: list[list[str]], recorded: Sequence[Sequence[Any]], steps: int, collisions: int) -> set[str]:
+    """What stands beside the agents in a page's table: its steps and collisions, in these columns, are recorded.
+
+    Args:
+        rows: of the page's table; a row may name several, with one figure each or one of all.
+        recorded: rows of a report's table of steps and collisions.
+        steps, collisions: where they stand in a row.
+
+    Returns:
+        Whom the page names.
+    """
+    known: dict[str, dict[str, float]] = {}
+    for figure, learner, agent, *_, average, _, _ in recorded:
+        own = learner in ("exact", "walked", "paper")
+        known.setdefault(agent if own else UNTRAINED.get(learner, learner), {})[figure] = average
+    told: set[str] = set()
+    for row in rows:
+        fixed = row[0].removeprefix("soft fixed points: ")
+        names = [part.partition(",")[0] for part in row[0].split("; ")]
+        if fixed != row[0]:
+            names = [f"soft fixed point ({name})" for name in fixed.split(", ")]
+        if set(names) & {"shortest", "bump", "collision-aware", "own shuffle"} or not set(names) <= set(known):
+            continue
+        for figure, column in (("steps", steps), ("collisions", collisions)):
+            written = row[column].split(", " if fixed != row[0] else "; ")
+            for name, one in zip(names, written * (len(names) // len(written)), strict=True):
+                assert_written(one.replace(",", ""), known[name][figure], f"{figure} of {name}")
+        told |= set(names)
+    return told
+
+
 def assert_judged(
     claim: Claim, verdict: str, p: str, corrected: str, own: str = "", other: str = "", difference: str = ""
 ) -> None:
     """A claim's row shows its verdict, its p and what figures the row has, as the claim's evidence writes them."""
+    assert own or difference, "a row shows figures"
     own, other, difference = (cell.replace("(", "[").replace(")", "]") for cell in (own, other, difference))
     assert verdict == claim.verdict, claim.text
     assert f": {own}" in claim.evidence and f" against {other}" in claim.evidence, claim.text

@@ -315,6 +315,18 @@ def in_corridor(folder: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> R
     return load_run_in_scene(folder / "run", files=[folder / "corridor.h5"])
 
 
+OWN_ANSWER = """
+    def in_scene(self, index):
+        found = super().in_scene(index)
+        plain = found.forward
+
+        def forward(history, target):
+            p, v = plain(history, target)
+            return {}
+
+        found.forward = forward
+        return found
+"""
 OWN_FORWARD = """
     def in_scene(self, index):
         found = super().in_scene(index)
@@ -346,6 +358,24 @@ def test_a_package_s_network_that_fails_while_walking_is_its_fault(tmp_path, mon
     state = agent.reset(features, np.zeros(1, np.int64))
     with pytest.raises(PluginError, match=rf"^{SOURCE}: its network failed \(ZeroDivisionError: division by zero\)"):
         agent.act(features, state)
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ("(p.tolist(), v)", "AttributeError: 'list' object has no attribute 'shape'"),
+        ("(p, v[:, 0])", r"ValueError: gives tensor\(\[.*, expected \(1, 1\) finite numbers"),
+        ("(p[:, :2], v)", r"ValueError: gives tensor\(\[\[.*, expected \(1, 4\) finite numbers"),
+        ("(p * float('nan'), v)", r"ValueError: gives tensor\(\[\[nan.*, expected \(1, 4\) finite numbers"),
+        ("(p,)", "ValueError: not enough values to unpack"),
+    ],
+)
+def test_answers_of_a_package_s_network_are_looked_at(tmp_path, monkeypatch, answer, told) -> None:
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(OWN_ANSWER.format(answer)))
+    agent = NetworkAgent(chosen.trained, chosen.index)
+    features = {agent.sees[0]: np.asarray(SCENE.features[:1])}
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: its network failed \({told}.*\. Ask its authors"):
+        agent.act(features, agent.reset(features, np.zeros(1, np.int64)))
 
 
 def test_an_encoder_that_fails_is_not_the_package_s_fault(tmp_path, monkeypatch) -> None:

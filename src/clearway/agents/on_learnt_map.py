@@ -102,8 +102,9 @@ def nearest_pictures(next_state: np.ndarray, features: np.ndarray) -> np.ndarray
 
 
 def nearest(features: np.ndarray, poses: np.ndarray, pictures: np.ndarray) -> np.ndarray:
-    """(B, F), (P,), (P, F) float64 -> (B,): of some poses that whose picture is nearest, by Euclidean distance."""
-    distance = (pictures**2).sum(axis=1) - 2 * features.astype(np.float64) @ pictures.T  # but for a term of B
+    """(B, F), (P,), (P, F) float64 -> (B,): the pose, among P, whose picture is nearest by Euclidean distance."""
+    alike = features.astype(np.float64) @ pictures.T
+    distance = (pictures**2).sum(axis=1) - 2 * alike  # squared, less what is the same for all poses
     return poses[distance.argmin(axis=1)]
 
 

@@ -13,6 +13,7 @@ from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, is_our
 from clearway.model.policy import ScenePolicy
 from clearway.perception.encoder import Encoder
 from clearway.plugins import find_plugin
+from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.world import World
 
 if TYPE_CHECKING:
@@ -62,4 +63,8 @@ class NetworkAgent(FeatureAgent):
     def _asked(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         """What the network says, see `ScenePolicy`."""
         with faults_of_agent(self._trained, "its network"):
-            return super()._asked(history, target)
+            answers = super()._asked(history, target)
+            for found, width in zip(answers, (ACTION_COUNT, 1), strict=True):
+                if found.shape != (len(history), width) or not found.isfinite().all():
+                    raise ValueError(f"gives {found!r:.40}, expected ({len(history)}, {width}) finite numbers")
+        return answers
