@@ -7,11 +7,10 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 
-from criteria import Criteria, Quality, quality
-
 from clearway.agents.by_pose import PoseAgent, network_on_poses
+from clearway.evaluation.criteria import Criteria, Quality, quality
 from clearway.evaluation.episodes import run_episodes
-from clearway.evaluation.metrics import SC_STEPS
+from clearway.evaluation.metrics import SC_STEPS, by_target
 from clearway.evaluation.summary import Evaluation, Protocol, summarise
 from clearway.learn.learner import OnFeatures
 from clearway.learn.named_tensors import part_of
@@ -117,7 +116,8 @@ def learning_curve(
             seed=final.seed,
         )
         evaluation = summarise(trainer.world, table, request.reward.name, encoder, final)
-        return Curve(request.seed, tuple(checks), evaluation, quality(trainer.world, table), seconds, trainer.frames)
+        found = quality(trainer.world, by_target(table, trainer.world.target_count))
+        return Curve(request.seed, tuple(checks), evaluation, found, seconds, trainer.frames)
 
 
 def _checked(trainer: Learning, episodes: int) -> Quality:
@@ -128,7 +128,7 @@ def _checked(trainer: Learning, episodes: int) -> Quality:
         step_limit=SC_STEPS,
         seed=CHECK_SEED,
     )
-    return quality(trainer.world, table)
+    return quality(trainer.world, by_target(table, trainer.world.target_count))
 
 
 def agent_of(trainer: Learning) -> PoseAgent:

@@ -8,11 +8,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from criteria import quality
-
 from clearway.agents.agent import Agent
+from clearway.evaluation.criteria import quality
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, run_episodes
-from clearway.evaluation.metrics import SC_STEPS
+from clearway.evaluation.metrics import SC_STEPS, by_target
 from clearway.world.world import World
 
 CHECK_SEED = 1
@@ -24,7 +23,7 @@ PAUSE_SHARE = 0.05  # of the training time so far: the precision of the answer
 def solved_count(world: World, agent: Agent, episodes: int = EPISODES_PER_TARGET) -> int:
     """How many targets are solved."""
     table = run_episodes(world, agent, episodes_per_target=episodes, step_limit=SC_STEPS, seed=CHECK_SEED)
-    return quality(world, table).solved_targets
+    return quality(world, by_target(table, world.target_count)).solved_targets
 
 
 class SolvingClock:

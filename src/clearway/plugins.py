@@ -28,7 +28,7 @@ BUILT_IN: dict[Kind, tuple[str, ...]] = {
     "importers": ("thor-v1", "floor-plan", "images", "savn", "avd", "ai2thor", "mjcf", "miniworld"),
     "algorithms": ("ppo", "a2c", "a3c", "bc", "q-learning", "recurrent", "adapt", "default", "paper", "paper-a3c"),
     "experiments": (
-        *("table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis", "memory"),
+        *("table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "analysis", "memory", "quality"),
         *("zones-or-step", "shuffles", "step-size", "zone-time", "zone-levels", "ablations", "off-grid", "all"),
     ),
 }

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from clearway.evaluation import metrics
-from clearway.evaluation.episodes import EpisodeTable
 from clearway.world.world import World
 
 
@@ -69,10 +68,14 @@ class Quality:
         return {**asdict(self), "path_ratio": self.path_ratio}
 
 
-def quality(world: World, table: EpisodeTable) -> Quality:
-    """The quality that episodes show; every target of the world occurs in the table."""
+def quality(world: World, per_target: np.ndarray) -> Quality:
+    """The quality that episodes show.
+
+    Args:
+        world: M targets.
+        per_target: (M, J) their figures, as of `metrics.by_target`.
+    """
     names = metrics.METRIC_NAMES
-    per_target = metrics.by_target(table, world.target_count)
     mean = metrics.average(metrics.by_scene(per_target, world.target_scene.cpu().numpy()))
     average = dict(zip(names, mean.tolist(), strict=True))
     ratios = per_target[:, names.index("path_ratio")]

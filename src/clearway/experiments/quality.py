@@ -1,0 +1,116 @@
+"""Whether agents are good enough: every training by itself, against criteria that no mean can hide a target from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from clearway.evaluation.criteria import Criteria, Quality, quality
+from clearway.experiments.convergence import settling_table
+from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
+from clearway.experiments.plan import RANDOM_WALK, Job
+from clearway.experiments.section import Claim, ReportTable, Section, Value, Verdict
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import LEAST_RUNS, further
+from clearway.reward import COLLISION_AWARE
+from clearway.world.world import World
+
+NAME = "quality"
+CRITERIA = Criteria()
+CALLED = {
+    "solved_targets": "targets solved",
+    "path_ratio": "x the shortest path",
+    "worst_path_ratio": "worst target",
+    "collisions": "collisions",
+}
+"""What is judged, by the criterion's name."""
+HEADINGS = ("learner", "agent", "seed", *CALLED.values(), "which is the worst", "misses")
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done: the main experiment's agents under the collision-aware reward."""
+    return all_jobs(_groups(setting))
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    groups = _groups(setting)
+    return Section(
+        name=NAME,
+        title="Good enough?",
+        text=(
+            "Every training under the collision-aware reward against criteria: each target solved (all its episodes "
+            f"arrive in under 500 steps), steps at most {CRITERIA.path_ratio - 1:.0%} above the shortest paths, on no "
+            f"target above {CRITERIA.worst_path_ratio - 1:.0%}, and fewer than {CRITERIA.collisions:g} collisions an "
+            "episode."
+        ),
+        tables=(_table(setting, groups), settling_table(NAME, setting, groups)),
+        claims=further(_claims(setting, groups)),
+        missing=all_missing(groups, setting.out),
+    )
+
+
+def _groups(setting: Setting) -> list[Group]:
+    return compared(setting, (COLLISION_AWARE,))
+
+
+def _found(world: World, scores: Scores) -> dict[int, Quality]:
+    """The quality of each run, by its seed."""
+    return {seed: quality(world, own) for seed, own in zip(scores.seeds, scores.values, strict=True)}
+
+
+def _missed(found: Quality) -> list[str]:
+    """What the criteria call those that are not met."""
+    met = found.met(CRITERIA)
+    return [called for name, called in CALLED.items() if not met[name]]
+
+
+def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
+    world, trial = setting.world(), setting.trial()
+    rows: list[tuple[Value, ...]] = []
+    for group in groups:
+        found = _found(world, group.scores(setting.out, world.target_count))
+        rows += [_row((group.learner, group.agent, seed), own) for seed, own in found.items()]
+    for mapped in on_maps(setting, trial):
+        rows += [_row((*mapped.called, seed), own) for seed, own in _found(world, mapped.scores).items()]
+    (walked,) = _found(world, random_walk(world, trial)).values()
+    rows.append(_row(("walked", RANDOM_WALK, None), walked))
+    notes = (
+        "Of all targets; means over scenes of their targets' means. The worst target is the one whose steps exceed its "
+        "shortest paths' the most, in its scene's own numbering.",
+        ABOUT_MAPS,
+    )
+    return ReportTable(NAME, "Against the criteria", HEADINGS, tuple(rows), notes)
+
+
+def _row(who: tuple[Value, ...], found: Quality) -> tuple[Value, ...]:
+    return (
+        *who,
+        f"{found.solved_targets} of {found.target_count}",
+        found.path_ratio,
+        found.worst_path_ratio,
+        found.collisions,
+        f"{found.worst_scene}, {found.worst_target}",
+        ", ".join(_missed(found)) or "none",
+    )
+
+
+def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
+    """Every training of a learner meets all criteria. This is counted, not estimated: there is no p."""
+    world = setting.world()
+    for group in groups:
+        found = _found(world, group.scores(setting.out, world.target_count))
+        met = sum(not _missed(own) for own in found.values())
+        told = f"{met} of {len(found)} trainings meet all criteria"
+        missed = {name for own in found.values() for name in _missed(own)}
+        told += f"; missed: {', '.join(name for name in CALLED.values() if name in missed)}." if missed else "."
+        yield Claim(f"{group.learner}: every training is good enough", *_judged(met, len(found), len(group.runs), told))
+
+
+def _judged(met: int, complete: int, planned: int, told: str) -> tuple[Verdict, str]:
+    """One training that misses a criterion is enough to say no; yes needs all of them."""
+    if complete < LEAST_RUNS:
+        return "undecided", f"{told} Fewer than {LEAST_RUNS} seeds decide nothing."
+    if met < complete:
+        return "does not hold", told
+    return ("holds", told) if complete == planned else ("undecided", f"{told} Still to come: {planned - complete}.")
