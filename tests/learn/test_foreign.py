@@ -39,6 +39,8 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape, fit_record
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.thor_v1 import write_scene
+from clearway.view.stage import StageRun
+from clearway.view.walker import Walker
 from helpers.made import corridor_scene, grid_scene
 from helpers.own_algorithm import CLASS, SMALL, SOURCE, forget_algorithm, offer_algorithm, with_body, with_trainer
 from helpers.small_eyes import seen_by_eyes
@@ -549,3 +551,37 @@ def test_what_is_ours_stands_behind_no_guard(tmp_path, monkeypatch) -> None:
 def test_rows_have_no_other_names_than_those_that_are_refused() -> None:
     trainer = clearway.QLearning(**SMALL).trainer(corridor_world(), COLLISION_AWARE, 0)
     assert set(metrics_row(trainer, {}, 0.0)) == set(OWN_FIGURES) - {"slowest_worker", "slowest_factor"}
+
+
+OWN_LOOKUP = """
+    def lookup(self, world):
+        {}
+        class Lookup(type(super().lookup(world))):
+            def for_targets(self, *given):
+                {}
+                found = super().for_targets(*given)
+                found.forward = lambda *asked: 1 / 0
+                return found
+        found = super().lookup(world)
+        found.__class__ = Lookup
+        return found
+"""
+
+
+@pytest.mark.parametrize("where", ["lookup", "for_targets", "walking"])
+def test_a_package_s_network_that_fails_in_the_viewer_is_its_fault(tmp_path, monkeypatch, where) -> None:
+    lines = ("1 / 0" if where == name else "pass" for name in ("lookup", "for_targets"))
+    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(OWN_LOOKUP.format(*lines)))
+    shown = StageRun("run", chosen.trained, (SCENE,))
+    if where == "lookup":
+        with pytest.raises(PluginError, match=rf"^{SOURCE}: lookup failed \(ZeroDivisionError"):
+            shown.make_ready()
+        return
+    shown.make_ready()
+    placed = shown.place("corridor", 8)
+    if where == "for_targets":
+        with pytest.raises(PluginError, match=rf"^{SOURCE}: lookup failed \(ZeroDivisionError"):
+            shown.on_poses(placed)
+        return
+    with pytest.raises(AgentError, match=rf"^{SOURCE}: failed \(ZeroDivisionError: division by zero\)"):
+        Walker(placed, 0, 3, shown.reward, seed=0, agent=shown.on_poses(placed))

@@ -62,6 +62,12 @@ def faults_of_agent(agent: TrainedAgent, what: str) -> Iterator[None]:
         yield
 
 
+def guarded_agent(trained: TrainedAgent, agent: Agent) -> Agent:
+    """The agent that was made of what a run has learnt; behind a guard where that is of a package's own class."""
+    plugin = None if is_ours(trained) else find_plugin("algorithms", trained.record.learner.algorithm)
+    return agent if plugin is None else Foreign(agent, str(plugin))
+
+
 class ForeignTrained:
     """Another's trained agent; see `TrainedAgent`. What else it has is found here too.
 

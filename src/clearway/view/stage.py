@@ -15,6 +15,7 @@ from clearway.agents.agent import Agent, State
 from clearway.agents.by_pose import network_on_poses
 from clearway.choices import ZoneLevel
 from clearway.errors import RunError
+from clearway.learn.foreign_agent import faults_of_agent, guarded_agent
 from clearway.learn.load import TrainedNetwork, load_network, run_scenes, run_tables
 from clearway.mapping.held import Held
 from clearway.model.lookup import LookupNetwork
@@ -91,10 +92,11 @@ class StageRun:
 
     @cached_property
     def _lookup(self) -> LookupNetwork:
-        return self.trained.lookup(self.world)
+        with faults_of_agent(self.trained, "lookup"):
+            return self.trained.lookup(self.world)
 
     def make_ready(self) -> None:
-        """Compute what all episodes share, so that one begins at once."""
+        """Compute what all episodes share, so that one begins at once. Raises PluginError: a package's agent fails."""
         assert self._lookup is not None
 
     def place(self, scene: str, target: int) -> World:
@@ -104,7 +106,9 @@ class StageRun:
     def on_poses(self, placed: World) -> Agent:
         """Itself in a world from `place`."""
         scale = self.trained.record.learner.reward_scale
-        return network_on_poses(self._lookup.for_targets(placed.target_state), placed, scale)
+        with faults_of_agent(self.trained, "lookup"):
+            agent = network_on_poses(self._lookup.for_targets(placed.target_state), placed, scale)
+        return guarded_agent(self.trained, agent)
 
     def holds(self, placed: World, start: int) -> None:
         """It keeps no map."""
