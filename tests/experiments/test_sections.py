@@ -184,6 +184,23 @@ def test_figures_halfway_and_in_the_end_are_those_of_their_trials(
         assert dict(zip(table.headings, row, strict=True))["steps"] == pytest.approx(expected)
 
 
+def test_figure4_stands_beside_what_memory_solves(sections: dict[str, Section]) -> None:
+    table, (first, _) = sections["fig4"].tables[0], sections["table1"].tables
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    beside = [row for row in rows if row["learner"] not in ("paper", "default")]
+    assert [(row["learner"], row["agent"], row["frames"], row["seeds"]) for row in beside] == [
+        ("planner on a learnt map", None, 7_500, 2),
+        ("nearest picture", None, 7_500, 2),
+        ("walked", "random walk", None, None),
+    ]
+    average = first.headings.index("average")
+    for row, agent in zip(beside, ("7,500 frames", "7,500 frames", "random walk"), strict=True):
+        of_table1 = {
+            other[0]: other[average] for other in first.rows if other[1:3] == (row["learner"], row["agent"] or agent)
+        }
+        assert {metric: row[metric] for metric in ("steps", "collisions")} == of_table1
+
+
 def test_bands_reach_from_the_smallest_to_the_largest_seed(setting: Setting, sections: dict[str, Section]) -> None:
     for figure in sections["fig4"].figures:
         for line in figure.series:

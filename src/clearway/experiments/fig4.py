@@ -8,9 +8,10 @@ import numpy as np
 
 from clearway.evaluation.across_seeds import failed_targets, mean_estimate
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.job import run_folder
-from clearway.experiments.plan import Job
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
+from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less, judged_no_more, with_failures
@@ -50,19 +51,17 @@ def _groups(setting: Setting) -> list[Group]:
 
 
 def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
-    world = setting.world()
+    world, trial = setting.world(), setting.trial()
+    scenes = world.target_scene.numpy()
     rows: list[tuple[Value, ...]] = []
     for group in groups:
         values = group.scores(setting.out, world.target_count)
         frames = group.runs[0].halfway if group.trial.halfway else group.runs[0].learner.frames
-        figures: list[Value] = [failed_targets(values.of("success")) if len(values) else None]
-        for metric in METRICS:
-            if not len(values):
-                figures += [None, None]
-                continue
-            found = mean_estimate(values.of(metric), world.target_scene.numpy())
-            figures += [found.value, found.ends]
-        rows.append((group.learner, group.agent, frames, len(values), *figures))
+        rows.append((group.learner, group.agent, frames, len(values), *_figures(values, scenes)))
+    for mapped in on_maps(setting, trial):
+        own = mapped.scores
+        rows.append((mapped.agent, None, mapped.frames, len(own), *_figures(own, scenes)))
+    rows.append(("walked", RANDOM_WALK, None, None, *_figures(random_walk(world, trial), scenes)))
     headings = (
         "learner",
         "agent",
@@ -74,7 +73,15 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
         "collisions",
         "95 % of collisions",
     )
-    return ReportTable("fig4", "Halfway and in the end", headings, tuple(rows))
+    return ReportTable("fig4", "Halfway and in the end", headings, tuple(rows), (ABOUT_MAPS,))
+
+
+def _figures(values: Scores, scenes: np.ndarray) -> list[Value]:
+    """Failed targets, then each metric and its interval; blank where nothing is complete."""
+    if not len(values):
+        return [None] * (1 + 2 * len(METRICS))
+    estimates = [mean_estimate(values.of(metric), scenes) for metric in METRICS]
+    return [failed_targets(values.of("success")), *(part for each in estimates for part in (each.value, each.ends))]
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
