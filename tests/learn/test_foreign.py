@@ -16,7 +16,7 @@ from clearway.deploy import export
 from clearway.deploy.export import export_onnx
 from clearway.deploy.from_run import RunAgent, RunInScene, load_run_in_scene
 from clearway.deploy.onnx_graph import AgentGraph
-from clearway.errors import AgentError, PluginError, RunError
+from clearway.errors import AgentError, ClearwayError, PluginError, RunError
 from clearway.experiments import live_trial
 from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
@@ -39,8 +39,9 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape, fit_record
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.thor_v1 import write_scene
-from clearway.view.stage import StageRun
-from clearway.view.walker import Walker
+from clearway.view.saved import save_page
+from clearway.view.stage import Stage, StageRun
+from clearway.view.viewing import Viewing
 from helpers.made import corridor_scene, grid_scene
 from helpers.own_algorithm import CLASS, SMALL, SOURCE, forget_algorithm, offer_algorithm, with_body, with_trainer
 from helpers.small_eyes import seen_by_eyes
@@ -559,8 +560,14 @@ OWN_LOOKUP = """
         class Lookup(type(super().lookup(world))):
             def for_targets(self, *given):
                 {}
-                found = super().for_targets(*given)
-                found.forward = lambda *asked: 1 / 0
+                found, asked = super().for_targets(*given), []
+                plain = found.forward
+                def forward(*rows):
+                    asked.append(rows)
+                    output = plain(*rows)
+                    {}
+                    return output
+                found.forward = forward
                 return found
         found = super().lookup(world)
         found.__class__ = Lookup
@@ -568,20 +575,56 @@ OWN_LOOKUP = """
 """
 
 
-@pytest.mark.parametrize("where", ["lookup", "for_targets", "walking"])
-def test_a_package_s_network_that_fails_in_the_viewer_is_its_fault(tmp_path, monkeypatch, where) -> None:
-    lines = ("1 / 0" if where == name else "pass" for name in ("lookup", "for_targets"))
-    chosen = in_corridor(tmp_path, monkeypatch, OWN_NETWORK.format(OWN_LOOKUP.format(*lines)))
-    shown = StageRun("run", chosen.trained, (SCENE,))
-    if where == "lookup":
-        with pytest.raises(PluginError, match=rf"^{SOURCE}: lookup failed \(ZeroDivisionError"):
-            shown.make_ready()
-        return
-    shown.make_ready()
-    placed = shown.place("corridor", 8)
-    if where == "for_targets":
-        with pytest.raises(PluginError, match=rf"^{SOURCE}: lookup failed \(ZeroDivisionError"):
-            shown.on_poses(placed)
-        return
-    with pytest.raises(AgentError, match=rf"^{SOURCE}: failed \(ZeroDivisionError: division by zero\)"):
-        Walker(placed, 0, 3, shown.reward, seed=0, agent=shown.on_poses(placed))
+def viewed(folder: Path, monkeypatch: pytest.MonkeyPatch, lookup: str = "", targets: str = "", walking: str = ""):
+    """A stage on which an agent walks whose network has these lines of its own."""
+    source = OWN_LOOKUP.format(*(line or "pass" for line in (lookup, targets, walking)))
+    chosen = in_corridor(folder, monkeypatch, OWN_NETWORK.format(source))
+    run = StageRun("run", chosen.trained, (SCENE,))
+    return Stage((SCENE,), {SCENE.name: CORRIDOR_TARGETS}, (run,))
+
+
+@pytest.mark.parametrize(("line", "told"), [("1 / 0", "ZeroDivisionError"), ("return None", "TypeError: gives None")])
+def test_a_package_s_network_that_cannot_be_shown_is_its_fault(tmp_path, monkeypatch, line, told) -> None:
+    stage = viewed(tmp_path, monkeypatch, lookup=line)
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: lookup failed \({told}"):
+        stage.agents[0].make_ready()
+
+
+BEGIN = {"do": "begin", "episode": "scene=corridor&start=2&target=8"}
+
+
+def test_a_package_s_network_without_targets_is_its_fault_in_the_viewer(tmp_path, monkeypatch) -> None:
+    answer = Viewing(viewed(tmp_path, monkeypatch, targets="1 / 0")).answer(BEGIN)
+    assert answer["kind"] == "refused" and f"{SOURCE}: its network failed (ZeroDivisionError" in answer["text"]
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("if len(asked) == 2: 1 / 0", f"{SOURCE}: failed (ZeroDivisionError: division by zero)"),
+        (
+            "if len(asked) == 2: output.scores.fill_(float('nan'))",
+            "the agent gave probabilities that are negative, not",
+        ),
+        ("if len(asked) == 2: output.value.fill_(float('nan'))", "the agent gave values that are not finite"),
+    ],
+)
+def test_a_package_s_network_that_fails_at_a_step_ends_the_episode(tmp_path, monkeypatch, line, told) -> None:
+    stage = viewed(tmp_path, monkeypatch, walking=line)
+    session = Viewing(stage)
+    assert session.answer(BEGIN)["kind"] == "episode"
+    answer = session.answer({"do": "step"})
+    assert answer["kind"] == "refused" and told in answer["text"]
+    after = session.answer({"do": "step"})
+    assert (after["steps"], after["ended"]) == ([None], [True])
+    assert len(session.walkers[0].steps) == 1  # what the page was told
+    with pytest.raises(ClearwayError) as caught:
+        save_page(stage, tmp_path / "page", first=BEGIN["episode"], episodes=1)
+    assert told in str(caught.value) and not (tmp_path / "page").exists()
+
+
+def test_values_of_a_package_s_network_are_looked_at_before_they_are_mapped(tmp_path, monkeypatch) -> None:
+    session = Viewing(viewed(tmp_path, monkeypatch, walking="if len(asked) == 2: output.value.fill_(float('nan'))"))
+    assert session.answer(BEGIN)["kind"] == "episode"
+    answer = session.answer({"do": "map", "walker": 0})
+    assert answer["kind"] == "refused" and "values that are not finite" in answer["text"]

@@ -35,6 +35,10 @@ def check_decisions(decisions: object, count: int) -> None:
     _check_array("actions", action, "int64", (count,))
     if told is not None:
         _check_array("probabilities", told, "float32", (count, ACTION_COUNT))
+    if decisions.value is not None:
+        _check_array("values", decisions.value, "float32", (count,))
+        if not np.isfinite(decisions.value).all():
+            raise AgentError("the agent gave values that are not finite. Give finite ones, or None")
     for name in ("certain", "arrived"):
         if (values := getattr(decisions, name)) is not None:
             _check_array(name, values, "bool", (count,))

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clearway.evaluation.across_seeds import failed_targets, mean_estimate
+from clearway.evaluation.across_seeds import failed_targets
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, compared, estimated, random_walk
 from clearway.experiments.job import run_folder
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
@@ -77,11 +77,8 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
 
 
 def _figures(values: Scores, scenes: np.ndarray) -> list[Value]:
-    """Failed targets, then each metric and its interval; blank where nothing is complete."""
-    if not len(values):
-        return [None] * (1 + 2 * len(METRICS))
-    estimates = [mean_estimate(values.of(metric), scenes) for metric in METRICS]
-    return [failed_targets(values.of("success")), *(part for each in estimates for part in (each.value, each.ends))]
+    failed = failed_targets(values.of("success")) if len(values) else None
+    return [failed, *estimated(values, METRICS, scenes)]
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:

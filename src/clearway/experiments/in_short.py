@@ -14,8 +14,8 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 
 def is_judged(sections: Sequence[Section]) -> bool:
-    """Whether any claim rests on enough runs to be judged at all; what is counted has a verdict and no p."""
-    return any(claim.p is not None or claim.verdict != "undecided" for section in sections for claim in section.claims)
+    """Whether any claim rests on enough runs to be judged at all."""
+    return any(claim.judged for section in sections for claim in section.claims)
 
 
 def in_short(sections: Sequence[Section]) -> tuple[str, ...]:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.evaluation.across_seeds import failed_targets, mean_estimate
-from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.evaluation.across_seeds import failed_targets
+from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, estimated, random_walk
 from clearway.experiments.learnt_maps import (
     ABOUT_MAPS,
     FRAMES_A_POSE,
@@ -73,11 +73,8 @@ def _table(setting: Setting, groups: Sequence[Group], mapped: Sequence[Mapped]) 
 
 
 def _figures(values: Scores, scenes: np.ndarray) -> tuple[Value, ...]:
-    if not len(values):
-        return (0, None, *(None for _ in METRICS for _ in range(2)))
-    estimates = [mean_estimate(values.of(metric), scenes) for metric in METRICS]
-    figures = (value for found in estimates for value in (found.value, found.ends))
-    return (len(values), failed_targets(values.of("success")), *figures)
+    failed = failed_targets(values.of("success")) if len(values) else None
+    return (len(values), failed, *estimated(values, METRICS, scenes))
 
 
 def _curve(mapped: Sequence[Mapped]) -> ReportFigure:

@@ -9,7 +9,7 @@ from clearway.experiments.convergence import settling_table
 from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
-from clearway.experiments.section import Claim, ReportTable, Section, Value, Verdict
+from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import LEAST_RUNS, further
 from clearway.reward import COLLISION_AWARE
@@ -104,13 +104,15 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
         told = f"{met} of {len(found)} trainings meet all criteria"
         missed = {name for own in found.values() for name in _missed(own)}
         told += f"; missed: {', '.join(name for name in CALLED.values() if name in missed)}." if missed else "."
-        yield Claim(f"{group.learner}: every training is good enough", *_judged(met, len(found), len(group.runs), told))
+        yield _judged(f"{group.learner}: every training is good enough", met, len(found), len(group.runs), told)
 
 
-def _judged(met: int, complete: int, planned: int, told: str) -> tuple[Verdict, str]:
-    """One training that misses a criterion is enough to say no; yes needs all of them."""
+def _judged(text: str, met: int, complete: int, planned: int, told: str) -> Claim:
+    """Of at least `LEAST_RUNS` trainings one that misses a criterion is enough to say no; yes needs all planned."""
     if complete < LEAST_RUNS:
-        return "undecided", f"{told} Fewer than {LEAST_RUNS} seeds decide nothing."
+        return Claim(text, "undecided", f"{told} Fewer than {LEAST_RUNS} seeds decide nothing.", judged=False)
     if met < complete:
-        return "does not hold", told
-    return ("holds", told) if complete == planned else ("undecided", f"{told} Still to come: {planned - complete}.")
+        return Claim(text, "does not hold", told)
+    if complete < planned:
+        return Claim(text, "undecided", f"{told} Still to come: {planned - complete}.")
+    return Claim(text, "holds", told)

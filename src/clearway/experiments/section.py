@@ -122,7 +122,9 @@ class Claim:
         verdict, evidence: for people.
         numbers: the evidence by name, for programs.
         further: the paper does not ask this.
-        p: that chance alone tells the two kinds apart as much; None where too few runs decide nothing.
+        p: that chance alone tells the two kinds apart as much; None where too few runs decide nothing, and of what is
+            counted.
+        judged: there are runs enough; without, the verdict is undecided.
     """
 
     text: str
@@ -131,6 +133,7 @@ class Claim:
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     further: bool = False
     p: float | None = None
+    judged: bool = True
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def _judged(
     allowed: float = 0.0,
 ) -> Claim:
     if not len(first) or not len(second):
-        return Claim(text, "undecided", "No complete runs.")
+        return Claim(text, "undecided", "No complete runs.", judged=False)
     found = difference(first, second, target_scene)
     pair = (second, first) if more else (first, second)
     numbers = {
@@ -105,7 +105,8 @@ def _judged(
         f"over targets: {numbers['probability of improvement']}; {len(first)} and {len(second)} seeds."
     )
     if min(len(first), len(second)) < LEAST_RUNS:
-        return Claim(text, "undecided", f"{evidence} Fewer than {LEAST_RUNS} seeds decide nothing.", numbers)
+        few = f"{evidence} Fewer than {LEAST_RUNS} seeds decide nothing."
+        return Claim(text, "undecided", few, numbers, judged=False)
     p = permutation_p(first, second, target_scene, allowed)
     return Claim(text, _side(-found if more else found, allowed), evidence, numbers, p=p)
 

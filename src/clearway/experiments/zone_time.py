@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
-from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, estimated, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -62,16 +59,10 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
         (group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups
     }
     found |= {mapped.called: mapped.scores for mapped in on_maps(setting, trial)}
-    rows: list[tuple[Value, ...]] = [(*kind, len(own), *_figures(own, scenes)) for kind, own in found.items()]
-    rows.append(("walked", RANDOM_WALK, None, *_figures(random_walk(world, trial), scenes)))
+    rows: list[tuple[Value, ...]] = [(*kind, len(own), *estimated(own, FIGURES, scenes)) for kind, own in found.items()]
+    rows.append(("walked", RANDOM_WALK, None, *estimated(random_walk(world, trial), FIGURES, scenes)))
     headings = (heading for words in FIGURES.values() for heading in (words, f"95 % of {words}"))
     return ReportTable(NAME, "Steps in the zones", ("learner", "agent", "seeds", *headings), tuple(rows), (ABOUT_MAPS,))
-
-
-def _figures(own: Scores, scenes: np.ndarray) -> list[Value]:
-    """Each figure and its interval; blank where nothing is complete."""
-    estimates = [mean_estimate(own.of(figure), scenes) if len(own) else None for figure in FIGURES]
-    return [value for each in estimates for value in ((each.value, each.ends) if each else (None, None))]
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:

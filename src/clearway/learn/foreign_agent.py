@@ -51,6 +51,11 @@ def is_ours(agent: TrainedAgent) -> bool:
     return type(agent).__module__.startswith("clearway.")
 
 
+def plugin_of(agent: TrainedAgent) -> Plugin | None:
+    """Whose class it is of; None: ours."""
+    return None if is_ours(agent) else find_plugin("algorithms", agent.record.learner.algorithm)
+
+
 @contextmanager
 def faults_of_agent(agent: TrainedAgent, what: str) -> Iterator[None]:
     """Tell of what an agent of a package's own class raises as that package's fault, see `faults_of`.
@@ -64,7 +69,7 @@ def faults_of_agent(agent: TrainedAgent, what: str) -> Iterator[None]:
 
 def guarded_agent(trained: TrainedAgent, agent: Agent) -> Agent:
     """The agent that was made of what a run has learnt; behind a guard where that is of a package's own class."""
-    plugin = None if is_ours(trained) else find_plugin("algorithms", trained.record.learner.algorithm)
+    plugin = plugin_of(trained)
     return agent if plugin is None else Foreign(agent, str(plugin))
 
 

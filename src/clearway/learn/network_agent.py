@@ -9,10 +9,9 @@ from torch import Tensor
 from clearway.agents.agent import Agent
 from clearway.agents.arrival import Arrival
 from clearway.agents.by_features import FeatureAgent
-from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, is_ours
+from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, plugin_of
 from clearway.model.policy import ScenePolicy
 from clearway.perception.encoder import Encoder
-from clearway.plugins import find_plugin
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.world.world import World
 
@@ -36,7 +35,7 @@ def network_on_grid(trained: TrainedNetwork, world: World) -> Agent:
         RunError: as of `TrainedNetwork.lookup`.
         PluginError, AgentError: another package's fails, then or walking.
     """
-    plugin = None if is_ours(trained) else find_plugin("algorithms", trained.record.learner.algorithm)
+    plugin = plugin_of(trained)
     return trained.on_poses(world) if plugin is None else ForeignTrained(trained, plugin).on_poses(world)
 
 

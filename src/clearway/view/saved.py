@@ -90,7 +90,7 @@ def _recorded(stage: Stage, episode: Episode) -> dict[str, Any]:
     begun = session.tell(episode)
     steps: list[dict[str, Any]] = []
     while len(steps) < MOST_STEPS and not all(walker.ended for walker in session.walkers):
-        told = session.answer({"do": "step"})
+        told = session.ask({"do": "step"})
         if not any(told["steps"]):
             break
         steps.append({"steps": told["steps"], "ended": told["ended"]})
@@ -132,7 +132,7 @@ def _minds(stage: Stage, recorded: list[dict[str, Any]]) -> dict[str, Any]:
             if shown.tells_values and key not in told:
                 session = Viewing(stage)
                 session.begin(read_episode(begun["link"]))
-                told[key] = session.answer({"do": "map", "walker": walker})
+                told[key] = session.ask({"do": "map", "walker": walker})
     return told
 
 

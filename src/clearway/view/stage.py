@@ -93,7 +93,10 @@ class StageRun:
     @cached_property
     def _lookup(self) -> LookupNetwork:
         with faults_of_agent(self.trained, "lookup"):
-            return self.trained.lookup(self.world)
+            found: object = self.trained.lookup(self.world)
+            if not isinstance(found, LookupNetwork):
+                raise TypeError(f"gives {found!r:.40}, expected a LookupNetwork (clearway.model.lookup)")
+        return found
 
     def make_ready(self) -> None:
         """Compute what all episodes share, so that one begins at once. Raises PluginError: a package's agent fails."""
@@ -104,9 +107,9 @@ class StageRun:
         return self.world.with_targets({scene: (target,)})
 
     def on_poses(self, placed: World) -> Agent:
-        """Itself in a world from `place`."""
+        """Its network in a world from `place`; what a package's own `on_poses` does beside that is not shown."""
         scale = self.trained.record.learner.reward_scale
-        with faults_of_agent(self.trained, "lookup"):
+        with faults_of_agent(self.trained, "its network"):
             agent = network_on_poses(self._lookup.for_targets(placed.target_state), placed, scale)
         return guarded_agent(self.trained, agent)
 

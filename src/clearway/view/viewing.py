@@ -8,7 +8,7 @@ Messages are JSON objects. The page says what to `do`:
     {"do": "map", "walker": 0}                            values and probabilities of every pose
 
 and gets one answer to each, told apart by its `kind`: "episode", "steps", "map" or "refused" (with a `text`). A refused
-message changes nothing.
+message changes nothing, but that an episode ends where an agent fails.
 """
 
 from __future__ import annotations
@@ -45,11 +45,16 @@ class Viewing:
     def answer(self, message: object) -> Message:
         """What to answer to a message."""
         try:
-            return self._answer(message)
+            return self.ask(message)
         except ClearwayError as error:
             return {"kind": "refused", "text": str(error)}
 
-    def _answer(self, message: object) -> Message:
+    def ask(self, message: object) -> Message:
+        """What to answer to a message that is not refused.
+
+        Raises:
+            ClearwayError: it is.
+        """
         match message:
             case {"do": "begin", "episode": str(query)}:
                 return self.tell(read_episode(query))
@@ -116,10 +121,15 @@ class Viewing:
         return replace(self.episode, walks=tuple(letters(walker.actions) for walker in self.walkers))
 
     def _step(self, actions: list[int | None], moving: set[int]) -> Message:
-        steps = [
-            walker.step(action) if index in moving else None
-            for index, (walker, action) in enumerate(zip(self.walkers, actions, strict=True))
-        ]
+        try:
+            steps = [
+                walker.step(action) if index in moving else None
+                for index, (walker, action) in enumerate(zip(self.walkers, actions, strict=True))
+            ]
+        except ClearwayError:
+            for walker in self.walkers:
+                walker.stopped = True
+            raise
         sent = [_sent(step) if step else None for step in steps]
         return {"kind": "steps", "steps": sent, "ended": self._ended(), "link": self.walked().query()}
 

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from clearway.agents.agent import POSE, Agent, Decisions, State
+from clearway.agents.answers import check_decisions
 from clearway.agents.selection import ActionSelection, having_taken, selecting
 from clearway.evaluation.sight import Sight
 from clearway.mapping.held import Held
@@ -66,6 +67,9 @@ class Walker:
         holds: tells what the agent holds by its state; None where it has no map.
         selection: how its actions are chosen.
         recorded: actions that it takes before it chooses by itself.
+
+    Raises:
+        AgentError: the agent fails, then or at a step; the walk is to be stopped then.
     """
 
     def __init__(
@@ -93,7 +97,7 @@ class Walker:
         self.memory: State = {}
         if self.chooser and self.sight:
             self.memory = self.chooser.reset(self.sight(world.target_state[[target]]), seeds.numpy())
-        self.recorded = list(recorded)
+        self.recorded, self.stopped = list(recorded), False
         reached = int(self.env.state) == int(world.target_state[target])
         zone = int(world.zone[self.env.state])
         self.steps = [self._arrived(None, blocked=False, reward=0.0, zone=zone, reached=reached)]
@@ -105,8 +109,8 @@ class Walker:
 
     @property
     def ended(self) -> bool:
-        """The target is reached, or the walk is as long as a walk may be."""
-        return self.steps[-1].reached or len(self.steps) > MOST_STEPS
+        """The target is reached, or the walk is as long as a walk may be, or was stopped."""
+        return self.stopped or self.steps[-1].reached or len(self.steps) > MOST_STEPS
 
     def step(self, action: int | None = None) -> Standing | None:
         """Take the recorded action, else the one given, else the one that the agent has chosen.
@@ -135,11 +139,16 @@ class Walker:
         return self.steps[-1]
 
     def map_of_mind(self) -> Decisions:
-        """What the agent holds in all poses of the scene (S), each as at the start of an episode."""
+        """What the agent holds in all poses of the scene (S), each as at the start of an episode.
+
+        Raises:
+            AgentError: its answer is none.
+        """
         assert self.agent is not None
         poses = np.arange(self.states_here) + self.offset
         target = np.full_like(poses, int(self.world.target_state[self.target]))
         decisions, _ = self.agent.act({POSE: poses}, self.agent.reset({POSE: target}, np.zeros_like(poses)))
+        check_decisions(decisions, len(poses))
         return decisions
 
     def _arrived(self, action: int | None, *, blocked: bool, reward: float, zone: int, reached: bool) -> Standing:
@@ -147,6 +156,7 @@ class Walker:
         probabilities = value = following = held = None
         if self.chooser and self.sight:
             decisions, self.memory = self.chooser.act(self.sight(self.env.state), self.memory)
+            check_decisions(decisions, 1)
             held = None if self.holds is None else self.holds(self.memory)
             value = None if decisions.value is None else float(decisions.value[0])
             if not reached:
