@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.experiments import plan
 from clearway.experiments.plan import Job, PlannedRun, SceneFile, Trial, merged
 from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Reward, Term, Time
 from helpers.small_runs import small_learner
@@ -83,3 +84,12 @@ def test_a_run_is_planned_once_with_all_its_trials() -> None:
     first, second = Trial(((1,),)), Trial(((1,),), halfway=True)
     jobs = merged([Job(RUN, (first,)), Job(other, (first,)), Job(RUN, (second, first))])
     assert jobs == [Job(RUN, (first, second)), Job(other, (first,))]
+
+
+def test_a_name_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many runs' names are asked for several times a second while others train."""
+    named = replace(RUN), Trial(((1, 2),))
+    names = [each.name for each in named]
+    monkeypatch.setattr(plan, "_digest", lambda content: pytest.fail("computed again"))
+    assert [each.name for each in named] == names
+    assert named == (replace(RUN), Trial(((1, 2),)))  # that a name is known is no difference

@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
@@ -63,7 +64,7 @@ class PlannedRun:
         """Frames after half of the training; the agent is kept there too, see `RunFolder.milestone`."""
         return max(1, self.learner.frames // 2)
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
@@ -96,7 +97,7 @@ class Trial:
     step_limit: int = STEP_LIMIT
     seed: int = 0
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Name of its file in the run's folder."""
         return f"{'halfway' if self.halfway else 'end'}-{sum(map(len, self.targets))}t-{_digest(asdict(self))}"
@@ -119,7 +120,7 @@ class LiveTrial:
     seed: int = 0
     walker: LiveWalker = "agent"
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Name of its file in the run's folder."""
         content = asdict(self)
