@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from clearway.experiments.board import RunState, clock, state_of, state_table
+from clearway.experiments import board as module
+from clearway.experiments.board import Looks, RunState, board, clock, pace, state_of, state_table
 from clearway.experiments.job import do
 from clearway.experiments.plan import Job
 from clearway.reward import COLLISION_AWARE
@@ -45,3 +46,45 @@ def test_the_table_shows_what_is_under_way_first() -> None:
 @pytest.mark.parametrize(("seconds", "text"), [(0, "0:00:00"), (3661.4, "1:01:01"), (59.6, "0:01:00")])
 def test_clock(seconds: float, text: str) -> None:
     assert clock(seconds) == text
+
+
+def test_the_files_of_a_run_that_is_done_are_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    setting = small_setting(tmp_path, seeds=2)
+    jobs = [Job(run, (setting.trial(),)) for run in setting.runs(setting.learners["default"], COLLISION_AWARE)]
+    looks = Looks(tmp_path, jobs)
+    do(tmp_path, jobs[0], threads=1)
+    asked = []
+    monkeypatch.setattr(module, "state_of", lambda out, job, busy: asked.append(job) or state_of(out, job, busy))
+    assert [state.state for state in looks.states(jobs[1:])] == ["done", "training"]
+    assert [state.state for state in looks.states(jobs[1:])] == ["done", "training"]
+    assert asked == [*jobs, jobs[1]]
+
+
+STATES = [
+    RunState("a", "done", 800, 800, 10.0, 5, 5, 0.0),
+    RunState("b", "training", 400, 800, 100.0, 2, 5, 4.0),
+    RunState("c", "trying", 800, 800, 100.0, 2, 5, 0.0),
+    RunState("d", "waiting", 0, 800, None, 0, 5, None),
+]
+
+
+def test_a_line_says_how_many_runs_are_done_and_when_all_will_be() -> None:
+    assert pace(STATES, frames_before=1_000, seconds=100.0) == (
+        "runs: 1 of 4 done, 2 under way, 0:02:00 left at this pace"  # 1,000 frames in 100 s, 1,200 to go
+    )
+    assert pace(STATES, frames_before=2_000, seconds=100.0) == "runs: 1 of 4 done, 2 under way"
+
+
+def test_where_nobody_watches_lines_stand_instead_of_a_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    (run,) = setting.runs(setting.learners["default"], COLLISION_AWARE)
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    with board(tmp_path, [Job(run, (setting.trial(),))], visible=True) as show:
+        show([])
+        assert capsys.readouterr().err == ""
+        now[0] += 11
+        show([Job(run, (setting.trial(),))])
+    assert capsys.readouterr().err == "runs: 0 of 1 done, 1 under way\n"

@@ -1,7 +1,8 @@
-"""The state of a plan's runs, read from their folders, as a table that is drawn anew while they run."""
+"""The state of a plan's runs, read from their folders, while they run: a table that is drawn anew, or lines."""
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from clearway.experiments.job import is_done, run_folder
 from clearway.experiments.plan import Job
+from clearway.progress import LineTimes
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -59,16 +61,42 @@ def state_of(out: Path, job: Job, under_way: bool) -> RunState:
     return RunState(job.run.name, state, frames, all_frames, speed, int(last["solved_targets"]), targets, left)
 
 
+class Looks:
+    """The states of a plan's runs; of one that is done the files are read once.
+
+    Args:
+        out: folder of the reproduction.
+        jobs: all runs with their trials.
+    """
+
+    def __init__(self, out: Path, jobs: Sequence[Job]) -> None:
+        self._out, self._jobs = out, jobs
+        self._done: dict[str, RunState] = {}
+
+    def states(self, under_way: Sequence[Job] = ()) -> list[RunState]:
+        """All of them, now."""
+        names = {job.run.name for job in under_way}
+        found = [self._done.get(job.run.name) or state_of(self._out, job, job.run.name in names) for job in self._jobs]
+        self._done = {state.name: state for state in found if state.state == "done"}
+        return found
+
+
 @contextmanager
 def board(out: Path, jobs: Sequence[Job], visible: bool) -> Iterator[Callable[[Sequence[Job]], None]]:
-    """A live table on standard error; yields what to call with the jobs under way."""
+    """A live table on standard error; yields what to call with the jobs under way.
+
+    If standard error is not a terminal, a line now and then instead.
+    """
     if not visible:
         yield lambda under_way: None
         return
     from rich.console import Console
     from rich.live import Live
 
-    console = Console(stderr=True)
+    console, looks = Console(stderr=True), Looks(out, jobs)
+    if not console.is_terminal:
+        yield _lines(looks)
+        return
     with Live(console=console, auto_refresh=False, transient=True) as live:
         looked = -SECONDS_BETWEEN_LOOKS
 
@@ -76,11 +104,38 @@ def board(out: Path, jobs: Sequence[Job], visible: bool) -> Iterator[Callable[[S
             nonlocal looked
             if time.monotonic() - looked >= SECONDS_BETWEEN_LOOKS:
                 looked = time.monotonic()
-                names = {job.run.name for job in under_way}
-                states = [state_of(out, job, job.run.name in names) for job in jobs]
-                live.update(state_table(states), refresh=True)
+                live.update(state_table(looks.states(under_way)), refresh=True)
 
         yield show
+
+
+def _lines(looks: Looks) -> Callable[[Sequence[Job]], None]:
+    began = time.monotonic()
+    times, before = LineTimes(began), sum(state.frames for state in looks.states())
+
+    def show(under_way: Sequence[Job]) -> None:
+        now = time.monotonic()
+        if times.is_due(now):
+            print(pace(looks.states(under_way), before, now - began), file=sys.stderr, flush=True)
+
+    return show
+
+
+def pace(states: Sequence[RunState], frames_before: int, seconds: float) -> str:
+    """How many runs are done, and when all will be if the rest goes on as fast.
+
+    Args:
+        states: of all runs.
+        frames_before: of all runs together, when the command began.
+        seconds: since then.
+    """
+    count = {kind: sum(state.state == kind for state in states) for kind in ("done", "waiting")}
+    under_way = len(states) - sum(count.values())
+    told = f"runs: {count['done']} of {len(states)} done, {under_way} under way"
+    frames, all_frames = sum(state.frames for state in states), sum(state.all_frames for state in states)
+    if frames <= frames_before:
+        return told
+    return f"{told}, {clock((all_frames - frames) * seconds / (frames - frames_before))} left at this pace"
 
 
 def state_table(states: Sequence[RunState]) -> Table:
