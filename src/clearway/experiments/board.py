@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 SECONDS_BETWEEN_LOOKS = 2.0
 MOST_ROWS = 12
+LEAST_S = 60.0
+"""Before, most of the time went into beginning."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ def pace(states: Sequence[RunState], frames_before: int, seconds: float) -> str:
     under_way = len(states) - sum(count.values())
     told = f"runs: {count['done']} of {len(states)} done, {under_way} under way"
     frames, all_frames = sum(state.frames for state in states), sum(state.all_frames for state in states)
-    if frames <= frames_before:
+    if frames <= frames_before or seconds < LEAST_S:
         return told
     return f"{told}, {clock((all_frames - frames) * seconds / (frames - frames_before))} left at this pace"
 
