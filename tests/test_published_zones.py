@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clearway.experiments import shuffles, table1, zone_time
+from clearway.experiments import shuffles, step_size, table1, zone_time
 from clearway.experiments.convergence import frames_until_settled, mark_steps
 from clearway.experiments.groups import compared
 from clearway.experiments.reproduce import gather
@@ -124,6 +124,57 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
         assert verdict == claim.verdict
     verdicts = [claim.verdict for claim in section.claims]
     assert verdicts == ["holds", "holds", "undecided", "undecided", "undecided"]
+
+
+@pytest.mark.slow
+def test_zones_at_several_step_sizes_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    unpack("step-size-bathroom", tmp_path / "steps")
+    (section,) = gather(tmp_path / "steps").sections
+    assert not section.missing
+    part = section_of(EVIDENCE, "Zones, at several step sizes")
+    lines = rows_of(part)
+    table, late = section.tables[0], section.tables[-1]
+    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    assert len(late.rows) == 2 * len(step_size.ALL)
+    for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+        step = str(row["learner"]).removeprefix("paper, ")
+        ((frames, *cells, lost),) = [cells for size, agent, *cells in lines if (size, agent) == (step, row["agent"])]
+        frames, ran = frames.rsplit(", ", 1)
+        assert_shown(frames, row["frames"], row["95 %"])
+        assert ran == f"{row['settled']} of 5"
+        for figure, cell in zip(("steps", "collisions"), cells, strict=True):
+            (own,) = [
+                r for r in rows if (r["figure"], r["learner"], r["agent"]) == (figure, row["learner"], row["agent"])
+            ]
+            assert_shown(cell, own["average"], own["95 %"])
+            assert lost == own["failed targets"]
+    assert check_beside(lines, table.rows, 3, 4) == {"planner on a learnt map", "nearest picture", "random walk"}
+    told = {line[0]: line[1:] for line in lines if len(line) == 7}
+    assert len(told) == 1 + len(section.claims)  # with the heading
+    for claim in section.claims:
+        verdict, own, other, difference, p, corrected = told[claim.text.removeprefix("paper: ")]
+        assert_judged(claim, verdict, p, corrected, own, other, difference)
+    setting = gather(tmp_path / "steps").setting
+    mark = mark_steps(setting, setting.targets)
+    settled = {
+        (group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0]
+        for group in step_size._groups(setting)
+    }
+    largest, published = (
+        ("paper, 4 x rate, whitened", "shortest"),
+        ("paper, 1 x rate, features as they are", "collision-aware"),
+    )
+    assert settled[largest].max() < settled[published].min()
+    first, second = (f"{settled[kind].mean():,.0f}" for kind in (largest, published))
+    both = rf"`shortest` [^.]*after {first} frames[^.]*`collision-aware` as published[^.]*{second}"
+    assert re.search(both, part) and re.search(both, RESULTS)
+    bumps = {(r["learner"], r["agent"]): r["average"] for r in rows if r["figure"] == "collisions"}
+    ended = [str(step) for step in step_size.ALL if step.rate >= 1]
+    assert len(ended) == 6
+    assert all(bumps[f"paper, {step}", "collision-aware"] < bumps[f"paper, {step}", "shortest"] for step in ended)
+    assert all((settled[kind] == setting.budget.frames).all() for kind in settled if "0.5 x" in kind[0])
+    seconds = seconds_of_runs(tmp_path / "steps")
+    assert len(seconds) == 80 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in part
 
 
 def check_results_of_shuffles(table: ReportTable, late: ReportTable) -> None:

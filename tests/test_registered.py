@@ -38,6 +38,7 @@ ASKED_FIRST = {
     "hard-bathroom": {58},
     "paper-bathroom": {51, 52},
     "shuffles-bathroom": {61, 62},
+    "step-size-bathroom": {60},
 }
 """Records of which runs tell when they were begun, and the questions written before these.
 
