@@ -51,8 +51,8 @@ def test_rows_are_those_of_the_episodes(setting: Setting) -> None:
         for name, column in (("x the shortest path", found.steps), ("collisions", found.collisions)):
             means = [column[found.target == target].mean() for target in range(5)]
             shortest = [found.shortest_path_steps[found.target == target].mean() for target in range(5)]
-            (own, below) = ((sum(each[:3]) / 3 + sum(each[3:]) / 2) / 2 for each in (means, shortest))
-            assert row[name] == pytest.approx(own / below if column is found.steps else own)
+            ours, below = ((sum(each[:3]) / 3 + sum(each[3:]) / 2) / 2 for each in (means, shortest))
+            assert row[name] == pytest.approx(ours / below if column is found.steps else ours)
         asked = {"targets solved": all(solved), "x the shortest path": row["x the shortest path"] <= 1.05}
         asked |= {"worst target": row["worst target"] <= 1.15, "collisions": row["collisions"] < 0.05}
         assert row["misses"] == ", ".join(name for name, met in asked.items() if not met)
