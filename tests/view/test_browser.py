@@ -252,6 +252,7 @@ def test_long_names_take_one_line_and_the_views_stand_level(opened: Callable[...
 def test_the_page_says_who_walks_where(opened: Callable[..., Page]) -> None:
     page = opened("scene=corridor&start=4&target=8", viewport=PHONE)
     expect(page.locator("h1")).to_contain_text("corridor: aware and plain, to where the target's picture was taken")
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
 def test_an_agent_has_one_colour_whatever_the_order(opened: Callable[..., Page]) -> None:
@@ -338,6 +339,7 @@ def test_scenes_change_from_large_to_small_and_faster_than_they_load(opened: Cal
     expect(page).to_have_url(re.compile("scene=corridor&.*walk="))
     expect(page.locator("#scene")).to_have_value("corridor")
     expect(page.locator("#legend")).to_contain_text("value")
+    assert page.locator("#targets img").count() == 3  # the corridor's, not those of a scene that came late
 
 
 def test_a_browser_that_keeps_no_more_addresses_shows_the_steps_nevertheless(opened: Callable[..., Page]) -> None:

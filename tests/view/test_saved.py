@@ -142,6 +142,7 @@ def test_a_click_says_which_recorded_episode_it_took(browser: Browser, addresses
         re.compile(r"^Nearest recorded target: pose 16, heading 0°, \w+ zone$")
     )
     expect(where).to_contain_text("pose 16,")
+    assert "target=16" in page.url
     page.close()
 
 

@@ -131,22 +131,27 @@ def pace(states: Sequence[RunState], frames_before: int, seconds: float) -> str:
         frames_before: of all runs together, when the command began.
         seconds: since then.
     """
-    count = {kind: sum(state.state == kind for state in states) for kind in ("done", "waiting")}
-    under_way = len(states) - sum(count.values())
-    told = f"runs: {count['done']} of {len(states)} done, {under_way} under way"
+    done, waiting = _count(states)
+    told = f"runs: {done} of {len(states)} done, {len(states) - done - waiting} under way"
     frames, all_frames = sum(state.frames for state in states), sum(state.all_frames for state in states)
     if frames <= frames_before or seconds < LEAST_S:
         return told
     return f"{told}, {clock((all_frames - frames) * seconds / (frames - frames_before))} left at this pace"
 
 
+def _count(states: Sequence[RunState]) -> tuple[int, int]:
+    """How many are done, and how many wait."""
+    done, waiting = (sum(state.state == kind for state in states) for kind in ("done", "waiting"))
+    return done, waiting
+
+
 def state_table(states: Sequence[RunState]) -> Table:
     """The runs under way and some of those that wait; the rest as counts."""
     from rich.table import Table
 
-    count = {kind: sum(state.state == kind for state in states) for kind in ("done", "waiting")}
+    done, waiting = _count(states)
     seconds = sum(state.seconds_left or 0 for state in states if state.state == "training")
-    title = f"{len(states)} runs: {count['done']} done, {count['waiting']} waiting"
+    title = f"{len(states)} runs: {done} done, {waiting} waiting"
     table = Table(title=title, caption=f"training under way needs another {clock(seconds)} of processor time")
     for heading in ("run", "state", "frames", "frames/s", "solved", "left"):
         table.add_column(heading, justify="left" if heading in ("run", "state") else "right", no_wrap=heading != "run")

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clearway.evaluation.across_seeds import failed_targets
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, compared, estimated, random_walk
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.job import run_folder
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
@@ -53,15 +52,15 @@ def _groups(setting: Setting) -> list[Group]:
 def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     world, trial = setting.world(), setting.trial()
     scenes = world.target_scene.numpy()
-    rows: list[tuple[Value, ...]] = []
+    found: list[tuple[tuple[Value, ...], Scores]] = []
     for group in groups:
         values = group.scores(setting.out, world.target_count)
         frames = group.runs[0].halfway if group.trial.halfway else group.runs[0].learner.frames
-        rows.append((group.learner, group.agent, frames, len(values), *_figures(values, scenes)))
+        found.append(((group.learner, group.agent, frames, len(values)), values))
     for mapped in on_maps(setting, trial):
-        own = mapped.scores
-        rows.append((mapped.agent, None, mapped.frames, len(own), *_figures(own, scenes)))
-    rows.append(("walked", RANDOM_WALK, None, None, *_figures(random_walk(world, trial), scenes)))
+        found.append(((mapped.agent, None, mapped.frames, len(mapped.scores)), mapped.scores))
+    found.append((("walked", RANDOM_WALK, None, None), random_walk(world, trial)))
+    rows = tuple((*who, own.failed(), *own.estimates(METRICS, scenes)) for who, own in found)
     headings = (
         "learner",
         "agent",
@@ -73,12 +72,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
         "collisions",
         "95 % of collisions",
     )
-    return ReportTable("fig4", "Halfway and in the end", headings, tuple(rows), (ABOUT_MAPS,))
-
-
-def _figures(values: Scores, scenes: np.ndarray) -> list[Value]:
-    failed = failed_targets(values.of("success")) if len(values) else None
-    return [failed, *estimated(values, METRICS, scenes)]
+    return ReportTable("fig4", "Halfway and in the end", headings, rows, (ABOUT_MAPS,))
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:

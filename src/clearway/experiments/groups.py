@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from clearway.agents.by_pose import RandomWalk
-from clearway.evaluation.across_seeds import mean_estimate
+from clearway.evaluation.across_seeds import failed_targets, mean_estimate
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.evaluation.metrics import METRIC_NAMES, by_scene, by_target
 from clearway.experiments.job import episodes_of
@@ -81,16 +81,19 @@ class Scores:
         """(R, C) steps in each scene over the shortest paths'; target_scene: (M,) int."""
         return self.in_scenes("steps", target_scene) / self.in_scenes("shortest_path_steps", target_scene)
 
+    def failed(self) -> str | None:
+        """How many targets some episode did not reach, of those of all seeds; None where nothing is complete."""
+        return failed_targets(self.of("success")) if len(self) else None
 
-def estimated(own: Scores, metrics: Iterable[str], target_scene: np.ndarray) -> list[Value]:
-    """Cells of a table: each metric's mean over seeds, then its interval; blank where nothing is complete.
+    def estimates(self, metrics: Iterable[str], target_scene: np.ndarray) -> list[Value]:
+        """Cells of a table: each metric's mean over seeds, then its interval; None where nothing is complete.
 
-    target_scene: (M,) int.
-    """
-    if not len(own):
-        return [None for _ in metrics for _ in range(2)]
-    estimates = [mean_estimate(own.of(metric), target_scene) for metric in metrics]
-    return [value for each in estimates for value in (each.value, each.ends)]
+        target_scene: (M,) int.
+        """
+        if not len(self):
+            return [None for _ in metrics for _ in range(2)]
+        found = [mean_estimate(self.of(metric), target_scene) for metric in metrics]
+        return [value for each in found for value in (each.value, each.ends)]
 
 
 def scores(tables: Mapping[int, EpisodeTable], target_count: int) -> Scores:

@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.evaluation.across_seeds import failed_targets
-from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, estimated, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
 from clearway.experiments.learnt_maps import (
     ABOUT_MAPS,
     FRAMES_A_POSE,
@@ -18,7 +17,7 @@ from clearway.experiments.learnt_maps import (
 )
 from clearway.experiments.other_learners import other_learners
 from clearway.experiments.plan import RANDOM_WALK, Job
-from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
+from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less, with_failures
 from clearway.reward import COLLISION_AWARE
@@ -55,26 +54,25 @@ def _groups(setting: Setting) -> list[Group]:
 def _table(setting: Setting, groups: Sequence[Group], mapped: Sequence[Mapped]) -> ReportTable:
     world = setting.world()
     scenes = world.target_scene.numpy()
-    rows: list[tuple[Value, ...]] = []
+    found: list[tuple[str, str | None, int, Scores, str | None]] = []
     for own in mapped:
         exact = f"{min(own.exact):.1%} to {max(own.exact):.1%}" if own.agent == PLANNER else None
-        rows.append((own.agent, "map", own.frames, *_figures(own.scores, scenes), exact))
+        found.append((own.agent, "map", own.frames, own.scores, exact))
     for group in groups:
         values = group.scores(setting.out, world.target_count)
-        rows.append((group.learner, group.agent, group.runs[0].learner.frames, *_figures(values, scenes), None))
-    rows.append((RANDOM_WALK, None, 0, *_figures(random_walk(world, setting.trial()), scenes), None))
+        found.append((group.learner, group.agent, group.runs[0].learner.frames, values, None))
+    found.append((RANDOM_WALK, None, 0, random_walk(world, setting.trial()), None))
+    rows = tuple(
+        (agent, reward, frames, len(own), own.failed(), *own.estimates(METRICS, scenes), exact)
+        for agent, reward, frames, own, exact in found
+    )
     headings = ("agent", "reward", "frames", "seeds", "failed targets")
     estimates = (heading for metric in METRICS for heading in (metric, f"95 % of {metric}"))
     notes = (
         "Shortest ways: share of starts from which the map's way to a target is a shortest path, least to most of the "
         "seeds; who is not told poses may take others.",
     )
-    return ReportTable("memory", "Memory alone", (*headings, *estimates, "shortest ways"), tuple(rows), notes)
-
-
-def _figures(values: Scores, scenes: np.ndarray) -> tuple[Value, ...]:
-    failed = failed_targets(values.of("success")) if len(values) else None
-    return (len(values), failed, *estimated(values, METRICS, scenes))
+    return ReportTable("memory", "Memory alone", (*headings, *estimates, "shortest ways"), rows, notes)
 
 
 def _curve(mapped: Sequence[Mapped]) -> ReportFigure:

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from clearway.evaluation.across_seeds import failed_targets, mean_estimate
+from clearway.evaluation.across_seeds import mean_estimate
 from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
@@ -103,7 +103,7 @@ def _group_row(
     scenes = [mean_estimate(own[:, part], target_scene[part]) for part in parts]
     estimate = mean_estimate(own, target_scene)
     figures = (value for scene in scenes for value in (scene.value, scene.ends))
-    return (*learnt, failed_targets(values.of("success")), *figures, estimate.value, estimate.ends, of_paper)
+    return (*learnt, values.failed(), *figures, estimate.value, estimate.ends, of_paper)
 
 
 def _reference_row(

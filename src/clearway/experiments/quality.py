@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 
 from clearway.evaluation.criteria import Criteria, Quality, quality
 from clearway.experiments.convergence import settling_table
@@ -35,6 +35,8 @@ def jobs(setting: Setting) -> list[Job]:
 def section(setting: Setting) -> Section:
     """What came of it."""
     groups = _groups(setting)
+    world = setting.world()
+    found = {group.learner: _by_seed(world, group.scores(setting.out, world.target_count)) for group in groups}
     return Section(
         name=NAME,
         title="Good enough?",
@@ -44,8 +46,8 @@ def section(setting: Setting) -> Section:
             f"target above {CRITERIA.worst_path_ratio - 1:.0%}, and fewer than {CRITERIA.collisions:g} collisions an "
             "episode."
         ),
-        tables=(_table(setting, groups), settling_table(NAME, setting, groups)),
-        claims=further(_claims(setting, groups)),
+        tables=(_table(setting, world, found), settling_table(NAME, setting, groups)),
+        claims=further(_claims(setting, found)),
         missing=all_missing(groups, setting.out),
     )
 
@@ -54,7 +56,7 @@ def _groups(setting: Setting) -> list[Group]:
     return compared(setting, (COLLISION_AWARE,))
 
 
-def _found(world: World, scores: Scores) -> dict[int, Quality]:
+def _by_seed(world: World, scores: Scores) -> dict[int, Quality]:
     """The quality of each run, by its seed."""
     return {seed: quality(world, own) for seed, own in zip(scores.seeds, scores.values, strict=True)}
 
@@ -65,15 +67,16 @@ def _missed(found: Quality) -> list[str]:
     return [called for name, called in CALLED.items() if not met[name]]
 
 
-def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
-    world, trial = setting.world(), setting.trial()
-    rows: list[tuple[Value, ...]] = []
-    for group in groups:
-        found = _found(world, group.scores(setting.out, world.target_count))
-        rows += [_row((group.learner, group.agent, seed), own) for seed, own in found.items()]
+def _table(setting: Setting, world: World, found: Mapping[str, Mapping[int, Quality]]) -> ReportTable:
+    trial = setting.trial()
+    rows = [
+        _row((learner, COLLISION_AWARE.name, seed), own)
+        for learner, runs in found.items()
+        for seed, own in runs.items()
+    ]
     for mapped in on_maps(setting, trial):
-        rows += [_row((*mapped.called, seed), own) for seed, own in _found(world, mapped.scores).items()]
-    (walked,) = _found(world, random_walk(world, trial)).values()
+        rows += [_row((*mapped.called, seed), own) for seed, own in _by_seed(world, mapped.scores).items()]
+    (walked,) = _by_seed(world, random_walk(world, trial)).values()
     rows.append(_row(("walked", RANDOM_WALK, None), walked))
     notes = (
         "Of all targets; means over scenes of their targets' means. The worst target is the one whose steps exceed its "
@@ -95,16 +98,15 @@ def _row(who: tuple[Value, ...], found: Quality) -> tuple[Value, ...]:
     )
 
 
-def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
+def _claims(setting: Setting, found: Mapping[str, Mapping[int, Quality]]) -> Iterator[Claim]:
     """Every training of a learner meets all criteria. This is counted, not estimated: there is no p."""
-    world = setting.world()
-    for group in groups:
-        found = _found(world, group.scores(setting.out, world.target_count))
-        met = sum(not _missed(own) for own in found.values())
-        told = f"{met} of {len(found)} trainings meet all criteria"
-        missed = {name for own in found.values() for name in _missed(own)}
-        told += f"; missed: {', '.join(name for name in CALLED.values() if name in missed)}." if missed else "."
-        yield _judged(f"{group.learner}: every training is good enough", met, len(found), len(group.runs), told)
+    for learner, runs in found.items():
+        missed = [_missed(own) for own in runs.values()]
+        met = missed.count([])
+        told = f"{met} of {len(runs)} trainings meet all criteria"
+        names = [name for name in CALLED.values() if any(name in own for own in missed)]
+        told += f"; missed: {', '.join(names)}." if names else "."
+        yield _judged(f"{learner}: every training is good enough", met, len(runs), len(setting.seeds), told)
 
 
 def _judged(text: str, met: int, complete: int, planned: int, told: str) -> Claim:
