@@ -36,14 +36,12 @@ RECORDS = ROOT / "docs" / "records"
 ASKED_FIRST = {
     "bedroom-fresh": {38},
     "hard-bathroom": {58},
-    "paper-bathroom": {51, 52},
     "shuffles-bathroom": {61, 62},
     "step-size-bathroom": {60},
 }
-"""Records of which runs tell when they were begun, and the questions written before these.
-
-Of paper-bathroom only Q-learning and cloning tell it, run after the answer: that shows nothing of 51 and 52.
-"""
+"""Records of which runs tell when they were begun, and the questions written before these."""
+ADDED_LATER = "paper-bathroom.tar.xz"
+"""Of its runs only those tell it that were added after the answer (Q-learning, cloning): nothing of 51 and 52."""
 
 
 def git(*words: str) -> subprocess.CompletedProcess[str]:
@@ -128,7 +126,7 @@ def begun(record: Path) -> list[datetime]:
 
 
 @with_history
-@pytest.mark.parametrize("record", sorted(path.name for path in RECORDS.glob("*.tar.xz")))
+@pytest.mark.parametrize("record", sorted({path.name for path in RECORDS.glob("*.tar.xz")} - {ADDED_LATER}))
 def test_runs_were_begun_after_their_question_was_written(record: str) -> None:
     times, asked_by_it = begun(RECORDS / record), ASKED_FIRST.get(record.partition(".")[0], set())
     assert bool(times) == bool(asked_by_it), "name the questions in ASKED_FIRST"

@@ -70,10 +70,12 @@ STATES = [
 
 def test_a_line_says_how_many_runs_are_done_and_when_all_will_be() -> None:
     assert pace(STATES, frames_before=1_000, seconds=100.0) == (
-        "runs: 1 of 4 done, 2 under way, 0:02:00 left at this pace"  # 1,000 frames in 100 s, 1,200 to go
+        "runs: 1 of 4 done, 2 under way, 0:02:00 of training left at this pace"  # 1,000 frames in 100 s, 1,200 to go
     )
     for frames, seconds in ((2_000, 100.0), (1_000, 59.0)):
         assert pace(STATES, frames, seconds) == "runs: 1 of 4 done, 2 under way"
+    ended = [STATES[0], STATES[2]]  # evaluation is not told of
+    assert pace(ended, frames_before=400, seconds=100.0) == "runs: 1 of 2 done, 1 under way"
 
 
 def test_where_nobody_watches_lines_stand_instead_of_a_table(

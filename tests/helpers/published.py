@@ -86,9 +86,12 @@ def check_beside(rows: list[list[str]], recorded: Sequence[Sequence[Any]], steps
         Whom the page names.
     """
     known: dict[str, dict[str, float]] = {}
+    agents: dict[str, str] = {}
     for figure, learner, agent, *_, average, _, _ in recorded:
         own = learner in ("exact", "walked", "paper")
-        known.setdefault(agent if own else UNTRAINED.get(learner, learner), {})[figure] = average
+        name = agent if own else UNTRAINED.get(learner, learner)
+        known.setdefault(name, {})[figure] = average
+        agents[name] = agent
     told: set[str] = set()
     for row in rows:
         fixed = row[0].removeprefix("soft fixed points: ")
@@ -102,7 +105,20 @@ def check_beside(rows: list[list[str]], recorded: Sequence[Sequence[Any]], steps
             for name, one in zip(names, written * (len(names) // len(written)), strict=True):
                 assert_written(one.replace(",", ""), known[name][figure], f"{figure} of {name}")
         told |= set(names)
+        assert_frames(row[0], agents)
     return told
+
+
+def assert_frames(cell: str, agents: dict[str, str]) -> None:
+    """The frames that a cell tells of those it names before them are recorded: "Q-learning; map, 11,600 frames"."""
+    names: list[str] = []
+    for part in cell.split("; "):
+        name, _, frames = part.partition(", ")
+        names.append(name)
+        if frames.endswith(" frames"):
+            exact = frames.replace(" M frames", ",000,000 frames")
+            assert {agents[one] for one in names} == {exact}, cell
+            names = []
 
 
 def assert_judged(

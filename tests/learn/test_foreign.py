@@ -21,7 +21,7 @@ from clearway.experiments import live_trial
 from clearway.learn import running
 from clearway.learn.foreign import ForeignTrainer, made_trainer
 from clearway.learn.foreign_agent import ForeignTrained
-from clearway.learn.load import load_network
+from clearway.learn.load import TrainedNetwork, load_network
 from clearway.learn.metrics_log import OWN_FIGURES, metrics_row
 from clearway.learn.network_agent import NetworkAgent
 from clearway.learn.peers import ALONE
@@ -621,6 +621,20 @@ def test_a_package_s_network_that_fails_at_a_step_ends_the_episode(tmp_path, mon
     with pytest.raises(ClearwayError) as caught:
         save_page(stage, tmp_path / "page", first=BEGIN["episode"], episodes=1)
     assert told in str(caught.value) and not (tmp_path / "page").exists()
+
+
+def test_who_walked_before_another_failed_takes_the_step_back(tmp_path, monkeypatch) -> None:
+    stage = viewed(tmp_path, monkeypatch, walking="if len(asked) == 3: 1 / 0")
+    (bad,) = stage.agents
+    own = bad.trained
+    good = StageRun("good", TrainedNetwork(own.record, own.network, own.feature_map, own.frames), (SCENE,))
+    session = Viewing(replace(stage, agents=(good, bad)))
+    assert session.answer(BEGIN)["kind"] == "episode"
+    link = session.answer({"do": "step"})["link"]
+    assert session.answer({"do": "step"})["kind"] == "refused"
+    assert [len(walker.steps) for walker in session.walkers] == [2, 2]
+    after = session.answer({"do": "step"})
+    assert (after["steps"], after["ended"], after["link"]) == ([None, None], [True, True], link)
 
 
 def test_values_of_a_package_s_network_are_looked_at_before_they_are_mapped(tmp_path, monkeypatch) -> None:

@@ -124,7 +124,7 @@ def _lines(looks: Looks) -> Callable[[Sequence[Job]], None]:
 
 
 def pace(states: Sequence[RunState], frames_before: int, seconds: float) -> str:
-    """How many runs are done, and when all will be if the rest goes on as fast.
+    """How many runs are done, and how long the rest of training takes if it goes on as fast; without evaluation.
 
     Args:
         states: of all runs.
@@ -134,9 +134,9 @@ def pace(states: Sequence[RunState], frames_before: int, seconds: float) -> str:
     done, waiting = _count(states)
     told = f"runs: {done} of {len(states)} done, {len(states) - done - waiting} under way"
     frames, all_frames = sum(state.frames for state in states), sum(state.all_frames for state in states)
-    if frames <= frames_before or seconds < LEAST_S:
+    if frames <= frames_before or frames == all_frames or seconds < LEAST_S:
         return told
-    return f"{told}, {clock((all_frames - frames) * seconds / (frames - frames_before))} left at this pace"
+    return f"{told}, {clock((all_frames - frames) * seconds / (frames - frames_before))} of training left at this pace"
 
 
 def _count(states: Sequence[RunState]) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import LEAST_RUNS, further
+from clearway.experiments.verdicts import LEAST_RUNS, TOO_FEW, further
 from clearway.reward import COLLISION_AWARE
 from clearway.world.world import World
 
@@ -112,9 +112,9 @@ def _claims(setting: Setting, found: Mapping[str, Mapping[int, Quality]]) -> Ite
 def _judged(text: str, met: int, complete: int, planned: int, told: str) -> Claim:
     """Of at least `LEAST_RUNS` trainings one that misses a criterion is enough to say no; yes needs all planned."""
     if complete < LEAST_RUNS:
-        return Claim(text, "undecided", f"{told} Fewer than {LEAST_RUNS} seeds decide nothing.", judged=False)
+        return Claim(text, "undecided", f"{told} {TOO_FEW}")
     if met < complete:
-        return Claim(text, "does not hold", told)
+        return Claim(text, "does not hold", told, counted=True)
     if complete < planned:
-        return Claim(text, "undecided", f"{told} Still to come: {planned - complete}.")
-    return Claim(text, "holds", told)
+        return Claim(text, "undecided", f"{told} Still to come: {planned - complete}.", counted=True)
+    return Claim(text, "holds", told, counted=True)

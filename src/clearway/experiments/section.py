@@ -124,7 +124,7 @@ class Claim:
         further: the paper does not ask this.
         p: that chance alone tells the two kinds apart as much; None where too few runs decide nothing, and of what is
             counted.
-        judged: there are runs enough; without, the verdict is undecided.
+        counted: of runs enough, by counting them, not by an estimate.
     """
 
     text: str
@@ -133,7 +133,12 @@ class Claim:
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     further: bool = False
     p: float | None = None
-    judged: bool = True
+    counted: bool = False
+
+    @property
+    def judged(self) -> bool:
+        """It rests on runs enough; without, the verdict is undecided."""
+        return self.counted or self.p is not None
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ LOST = 0.01  # of episodes, a point: so many more failures of the favoured kind 
 LEAST_RUNS = 4
 """Fewer of either kind decide nothing. Of two kinds that are alike, 31 % of all sets of 2 runs and 11 % of 3 would be
 told apart, 4 % of 4 and of 5 (simulated, normal scores)."""
+TOO_FEW = f"Fewer than {LEAST_RUNS} seeds decide nothing."
 
 
 def further(claims: Iterable[Claim]) -> tuple[Claim, ...]:
@@ -91,7 +92,7 @@ def _judged(
     allowed: float = 0.0,
 ) -> Claim:
     if not len(first) or not len(second):
-        return Claim(text, "undecided", "No complete runs.", judged=False)
+        return Claim(text, "undecided", "No complete runs.")
     found = difference(first, second, target_scene)
     pair = (second, first) if more else (first, second)
     numbers = {
@@ -105,8 +106,7 @@ def _judged(
         f"over targets: {numbers['probability of improvement']}; {len(first)} and {len(second)} seeds."
     )
     if min(len(first), len(second)) < LEAST_RUNS:
-        few = f"{evidence} Fewer than {LEAST_RUNS} seeds decide nothing."
-        return Claim(text, "undecided", few, numbers, judged=False)
+        return Claim(text, "undecided", f"{evidence} {TOO_FEW}", numbers)
     p = permutation_p(first, second, target_scene, allowed)
     return Claim(text, _side(-found if more else found, allowed), evidence, numbers, p=p)
 

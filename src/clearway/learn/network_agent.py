@@ -9,7 +9,7 @@ from torch import Tensor
 from clearway.agents.agent import Agent
 from clearway.agents.arrival import Arrival
 from clearway.agents.by_features import FeatureAgent
-from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, plugin_of
+from clearway.learn.foreign_agent import ForeignTrained, faults_of_agent, is_ours, plugin_of
 from clearway.model.policy import ScenePolicy
 from clearway.perception.encoder import Encoder
 from clearway.scenes.actions import ACTION_COUNT
@@ -61,6 +61,8 @@ class NetworkAgent(FeatureAgent):
 
     def _asked(self, history: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         """What the network says, see `ScenePolicy`."""
+        if is_ours(self._trained):
+            return super()._asked(history, target)
         with faults_of_agent(self._trained, "its network"):
             answers = super()._asked(history, target)
             for found, width in zip(answers, (ACTION_COUNT, 1), strict=True):

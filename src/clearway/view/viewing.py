@@ -8,7 +8,7 @@ Messages are JSON objects. The page says what to `do`:
     {"do": "map", "walker": 0}                            values and probabilities of every pose
 
 and gets one answer to each, told apart by its `kind`: "episode", "steps", "map" or "refused" (with a `text`). A refused
-message changes nothing, but that an episode ends where an agent fails.
+message changes nothing, but that an episode ends where an agent fails at a step.
 """
 
 from __future__ import annotations
@@ -121,14 +121,15 @@ class Viewing:
         return replace(self.episode, walks=tuple(letters(walker.actions) for walker in self.walkers))
 
     def _step(self, actions: list[int | None], moving: set[int]) -> Message:
+        before = [len(walker.steps) for walker in self.walkers]
         try:
             steps = [
                 walker.step(action) if index in moving else None
                 for index, (walker, action) in enumerate(zip(self.walkers, actions, strict=True))
             ]
         except ClearwayError:
-            for walker in self.walkers:
-                walker.stopped = True
+            for walker, count in zip(self.walkers, before, strict=True):
+                walker.stop(count)
             raise
         sent = [_sent(step) if step else None for step in steps]
         return {"kind": "steps", "steps": sent, "ended": self._ended(), "link": self.walked().query()}

@@ -138,6 +138,11 @@ class Walker:
         )
         return self.steps[-1]
 
+    def stop(self, count: int) -> None:
+        """End the walk, and keep so many of its steps."""
+        del self.steps[count:]
+        self.stopped = True
+
     def map_of_mind(self) -> Decisions:
         """What the agent holds in all poses of the scene (S), each as at the start of an episode.
 
