@@ -24,4 +24,3 @@ def test_five_claims_a_learner_wait_for_runs(tmp_path: Path) -> None:
     assert len(found.claims) == 5 * len(setting.learners)
     assert all(claim.further and claim.verdict == "undecided" for claim in found.claims)
     assert [row for row in found.tables[0].rows if CELLS in row]
-    assert len(found.missing) == len(jobs(setting))

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 
 from clearway.experiments.convergence import settling_table
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import Group, all_jobs, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
@@ -70,7 +70,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(*tables, settling_table(NAME, setting, groups)),
         claims=further(_claims(setting, groups)),
-        missing=all_missing(groups, setting.out),
     )
 
 

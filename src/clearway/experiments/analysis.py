@@ -17,7 +17,7 @@ from clearway.evaluation.metrics import METRIC_NAMES, average, by_scene
 from clearway.evaluation.optimum import world_yardsticks
 from clearway.evaluation.oracle import ENTROPY_WEIGHT, Expected
 from clearway.experiments import table1
-from clearway.experiments.groups import PAIR, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, all_jobs, compared
 from clearway.experiments.kept import keep, kept
 from clearway.experiments.plan import Job
 from clearway.experiments.section import ReportFigure, ReportTable, Section, Series, Value
@@ -103,7 +103,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(ReportTable("analysis", "Soft fixed points and optima", headings, tuple(rows), folded=True),),
         figures=tuple(_pareto(setting, found, metric) for metric in SHOWN),
-        missing=all_missing(compared(setting, PAIR), setting.out),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from clearway.evaluation.episodes import EpisodeTable
 from clearway.experiments.convergence import ONE_TARGET
-from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, compared
 from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, Section, Series
@@ -54,7 +54,6 @@ def section(setting: Setting) -> Section:
         ),
         figures=tuple(figure for figure in figures if figure.series),
         claims=tuple(_claims(setting, groups)),
-        missing=all_missing(groups, setting.out),
     )
 
 

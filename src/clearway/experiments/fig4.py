@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.job import run_folder
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
@@ -41,7 +41,6 @@ def section(setting: Setting) -> Section:
         tables=(_table(setting, groups), settled),
         figures=tuple(_curves(setting, groups)),
         claims=(*_claims(setting, groups), *sooner),
-        missing=all_missing(groups, setting.out),
     )
 
 

@@ -17,7 +17,7 @@ from clearway.experiments.generalisation import (
     told_of_own_goals,
     tried,
 )
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, all_missing, random_walk
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
 from clearway.experiments.plan import RANDOM_WALK, Job, TargetSets
@@ -43,7 +43,6 @@ def section(setting: Setting) -> Section:
     rows: list[tuple[Value, ...]] = []
     by_target: list[tuple[Value, ...]] = []
     kinds: dict[Kind, list[Tried]] = {}
-    missing: dict[str, None] = {}
     for steps in DISTANCES:
         groups = _groups(setting, steps)
         world = setting.world(groups[0].trial.targets)
@@ -58,7 +57,6 @@ def section(setting: Setting) -> Section:
             kinds.setdefault(kind, []).append(figures)
             rows.append(_row(steps, kind, figures))
             by_target += [(steps, *row) for row in figures.by_target(world, kind[0] or "walked", kind[1])]
-        missing.update(dict.fromkeys(all_missing(groups, setting.out)))
     averages = {kind: together(parts) for kind, parts in kinds.items()}
     rows += [_row(AVERAGE, kind, figures) for kind, figures in averages.items()]
     points = {
@@ -98,7 +96,6 @@ def section(setting: Setting) -> Section:
             ),
         ),
         claims=(*_claims(setting, averages), *_falls(setting, kinds)),
-        missing=tuple(missing),
     )
 
 

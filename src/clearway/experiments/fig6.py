@@ -55,14 +55,12 @@ def section(setting: Setting) -> Section:
     by_target: list[tuple[Value, ...]] = []
     flat = {RANDOM_WALK: walked} | {", ".join(kind): figures for kind, figures in on_map.items()}
     points = {label: [(float(count), figures) for count in TRAINED] for label, figures in flat.items()}
-    missing: dict[str, None] = {}
     for count in TRAINED:
         for group, own in zip(_groups(setting, count), _on_trained(setting, count), strict=True):
             figures = Tried(group.scores(setting.out, world.target_count), target_scene)
             rows.append((count, group.learner, len(figures.scores), _learnt(setting, own), *figures.cells()))
             by_target += [(count, *row) for row in figures.by_target(world, group.learner, group.agent)]
             points.setdefault(group.learner, []).append((count, figures))
-            missing.update(dict.fromkeys((*group.missing(setting.out), *own.missing(setting.out))))
     for kind, figures in on_map.items():
         rows.append((None, ", ".join(kind), len(figures.scores), None, *figures.cells()))
         by_target += [(None, *row) for row in figures.by_target(world, *kind)]
@@ -91,7 +89,6 @@ def section(setting: Setting) -> Section:
         ),
         figures=(ReportFigure("fig6", title, "training targets a scene", "success score", lines(points), band=BAND),),
         claims=tuple(_claims(setting, points, target_scene)),
-        missing=tuple(missing),
     )
 
 

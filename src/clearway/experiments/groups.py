@@ -48,10 +48,6 @@ class Group:
         found = [(run.seed, episodes_of(out, run, self.trial)) for run in self.runs]
         return scores({seed: table for seed, table in found if table is not None}, target_count)
 
-    def missing(self, out: Path) -> list[str]:
-        """Names of runs that are not complete."""
-        return [run.name for run in self.runs if episodes_of(out, run, self.trial) is None]
-
 
 @dataclass(frozen=True)
 class Scores:
@@ -147,8 +143,3 @@ def compared(
 def all_jobs(groups: Iterable[Group]) -> list[Job]:
     """What must be done for some groups."""
     return [job for group in groups for job in group.jobs()]
-
-
-def all_missing(groups: Iterable[Group], out: Path) -> tuple[str, ...]:
-    """Names of the groups' runs that are not complete."""
-    return tuple(dict.fromkeys(name for group in groups for name in group.missing(out)))

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, compared
 from clearway.experiments.hard_targets import hard_targets
 from clearway.experiments.kept import keep, kept
 from clearway.experiments.navigation_tables import navigation_tables
@@ -65,7 +65,6 @@ class HardTable:
             ),
             tables=(*tables, settled),
             claims=(*claims(setting, groups, where), *sooner, *self._beside_easy(setting, groups)),
-            missing=all_missing((*groups, *others), setting.out),
         )
 
     def _beside_easy(self, setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:

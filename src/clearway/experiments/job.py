@@ -6,7 +6,7 @@ is, so a job that was interrupted goes on from its last checkpoint.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from clearway.errors import RunError
@@ -39,6 +39,11 @@ def trial_path(out: Path, run: PlannedRun, trial: Trial | LiveTrial) -> Path:
 def is_done(out: Path, job: Job) -> bool:
     """All of the job's trials have been walked."""
     return all(trial_path(out, job.run, trial).exists() for trial in job.trials)
+
+
+def unfinished(out: Path, jobs: Iterable[Job]) -> tuple[str, ...]:
+    """Names of the runs whose jobs are not done."""
+    return tuple(dict.fromkeys(job.run.name for job in jobs if not is_done(out, job)))
 
 
 def do(out: Path, job: Job, threads: int) -> None:

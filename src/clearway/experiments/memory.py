@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.learnt_maps import (
     ABOUT_MAPS,
     FRAMES_A_POSE,
@@ -43,7 +43,6 @@ def section(setting: Setting) -> Section:
         tables=(_table(setting, groups, mapped),),
         figures=(_curve(mapped),),
         claims=tuple(_claims(setting, groups, mapped)),
-        missing=all_missing(groups, setting.out),
     )
 
 

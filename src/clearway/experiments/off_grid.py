@@ -10,7 +10,7 @@ import numpy as np
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.errors import ClearwayError
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.job import is_done, trial_path
+from clearway.experiments.job import trial_path
 from clearway.experiments.live_trial import FIGURES, read_live
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, LiveWalker, PlannedRun
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -81,9 +81,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(_table(setting, found),) if groups else (),
         claims=further(_claims(setting, found)) if groups else (),
-        missing=tuple(
-            dict.fromkeys(job.run.name for group in groups for job in group.jobs if not is_done(setting.out, job))
-        ),
     )
 
 

@@ -16,7 +16,7 @@ from clearway.experiments.setting import Setting
 from clearway.plugins import Plugin, load_plugin
 from clearway.scenes.parts import is_name
 
-PARTS = {"tables": ReportTable, "figures": ReportFigure, "maps": ReportMap, "claims": Claim, "missing": str}
+PARTS = {"tables": ReportTable, "figures": ReportFigure, "maps": ReportMap, "claims": Claim}
 
 
 def plugged_experiment(plugin: Plugin) -> Experiment:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from clearway.evaluation.criteria import Criteria, Quality, quality
 from clearway.experiments.convergence import settling_table
-from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -48,7 +48,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(_table(setting, world, found), settling_table(NAME, setting, groups)),
         claims=further(_claims(setting, found)),
-        missing=all_missing(groups, setting.out),
     )
 
 

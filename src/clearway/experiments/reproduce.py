@@ -16,7 +16,7 @@ from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import experiment, in_order
 from clearway.experiments.correction import corrected
 from clearway.experiments.expected_time import told_time
-from clearway.experiments.job import is_done
+from clearway.experiments.job import is_done, unfinished
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
@@ -198,9 +198,14 @@ def _question(request: ReproduceRequest) -> str:
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
     names = _known(request)
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
-        sections = [corrected(experiment(name).section(setting)) for name in names]
+        sections = [_section(name, setting) for name in names]
     _check_files(sections)
     return Reproduction(tuple(request.commands), tuple(request.changes), setting, planned(setting, names), sections)
+
+
+def _section(name: str, setting: Setting) -> Section:
+    found = experiment(name)
+    return replace(corrected(found.section(setting)), missing=unfinished(setting.out, found.jobs(setting)))
 
 
 def _check_files(sections: Sequence[Section]) -> None:

@@ -150,7 +150,7 @@ class Section:
         title: of the section.
         text: what was done, in a few sentences.
         tables, figures, maps, claims: what came of it.
-        missing: runs that are not complete, by name.
+        missing: runs that are not complete, by name; `clearway reproduce` fills it in.
     """
 
     name: str

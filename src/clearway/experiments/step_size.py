@@ -19,7 +19,7 @@ from clearway.experiments.convergence import (
     settled_by_seed,
     settling_table,
 )
-from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, Section
@@ -83,7 +83,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(*tables, settling_table(NAME, setting, groups)) if groups else (),
         claims=further(_claims(setting, groups)),
-        missing=all_missing(groups, setting.out),
     )
 
 

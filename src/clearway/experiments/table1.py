@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from clearway.experiments.groups import PAIR, Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import PAIR, Group, all_jobs, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.other_learners import other_learners
 from clearway.experiments.paper_numbers import TABLE_1
@@ -44,7 +44,6 @@ def section(setting: Setting) -> Section:
         tables=tables,
         maps=maps(setting, groups),
         claims=(*claims(setting, groups), *_tenth(setting, groups)),
-        missing=all_missing((*groups, *others), setting.out),
     )
 
 

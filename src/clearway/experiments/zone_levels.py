@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settling_table
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import Group, all_jobs, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
@@ -42,7 +42,6 @@ def section(setting: Setting) -> Section:
             settling_table(NAME, setting, groups),
         ),
         claims=further(_claims(setting, groups)),
-        missing=all_missing(groups, setting.out),
     )
 
 

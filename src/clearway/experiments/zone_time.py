@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from clearway.experiments.groups import Group, Scores, all_jobs, all_missing, compared, random_walk
+from clearway.experiments.groups import Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -44,7 +44,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(_table(setting, groups),),
         claims=further(_claims(setting, groups)),
-        missing=all_missing(groups, setting.out),
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settling
-from clearway.experiments.groups import Group, all_jobs, all_missing, compared
+from clearway.experiments.groups import Group, all_jobs, compared
 from clearway.experiments.navigation_tables import navigation_tables
 from clearway.experiments.paper_numbers import TABLE_1
 from clearway.experiments.plan import Job
@@ -88,7 +88,6 @@ def section(setting: Setting) -> Section:
         ),
         tables=(*tables, settled),
         claims=further((*sooner, *_claims(setting, groups))),
-        missing=all_missing(groups, setting.out),
     )
 
 
