@@ -35,7 +35,7 @@ def figures(folder: Path) -> dict[str, dict[str, np.ndarray]]:
     setting = gather(folder).setting
     world, mark = setting.world(), mark_steps(setting, setting.targets)
     found = {}
-    for group in compared(setting, PAIR):
+    for group in (group for group in compared(setting, PAIR) if group.learner == "paper"):
         own = group.scores(setting.out, world.target_count)
         values = (
             own.of("collisions").mean(1),

@@ -24,11 +24,11 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
+from family import processor_s
 
 import clearway.envs  # noqa: F401 (registers)
 from clearway.envs.registration import LIVE_ENV_ID
@@ -57,24 +57,6 @@ def moves_per_s(envs: LiveImageGoalVectorEnv, seconds: float) -> float:
             episode = episodes.begin(episodes.planned(count), last=episode)
         count += 1
     return count / (time.perf_counter() - begin)
-
-
-def processor_s(process: int | None = None) -> float:
-    """Processor time of a process (None: this one) and of all that it started and that are there, seconds."""
-    if not Path("/proc/self/task").exists():
-        return float("nan")
-    process = os.getpid() if process is None else process
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    children = [int(child) for task in Path(f"/proc/{process}/task").iterdir() for child in _children(task)]
-    own = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-    return own + sum(map(processor_s, children))
-
-
-def _children(task: Path) -> list[str]:
-    try:
-        return (task / "children").read_text().split()
-    except OSError:  # a thread that has ended meanwhile
-        return []
 
 
 @dataclass(frozen=True)

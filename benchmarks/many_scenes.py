@@ -22,6 +22,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from family import family
 
 from clearway.scenes.floor_plans import FloorPlan
 from clearway.scenes.grid import connected_parts, neighbour_pairs
@@ -63,15 +64,6 @@ def memory_gb(pid: int) -> float:
         return 0.0
 
 
-def descendants(pid: int) -> list[int]:
-    """A process and all that it started."""
-    try:
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    except (FileNotFoundError, ProcessLookupError):
-        children = []
-    return [pid, *(one for child in children for one in descendants(int(child)))]
-
-
 def main() -> None:
     """Make rooms, train one update, print figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -90,7 +82,7 @@ def main() -> None:
         started, began = time.time(), 0.0
         with subprocess.Popen([*command, "--set", *settings], stdout=subprocess.DEVNULL) as process:
             while process.poll() is None:
-                for pid in descendants(process.pid):
+                for pid in family(process.pid):
                     most[pid] = max(most.get(pid, 0.0), memory_gb(pid))
                 if not began and (out / "run.json").exists():
                     began = time.time()

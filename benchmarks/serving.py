@@ -24,10 +24,12 @@ def served(agent: str, *options: str, environment: Mapping[str, str] | None = No
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=variables) as process:
         try:
             assert process.stderr is not None
-            line = process.stderr.readline()
-            found = re.search(r"http://\S+", line)
+            lines, found = [], None
+            while found is None and (line := process.stderr.readline()):  # before, it may tell that it exports an agent
+                lines.append(line)
+                found = re.search(r"http://\S+", line)
             if found is None:
-                sys.exit(f"the service did not start: {line}{process.stderr.read()}")
+                sys.exit(f"the service did not start: {''.join(lines)}")
             yield found[0], process.pid
         finally:
             process.terminate()

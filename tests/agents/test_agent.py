@@ -11,7 +11,8 @@ from clearway.agents.agent import FEATURES, POSE, Agent, Decisions, Observation,
 from clearway.agents.by_features import FeatureAgent
 from clearway.agents.by_pose import RandomWalk, network_on_poses, shortest_paths
 from clearway.agents.selection import Argmax, ArgmaxUntried
-from clearway.evaluation.optimum import optimum_agents, world_yardsticks
+from clearway.evaluation.optimum import policies_agent, world_tasks
+from clearway.evaluation.oracle import Task, optimal_policy, soft_policy
 from clearway.learn.q_learning import QLearning, TrainedTable
 from clearway.learn.run_record import record_of
 from clearway.reward import COLLISION_AWARE
@@ -37,15 +38,15 @@ def network(world: World) -> Agent:
     return network_on_poses(found.lookup(world), world, found.record.learner.reward_scale)
 
 
-def optimum(world: World, which: int) -> Agent:
-    return optimum_agents(world, world_yardsticks(world, COLLISION_AWARE))[which]
+def optimum(world: World, policy: Callable[[Task], np.ndarray]) -> Agent:
+    return policies_agent(world, [policy(task) for task in world_tasks(world, COLLISION_AWARE)])
 
 
 AGENTS: dict[str, tuple[Callable[[World], Agent], bool]] = {
     "random walk": (lambda world: RandomWalk(), True),
     "shortest paths": (shortest_paths, True),
-    "optimum": (lambda world: optimum(world, 0), True),
-    "soft optimum": (lambda world: optimum(world, 1), True),
+    "optimum": (lambda world: optimum(world, optimal_policy), True),
+    "soft optimum": (lambda world: optimum(world, soft_policy), True),
     "network": (network, True),
     "trained network": (lambda world: trained_network().on_poses(world), True),
     "trained table": (lambda world: trained_table().on_poses(world), True),

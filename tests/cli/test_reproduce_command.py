@@ -261,9 +261,24 @@ def test_rooms_beside_dumps_are_refused(clearway, dumps: Path, tmp_path: Path) -
 def test_other_frames_and_rooms_show_on_top() -> None:
     changed = BUDGETS["paper"].changed(("kitchen",), 2_000_000)
     assert (changed.frames, changed.default_frames, changed.rooms) == (2_000_000, 2_000_000, ("kitchen",))
-    assert "2,000,000" in changed.warning and "10,000,000" in changed.warning
+    told = changed.warning(1)
+    assert told == (
+        "Less than the paper's budget: 1 of 4 scenes; 2,000,000 frames in the main experiment instead of the paper's "
+        "10,000,000."
+    )
     assert BUDGETS["paper"].changed() == BUDGETS["paper"]
-    assert BUDGETS["paper"].changed(frames=20_000_000).warning == ""  # no less than the paper's
+    assert BUDGETS["paper"].changed(frames=20_000_000).warning(4) == ""  # no less than the paper's
+    assert BUDGETS["paper"].changed(("kitchen", "kitchen")).rooms == ("kitchen",)
+
+
+def test_a_smoke_run_of_more_frames_learns_something() -> None:
+    smoke = BUDGETS["smoke"]
+    for few in (None, 100, smoke.frames):
+        assert smoke.changed(frames=few).warning(1).endswith("its trainings end before anything is learnt.")
+    assert smoke.changed(frames=5_000_000).warning(4) == (
+        "Less than the paper's budget: 5,000,000 frames in the main experiment instead of the paper's 10,000,000; "
+        "10 episodes a target instead of 100, of 500 steps at most."
+    )
 
 
 def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:

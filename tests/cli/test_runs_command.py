@@ -56,6 +56,22 @@ def test_a_run_that_cannot_be_read_hides_no_other(clearway, runs):
     assert "runs/sub/b" in answer.out and "runs/a " not in answer.out
 
 
+def test_what_lies_in_a_run_is_no_other_run(clearway, runs):
+    for place in (runs / "a" / ".copied-0f", runs / ".trash"):  # as a copy under way has it
+        place.mkdir()
+        shutil.copy(runs / "a" / "run.json", place)
+    shutil.copytree(runs / "sub" / "b", runs / "a" / "kept")
+    assert [run["run"] for run in clearway("runs", "list", "--json").json] == ["runs/a", "runs/sub/b"]
+
+
+def test_a_run_of_damaged_checkpoints_keeps_no_other_from_being_cleaned(clearway, runs):
+    for path in (runs / "a" / "checkpoints").iterdir():
+        for file in path.iterdir():
+            file.write_bytes(b"")
+    answer = clearway("runs", "clean", "--yes")
+    assert answer.code == 0 and "left alone: " in answer.err and "removed 1 old checkpoint" in answer.err
+
+
 def test_folders_without_runs(clearway, tmp_path):
     assert clearway("runs", "list", tmp_path).refusal("holds no runs", "clearway train")
     for name in ("list", "clean"):

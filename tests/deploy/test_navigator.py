@@ -1,5 +1,6 @@
 """A robot's ten lines: pictures in, actions out."""
 
+import io
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -16,6 +17,7 @@ from clearway.reward import COLLISION_AWARE
 from clearway.world.navigation import Navigation
 from helpers.agents import after_poses, equal
 from helpers.imported import imported_by
+from helpers.serving import picture_bytes
 from helpers.sums import Sums, plain
 
 
@@ -136,6 +138,12 @@ def test_threads_may_share_a_navigator() -> None:
 PICTURE = np.zeros((4, 4, 3), np.uint8)
 
 
+def cut_off() -> Image.Image:
+    """A picture of a file that was cut off, which Pillow notices once its pixels are asked for."""
+    content = picture_bytes(np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8), "JPEG")
+    return Image.open(io.BytesIO(content[: len(content) // 2]))
+
+
 @pytest.mark.parametrize(
     ("picture", "part"),
     [
@@ -149,6 +157,7 @@ PICTURE = np.zeros((4, 4, 3), np.uint8)
         ([[1, 2], [3]], "what is seen is no picture .*Give an array"),
         (np.zeros((1, 4097, 3), np.uint8), "4097 x 1 pixels, expected at most 4096"),
         (Image.new("L", (5, 5)), r"uint8 \(5, 5\)"),
+        (cut_off(), r"what is seen is no picture \(image file is truncated.*Give an array"),
     ],
 )
 def test_what_is_no_picture_is_refused(picture, part) -> None:

@@ -1,13 +1,16 @@
 """Exported files that were changed, cut off or are something else are refused."""
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import onnx
 import pytest
 
 from clearway.deploy.card import Card, card_from_json
-from clearway.deploy.onnx_file import MAX_BYTES, OnnxAgent, read_onnx
+from clearway.deploy.onnx_file import MAX_BYTES, OnnxAgent, OnnxFile, read_onnx
 from clearway.errors import DeployError
 from clearway.scenes.actions import ACTION_NAMES
 
@@ -88,6 +91,8 @@ def test_a_card_round_trip() -> None:
                 ({"actions": [1, 2, 3, 4]}, "action 0 is 1)"),
                 ({"takes_pictures": "no"}, "takes_pictures is 'no')"),
                 ({"picture_size": [1_000_000, 3]}, "the pictures' height is 1000000)"),
+                ({"picture_size": [math.inf, 3]}, "cannot convert float infinity to integer)"),
+                ({"format_version": math.inf}, "cannot convert float infinity to integer)"),
                 ({"settings": None}, "a part of it is no object)"),
                 ({"scene": 7}, "scene is 7)"),
             )
@@ -99,3 +104,37 @@ def test_cards_that_cannot_be_read(text, part) -> None:
     with pytest.raises(DeployError) as caught:
         card_from_json(text, "x.onnx")
     assert str(caught.value).startswith("x.onnx: ") and part in str(caught.value)
+
+
+class Answering:
+    """Stands in for a session: puts out these arrays."""
+
+    def __init__(self, **outputs: np.ndarray) -> None:
+        self.outputs, self.metadata = outputs, {}
+
+    def run(self, names, given):
+        return [self.outputs[name] for name in names]
+
+
+FAIR, SURE = np.full((1, 4), 0.25, np.float32), np.zeros((1, 1), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "value", "told"),
+    [
+        (FAIR, SURE[0], r"value of shape \(1,\), where its card says \(1, 1\)"),
+        (np.full((1, 10), 0.1, np.float32), SURE, r"probabilities of shape \(1, 10\), where its card says \(1, 4\)"),
+        (np.repeat(FAIR, 2, 0), SURE, r"probabilities of shape \(2, 4\)"),
+        (FAIR * np.nan, SURE, "probabilities that are not finite"),
+        (FAIR, SURE + np.inf, "value that are not finite"),
+        (FAIR - 0.3, SURE, "probabilities that are negative, or all zero"),
+        (FAIR * 0, SURE, "probabilities that are negative, or all zero"),
+    ],
+)
+def test_a_graph_that_puts_out_something_else_is_refused(probabilities, value, told) -> None:
+    card = replace(CARD, takes_pictures=False, settings={})
+    agent = OnnxAgent(OnnxFile(Answering(probabilities=probabilities, value=value), card, "x.onnx"))
+    seen = {"features": np.zeros((1, card.feature_count), np.float32)}
+    state = agent.reset(seen, np.zeros(1, np.int64))
+    with pytest.raises(DeployError, match=rf"x\.onnx: its graph puts out {told}"):
+        agent.act(seen, state)

@@ -109,6 +109,14 @@ def _length(value: int) -> bytes:
     return found + bytes([value])
 
 
+def test_a_field_s_number_has_no_bits_that_others_leave_out() -> None:
+    """Protobuf takes 32 bits of a field's number and kind: with a higher one set, it would still see a graph."""
+    whole = model(LOOP)
+    place = whole.index(b"\x3a")  # the graph
+    with pytest.raises(ValueError, match="a field of no number"):
+        problem_of(whole[:place] + b"\xba\x80\x80\x80\x10" + whole[place + 1 :])
+
+
 def test_what_is_no_message_is_told_in_one_line(tmp_path: Path) -> None:
     whole = model(ADD)
     for hurt in (whole[:-3], b"\xff" * 20 + whole, b"\x3b" + whole, b"\x38\x01" + whole):

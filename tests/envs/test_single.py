@@ -162,7 +162,7 @@ def test_the_reward_can_be_chosen() -> None:
 def test_a_seed_repeats() -> None:
     def episode(env: ImageGoalEnv, seed: int) -> list[Any]:
         states = [env.reset(seed=seed)[1]["state"]]
-        env.action_space.seed(seed)
+        env.action_space.seed(int(seed))  # it takes no integer of NumPy's
         for _ in range(10):
             *_, terminated, _, info = env.step(env.action_space.sample())
             states.append(info["state"])
@@ -173,6 +173,7 @@ def test_a_seed_repeats() -> None:
     env, other = ImageGoalEnv(grid_scene(1)), ImageGoalEnv(grid_scene(1))
     assert episode(env, 5) == episode(env, 5) == episode(other, 5)
     assert episode(env, 5) != episode(env, 6)
+    assert episode(env, np.int64(5)) == episode(other, 5)
 
 
 def test_it_goes_on_after_pickling() -> None:
@@ -197,7 +198,7 @@ def test_resets_that_do_not_fit() -> None:
     env = ImageGoalEnv(grid_scene(0))
     with pytest.raises(ResetNeeded):
         env.step(0)
-    for seed in (-1, 1.5):
+    for seed in (-1, 1.5, np.array(3)):
         with pytest.raises(EnvError, match="seed"):
             env.reset(seed=seed)
     with pytest.raises(EnvError, match="is for vector environments"):

@@ -1,3 +1,4 @@
+import json
 from io import StringIO
 from pathlib import Path
 
@@ -6,8 +7,9 @@ from rich.console import Console
 
 from clearway.experiments import board as module
 from clearway.experiments.board import Looks, RunState, board, clock, pace, state_of, state_table
-from clearway.experiments.job import do
+from clearway.experiments.job import do, run_folder
 from clearway.experiments.plan import Job
+from clearway.learn.run_folder import METRICS_FILE
 from clearway.reward import COLLISION_AWARE
 from helpers.small_setting import FRAMES, small_setting
 
@@ -26,6 +28,18 @@ def test_a_run_s_state_is_read_from_its_files(tmp_path: Path) -> None:
     trial.unlink()
     assert state_of(tmp_path, job, under_way=True).state == "trying"
     assert state_of(tmp_path, job, under_way=False).state == "waiting"
+
+
+def test_an_update_that_goes_beyond_the_frames_asked_for_counts_them_alone(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path, seeds=1)
+    (run,) = setting.runs(setting.learners["default"], COLLISION_AWARE)
+    folder = run_folder(tmp_path, run)
+    folder.path.mkdir(parents=True)
+    row = {"frames": FRAMES + 40, "seconds": 2.0, "solved_targets": 0}
+    (folder.path / METRICS_FILE).write_text(json.dumps(row) + "\n")
+    found = state_of(tmp_path, Job(run, (setting.trial(),)), under_way=True)
+    assert (found.state, found.frames, found.seconds_left) == ("trying", FRAMES, 0)
+    assert found.frames_per_s == (FRAMES + 40) / 2
 
 
 def test_the_table_shows_what_is_under_way_first() -> None:

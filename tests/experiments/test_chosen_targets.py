@@ -13,6 +13,8 @@ from clearway.evaluation.episodes import run_episodes
 from clearway.experiments import fig5, fig6, hard_tables
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.scenes.actions import BLOCKED, Action
+from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.plan_scenes import floor_plan_scene
 from clearway.scenes.scene import Scene
 from clearway.world.world import make_world
 from clearway.zones import Zone
@@ -54,6 +56,15 @@ def test_where_too_few_lie_apart_they_stand_as_far_as_they_can(cells: int, count
     chosen = hard_targets(scene, count)
     assert len(set(chosen.targets)) == count
     assert chosen.apart_cells == apart == least_apart(scene, chosen.targets)
+
+
+def test_hard_targets_lie_where_ways_lead() -> None:
+    """Beside a room of four cells lies another one of two, with no way between them."""
+    cells = np.array([[x, 0] for x in (0, 1, 2, 3, 9, 10)])
+    scene = floor_plan_scene(FloorPlan("two rooms", cells), feature_count=4)
+    chosen = hard_targets(scene, 5)
+    assert (scene.components[list(chosen.targets)] == 0).all() and (scene.components == 1).any()
+    assert max(chosen.rank) <= (scene.components == 0).sum()
 
 
 def test_hard_targets_are_written_once_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """How long a plan will take is told before it begins."""
 
+import json
 import time
 from dataclasses import replace
 from multiprocessing import active_children
@@ -9,8 +10,10 @@ import pytest
 
 from clearway.experiments import expected_time
 from clearway.experiments.expected_time import frames_per_second, told_time
+from clearway.experiments.job import run_folder
 from clearway.experiments.reproduce import planned
 from clearway.learn.presets import PAPER_A3C
+from clearway.learn.run_folder import METRICS_FILE
 from helpers.small_setting import small_setting
 
 
@@ -19,12 +22,26 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
     frames = sum(job.run.learner.frames for job in jobs)
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
     assert (
-        told_time(jobs, jobs, 2, 1)
+        told_time(tmp_path, jobs, jobs, 2, 1)
         == f"{len(jobs)} runs, {len(jobs)} to be trained, 2 at a time: 1 h 00 min of training here at least"
     )
-    on_cluster = told_time(jobs, jobs, None, 1)
+    on_cluster = told_time(tmp_path, jobs, jobs, None, 1)
     assert on_cluster.endswith("to be trained, one after the other: 2 h 00 min of training here")
-    assert told_time(jobs, [], 2, 1) == f"{len(jobs)} runs, 0 to be trained: all is there"
+    assert told_time(tmp_path, jobs, [], 2, 1) == f"{len(jobs)} runs, 0 to be trained: all is there"
+
+
+def test_what_has_been_trained_takes_no_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    jobs = planned(small_setting(tmp_path), ["fig4"])
+    (first, second), frames = jobs[:2], jobs[0].run.learner.frames
+    monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
+    for run, reached in ((first.run, frames + 3), (second.run, frames // 2)):  # the last update may go beyond
+        folder = run_folder(tmp_path, run)
+        folder.path.mkdir(parents=True)
+        (folder.path / METRICS_FILE).write_text(json.dumps({"frames": reached, "seconds": 1.0}) + "\n")
+    assert told_time(tmp_path, jobs, [first, second], 1, 1) == (
+        f"{len(jobs)} runs, 1 to be trained, 1 only to be evaluated, 1 at a time: 1 h 00 min of training here at least"
+    )
+    assert told_time(tmp_path, jobs, [first], 1, 1) == f"{len(jobs)} runs, 0 to be trained, 1 only to be evaluated"
 
 
 def test_each_kind_of_learner_is_tried_once_and_nothing_is_kept(
@@ -39,7 +56,7 @@ def test_each_kind_of_learner_is_tried_once_and_nothing_is_kept(
         return measure(run, threads)
 
     monkeypatch.setattr(expected_time, "frames_per_second", counted)
-    assert "of training here" in told_time(jobs, jobs, 2, 1)
+    assert "of training here" in told_time(tmp_path, jobs, jobs, 2, 1)
     assert len(tried) == 2 < len(jobs)
     assert not (tmp_path / "runs").exists()
 
@@ -57,5 +74,5 @@ def test_asynchronous_workers_are_tried_too_and_ended(tmp_path: Path, monkeypatc
     monkeypatch.setattr(expected_time, "TRIED_S", 0.1)
     learner = replace(PAPER_A3C, width=8, feature_basis=8, frames=1_000_000)
     jobs = [replace(job, run=replace(job.run, learner=learner))] * 2
-    told = told_time(jobs, jobs, 1, 1)
+    told = told_time(tmp_path, jobs, jobs, 1, 1)
     assert "of training here at least" in told and not active_children()

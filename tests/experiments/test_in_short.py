@@ -45,3 +45,11 @@ def test_it_is_never_longer_than_ten_lines() -> None:
 def test_many_claims_of_a_kind_are_counted() -> None:
     (line,) = in_short(section(*(claim(f"paper: {name}", "holds") for name in "abcde")))
     assert line == "paper, the paper's claims. Holds (5): a; b; c; and 2 more."
+
+
+def test_claims_of_no_learner_are_told_whole() -> None:
+    claims = [claim("Clearance collides less.", "holds"), claim("It is slower.", "undecided", further=True)]
+    assert in_short(section(*claims)) == (
+        "The paper's claims. Holds (1): Clearance collides less.",
+        "Further claims. Undecided (1): It is slower.",
+    )

@@ -6,7 +6,7 @@ import pytest
 
 from clearway.errors import RunError
 from clearway.experiments.groups import PAIR, all_jobs, compared
-from clearway.experiments.job import do, episodes_of, is_done, run_folder
+from clearway.experiments.job import do, episodes_of, is_done, run_folder, unfinished
 from clearway.experiments.plan import Job
 from clearway.experiments.trajectories import maps
 from clearway.learn import train
@@ -118,3 +118,20 @@ def test_milestones_are_kept_beside_the_checkpoints(tmp_path: Path) -> None:
     do(tmp_path, job, threads=1)
     folder = run_folder(tmp_path, job.run)
     assert [path.name for path in folder.milestone(job.run.halfway).iterdir()] == ["frames-000000000240"]
+
+
+def test_a_job_without_trials_is_done_once_it_is_trained(tmp_path: Path) -> None:
+    job = replace(made_job(tmp_path), trials=())
+    assert not is_done(tmp_path, job) and unfinished(tmp_path, [job]) == (job.run.name,)
+    do(tmp_path, job, threads=1)
+    assert is_done(tmp_path, job) and not unfinished(tmp_path, [job])
+
+
+def test_targets_may_be_numpy_s(tmp_path: Path) -> None:
+    job = made_job(tmp_path)
+    targets = tuple(tuple(np.array(own)) for own in job.run.targets)
+    numpys = Job(replace(job.run, targets=targets), (replace(job.trials[0], targets=targets),))
+    assert numpys == Job(job.run, job.trials[:1]) and numpys.run.name == job.run.name
+    assert {type(target) for each in (numpys.run, *numpys.trials) for own in each.targets for target in own} == {int}
+    do(tmp_path, numpys, threads=1)
+    assert is_done(tmp_path, Job(job.run, job.trials[:1]))

@@ -18,8 +18,9 @@ from helpers.small_setting import small_setting
 
 MADE = """
 from clearway.experiments.experiment import Experiment
-from clearway.experiments.section import ReportTable, Section
+from clearway.experiments.section import ReportFigure, ReportMap, ReportTable, Section
 def table(name): return ReportTable(name, "Seeds", ("seed",), ((1,),))
+def drawn(**parts): return lambda setting: Section("odd", "", "", **parts)
 """
 
 
@@ -63,6 +64,14 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         (
             "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('../a'),)))",
             r"no file can be called '\.\./a', as a table or figure is",
+        ),
+        (
+            "Experiment(lambda s: [], drawn(figures=(ReportFigure('a', 'A', 'x', 'y', ()),)))",
+            "its figure 'a' has no series",
+        ),
+        (
+            "Experiment(lambda s: [], drawn(maps=(ReportMap('a', 'A', 'attic', 0, {}),)))",
+            "it has a map of 'attic', expected one of bathroom, kitchen",
         ),
     ],
 )

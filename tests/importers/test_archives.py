@@ -34,6 +34,13 @@ def test_scene_files_of_an_archive_stand_beside_plain_ones(tmp_path: Path) -> No
     assert not files[0].exists() and files[2].exists()
 
 
+def test_names_of_other_systems_are_those_behind_the_last_folder(tmp_path: Path) -> None:
+    write_scene(corridor_scene(3), tmp_path / "in.h5")
+    archive = zipped(tmp_path / "dumps.zip", {"scenes\\p.h5": (tmp_path / "in.h5").read_bytes()})
+    with unpacked([archive], SUFFIXES) as files:
+        assert [file.name for file in files] == ["p.h5"]
+
+
 def test_a_folder_named_like_an_archive_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "dumps.zip").mkdir()
     with unpacked([tmp_path / "dumps.zip"], SUFFIXES) as files:

@@ -100,6 +100,14 @@ def huge(folder: Path) -> str:
     return "eyes.json: damaged"
 
 
+def large(folder: Path) -> str:
+    path = folder / "eyes.json"
+    card = json.loads(path.read_text())
+    card["shape"] |= {"token_width": 4096, "description_width": 4096, "height_px": 512, "width_px": 512}
+    path.write_text(json.dumps(card))
+    return r"eyes\.json: a network of [0-9,]+ parameters, more than eyes\.safetensors can hold"
+
+
 def newer(folder: Path) -> str:
     path = folder / "eyes.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "format_version": 3}))
@@ -111,7 +119,7 @@ def gone(folder: Path) -> str:
     return "eyes.safetensors: cannot be read"
 
 
-@pytest.mark.parametrize("harm", [altered, cut, huge, newer, gone])
+@pytest.mark.parametrize("harm", [altered, cut, huge, large, newer, gone])
 def test_damaged_eyes_are_one_line(folder: Path, harm):
     record = find_record(str(folder), [])
     expected = harm(folder)

@@ -262,7 +262,14 @@ def test_a_plan_of_nothing_but_cells_needs_no_record() -> None:
     assert len(plan_of(scene).edges) == 4
 
 
+DAMAGED_AREAS = (
+    {"areas": [["attic", [0, 0]]]},
+    {"areas": [["bathroom", [0], [1]]]},
+    {"areas": [["bathroom", ["a", 0], [1, 1]]]},
+    {"areas": [["bathroom", [0, 0], [1, 1.5]]]},
+)
 DAMAGED_FURNITURE = (
+    {"furniture": [["sofa", [9, 9, 9], [9], "south"]]},
     {"furniture": [["sofa", [0, 0], [0, 0]]]},
     {"furniture": [["sofa", [0, 0, 0], [0, 0], "north"]]},
     {"furniture": [["sofa", ["0", 0], [0, 0], "north"]]},
@@ -274,7 +281,7 @@ def test_scenes_without_a_plan_are_refused() -> None:
     askew = replace(scene, locations_m=scene.locations_m + 0.1)
     with pytest.raises(SceneError, match=r"open: its poses are not those of a floor plan\. Make the scene"):
         plan_of(askew)
-    for parts in ({"areas": [["attic", [0, 0]]]}, {"walls": ["here"]}, *DAMAGED_FURNITURE, 3):
+    for parts in (*DAMAGED_AREAS, {"walls": ["here"]}, {"walls": [[2**70, 1]]}, *DAMAGED_FURNITURE, 3):
         damaged = replace(scene, made_by=replace(scene.made_by, notes={"plan": parts}))
         with pytest.raises(SceneError, match="the record of its floor plan is damaged"):
             plan_of(damaged)

@@ -253,15 +253,17 @@ FILL_UP = """
 import sys; sys.path[:] = {path!r}
 import os, resource
 from dataclasses import replace
+from pathlib import Path
 import numpy as np
 from clearway.errors import SceneError
+from clearway.scenes.export import export_thor_v1
 from clearway.scenes.thor_v1 import write_scene
 from helpers.made import corridor_scene
 
 pictures = np.random.default_rng(0).integers(0, 256, (12, 60, 80, 3), np.uint8)  # which pack badly
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, -1))
 try:
-    write_scene(replace(corridor_scene(3), observations=pictures), {file!r})
+    {write}(replace(corridor_scene(3), observations=pictures), Path({file!r}))
 except SceneError as error:
     print(error, flush=True)
     os._exit(0)
@@ -269,9 +271,10 @@ except SceneError as error:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
-def test_a_disk_that_fills_up_is_one_error_and_leaves_nothing(tmp_path: Path) -> None:
+@pytest.mark.parametrize("write", ["write_scene", "export_thor_v1"])
+def test_a_disk_that_fills_up_is_one_error_and_leaves_nothing(tmp_path: Path, write: str) -> None:
     """In a process of its own that ends at once, since HDF5 complains once more, or crashes, when it lets go of it."""
-    script = FILL_UP.format(path=sys.path, file=str(tmp_path / "a.h5"))
+    script = FILL_UP.format(path=sys.path, write=write, file=str(tmp_path / "a.h5"))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert "a.h5: cannot be written (" in done.stdout and "has room" in done.stdout

@@ -1,5 +1,6 @@
 """The client in the package."""
 
+import io
 import json
 import os
 import shutil
@@ -249,6 +250,16 @@ def test_pictures_that_cannot_be_read(client, tmp_path, name) -> None:
             give(tmp_path / name)
         with pytest.raises(DeployError, match="cannot be read"):
             give(str(tmp_path / name))
+
+
+def test_pictures_that_are_none_leave_the_count_as_it_is(client) -> None:
+    session = with_service(client, Client("http://testserver", TOKEN)).session()
+    content = picture_bytes(np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8), "JPEG")
+    for picture in (Image.open(io.BytesIO(content[: len(content) // 2])), [[1, 2], [3]]):
+        for give in (session.set_target, session.act):
+            with pytest.raises(DeployError, match="what is seen is no picture"):
+                give(picture)
+    assert session._answered == {"episode": 0, "step": 0}  # nothing was sent
 
 
 def test_a_client_needs_nothing_of_the_service_or_the_learner() -> None:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from clearway.serve.decoder import ANSWER, PIXELS, REFUSED
-from clearway.serve.decoders import Decoder, Decoders, Standing, _Ended
+from clearway.serve.decoders import FAILED_S, Decoder, Decoders, Standing, _Ended
 from clearway.serve.faults import Fault
 from clearway.serve.limits import Limits
 from clearway.serve.service import Service
@@ -191,6 +191,10 @@ def test_a_service_whose_decoders_cannot_start_is_not_ready(monkeypatch) -> None
             with pytest.raises(Fault, match="no picture can be decoded"):
                 await service.set_target(session, grey(1))
             assert not service.ready
+            later = time.monotonic() + FAILED_S
+            with monkeypatch.context() as patch:
+                patch.setattr(time, "monotonic", lambda: later)
+                assert service.ready  # who is sent no picture would never learn that decoders start again
             monkeypatch.undo()
             with pytest.raises(Fault, match="picture"):  # a decoder that refuses a picture has started
                 await service.set_target(session, b"no picture")

@@ -133,7 +133,7 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
         for name, learner in setting.learners.items()
     )
     changed = f"Changed in every learner compared: {', '.join(found.changes)}." if found.changes else ""
-    warning = " ".join(filter(None, (budget.warning, changed)))
+    warning = " ".join(filter(None, (budget.warning(len(setting.scenes)), changed)))
     facts = {
         "commands": "; ".join(found.commands),
         "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),

@@ -112,9 +112,9 @@ class CleanRuns:
 
         total = count = 0
         for folder in find_runs(self.folder):
-            if not old_checkpoints(folder):
-                continue
             try:
+                if not old_checkpoints(folder):
+                    continue
                 with folder.held() if self.yes else nullcontext():  # none that is being written; looking leaves no lock
                     for path in old_checkpoints(folder):
                         size = size_of(path)

@@ -71,20 +71,24 @@ def checked_seen(seen: object, card: Card) -> np.ndarray:
     Raises:
         DeployError: it is something else, too large, or not finite.
     """
+    return checked_picture(seen, card) if card.takes_pictures else _checked_features(seen, card)
+
+
+def _array(seen: object, wanted: str) -> np.ndarray:
     try:
-        array = np.asarray(seen)
-    except ValueError as fault:  # rows of unequal lengths
-        wanted, reason = "picture" if card.takes_pictures else "feature vector", " ".join(str(fault).split())[:120]
+        return np.asarray(seen)
+    except (ValueError, OSError) as fault:  # rows of unequal lengths; a picture whose file is cut off
+        reason = " ".join(str(fault).split())[:120]
         raise DeployError(f"what is seen is no {wanted} ({reason}). Give an array") from fault
-    return checked_picture(array, card) if card.takes_pictures else _checked_features(array, card)
 
 
-def checked_picture(picture: np.ndarray, card: Card | None = None) -> np.ndarray:
+def checked_picture(seen: object, card: Card | None = None) -> np.ndarray:
     """The picture, (height, width, 3) uint8, for an agent, or for one that is unknown.
 
     Raises:
         DeployError: it is something else, too large, or has another aspect than an agent for any room was taught on.
     """
+    picture = _array(seen, "picture")
     if picture.dtype.kind in "US":
         raise DeployError("the picture is a text. Give its pixels: of a file, np.asarray(PIL.Image.open(path))")
     if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3 or 0 in picture.shape:
@@ -105,7 +109,8 @@ def aspect_problem(picture: np.ndarray, card: Card) -> str | None:
     return other_aspect(picture.shape[:2], card.picture_size)
 
 
-def _checked_features(features: np.ndarray, card: Card) -> np.ndarray:
+def _checked_features(seen: object, card: Card) -> np.ndarray:
+    features = _array(seen, "feature vector")
     if features.dtype.kind != "f" or features.shape != (card.feature_count,):
         problem = f"given {features.dtype} {features.shape}, expected features, float32 ({card.feature_count},)"
         remedy = f"Encode the picture with {card.encoder.get('name')} first, or use an agent exported with its encoder"

@@ -83,7 +83,7 @@ def card_from_json(text: str, source: str) -> Card:
         card = Card(**{**kept, **sizes, "actions": tuple(kept["actions"])})
         _check(card)
         return card
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as fault:
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError) as fault:
         if isinstance(fault, DeployError):
             raise
         raise DeployError(f"{source}: its metadata cannot be read ({fault}). {EXPORT_AGAIN}") from fault

@@ -112,7 +112,7 @@ def exported_generalist(file: OnnxFile) -> GeneralistAgent:
         description_width = int(shape["shape"]["description_width"])
         settings = _settings(card.settings)
         record = EncoderRecord(str(card.encoder["name"]), str(card.encoder["identity"]), dict(shape))
-    except (KeyError, TypeError, ValueError, AttributeError) as fault:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as fault:
         problem = f"{file.source}: its card is not one of a generalist of clearway {__version__} ({fault})"
         raise DeployError(f"{problem}. {EXPORT_AGAIN}") from fault
     eyes = OnnxEyes(file, record, description_width)

@@ -29,7 +29,7 @@ class OnnxEyes:
     """
 
     def __init__(self, file: OnnxFile, record: EncoderRecord, description_width: int) -> None:
-        self._session, self.record, self._description_width = file.session, record, description_width
+        self._file, self.record, self._description_width = file, record, description_width
         self.feature_count = file.card.feature_count
         self._none = np.zeros((0, self.feature_count), np.float32)
 
@@ -38,7 +38,8 @@ class OnnxEyes:
         if pictures.ndim != 4 or pictures.shape[3] != 3 or pictures.dtype != np.uint8 or 0 in pictures.shape[1:3]:
             problem = f"pictures are {pictures.dtype} {pictures.shape}, expected uint8 (count, height, width, 3)"
             raise EncoderError(f"{problem}. Give RGB pictures")
-        return self._told("features", picture=np.ascontiguousarray(pictures))
+        shape = len(pictures), self.feature_count
+        return self._told("features", shape, picture=np.ascontiguousarray(pictures))
 
     def description(self, features: np.ndarray) -> np.ndarray:
         """See `Sight`."""
@@ -48,18 +49,18 @@ class OnnxEyes:
         """See `Sight`."""
         if not len(features):
             return np.zeros((0, len(PLACES_M)), np.float32)
-        return self._told("stands", seen=np.asarray(features, np.float32))
+        return self._told("stands", (len(features), len(PLACES_M)), seen=np.asarray(features, np.float32))
 
     def whereabouts(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """See `Sight`."""
         pairs = [np.asarray(features, np.float32) for features in (first, second)]
-        starts = range(0, len(first), AT_ONCE)
-        parts = [
-            self._told("whereabouts", first=pairs[0][b : b + AT_ONCE], second=pairs[1][b : b + AT_ONCE]) for b in starts
-        ]
+        parts = []
+        for begin in range(0, len(first), AT_ONCE):
+            one, other = (features[begin : begin + AT_ONCE] for features in pairs)
+            parts.append(self._told("whereabouts", (len(one), ELSEWHERE), first=one, second=other))
         return np.concatenate(parts) if parts else np.zeros((0, ELSEWHERE), np.float32)
 
-    def _told(self, output: str, **given: np.ndarray) -> np.ndarray:
-        """One of the graph's outputs, by its inputs."""
+    def _told(self, output: str, shape: tuple[int, ...], **given: np.ndarray) -> np.ndarray:
+        """One of the graph's outputs, of this shape, by its inputs."""
         nothing: dict[str, np.ndarray] = dict.fromkeys(("seen", "first", "second"), self._none)
-        return self._session.run([output], nothing | {"picture": NOTHING} | given)[0]
+        return self._file.run({output: shape}, nothing | {"picture": NOTHING} | given)[0]

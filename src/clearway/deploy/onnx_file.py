@@ -7,6 +7,7 @@ found by its bytes, so that no parser sees a file before it was checked.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -63,6 +64,21 @@ class OnnxFile:
     card: Card
     source: str
 
+    def run(self, shapes: Mapping[str, tuple[int, ...]], given: Mapping[str, np.ndarray]) -> list[np.ndarray]:
+        """The graph's outputs of these names and shapes, by its inputs.
+
+        Raises:
+            DeployError: one is of another shape or not finite; or as of `BoundedSession.run`.
+        """
+        outputs = self.session.run(list(shapes), given)
+        for (name, shape), output in zip(shapes.items(), outputs, strict=True):
+            if output.shape != shape:
+                problem = f"its graph puts out {name} of shape {output.shape}, where its card says {shape}"
+                raise DeployError(f"{self.source}: {problem}. {EXPORT_AGAIN}")
+            if not np.isfinite(output).all():
+                raise DeployError(f"{self.source}: its graph puts out {name} that are not finite. {EXPORT_AGAIN}")
+        return outputs
+
 
 def read_onnx(path: Path, threads: int | None = None) -> OnnxFile:
     """An exported agent's file.
@@ -93,7 +109,7 @@ class OnnxAgent:
     """
 
     def __init__(self, file: OnnxFile) -> None:
-        self._session, self.card = file.session, file.card
+        self._file, self.card = file, file.card
         if self.card.kind != SIAMESE:
             problem = f"{file.source}: holds an agent of the kind {self.card.kind!r:.40}, unknown to this clearway"
             raise DeployError(f"{problem}. Upgrade clearway")
@@ -119,7 +135,10 @@ class OnnxAgent:
         else:
             after = memory.history(state["history"][:, 1:], state["begun"], seen)
             given = {"history": after, "target": state["target"]}
-            probabilities, value = self._session.run(["probabilities", "value"], given)
+            probabilities, value = self._file.run(self._answers(len(seen)), given)
+        if (probabilities < 0).any() or not probabilities.any(axis=1).all():
+            problem = "its graph puts out probabilities that are negative, or all zero"
+            raise DeployError(f"{self._file.source}: {problem}. {EXPORT_AGAIN}")
         decisions, chance = drawn(probabilities, state[CHANCE], value[:, 0])
         if self._arrival is not None:
             decisions = replace(decisions, arrived=self._arrival(after[:, -1], state["target"]))
@@ -138,7 +157,11 @@ class OnnxAgent:
     ) -> list[np.ndarray]:
         """Probabilities (B, A), value (B, 1) and history (B, K, F) after pictures; where they start, they fill it."""
         given = {"picture": picture, "start": start, "history": history, "target": target}
-        return self._session.run(["probabilities", "value", "history_after"], given)
+        return self._file.run({**self._answers(len(picture)), "history_after": history.shape}, given)
+
+    def _answers(self, count: int) -> dict[str, tuple[int, ...]]:
+        """Shapes of what the graph tells of so many episodes."""
+        return {"probabilities": (count, len(self.card.actions)), "value": (count, 1)}
 
 
 def _arrival_of(file: OnnxFile) -> Arrival | None:

@@ -24,6 +24,7 @@ INSIDE = {
 """The messages in a message, by the numbers of their fields."""
 OPERATOR, DOMAIN = 4, 7  # of a node
 EXTERNAL_DATA, DATA_LOCATION = 13, 14  # of a tensor
+KEY_BITS = 32  # of a field's number and kind
 VARINT, FIXED_64, BYTES, FIXED_32 = 0, 1, 2, 5  # kinds of fields
 
 
@@ -67,6 +68,8 @@ def _fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
     place = 0
     while place < len(message):
         key, place = _varint(message, place)
+        if key >= 1 << KEY_BITS:  # others leave the rest of its bits out, and take it for another field
+            raise ValueError("a field of no number")
         number, kind = key >> 3, key & 7
         if kind == VARINT:
             value, place = _varint(message, place)

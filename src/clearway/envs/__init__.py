@@ -1,4 +1,4 @@
-"""Environments: the transition rule in batches (`navigation`), and Gymnasium's single and vector environments on it.
+"""Gymnasium's single and vector environments, on the transition rule in batches (`world.navigation`).
 
 Importing this package registers `Clearway/ImageGoal-v0` with Gymnasium; PyTorch is loaded when one is made.
 """

@@ -138,7 +138,8 @@ def seed_words(seed: int | Sequence[int | None] | np.ndarray, env_count: int) ->
 
     An int s means s, s + 1, ...; a sequence names each, None for none. Seeds count modulo 2^64.
     """
-    if not isinstance(seed, (int, np.integer, Sequence, np.ndarray)):
+    array = isinstance(seed, np.ndarray) and seed.ndim == 1
+    if not array and not isinstance(seed, (int, np.integer, Sequence)):
         raise EnvError(f"seed: expected an integer, or one for each of the {env_count} environments, got {seed!r}")
     seeds = [int(seed) + env for env in range(env_count)] if isinstance(seed, (int, np.integer)) else list(seed)
     if len(seeds) != env_count:

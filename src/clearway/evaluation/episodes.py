@@ -49,7 +49,7 @@ class EpisodeTable:
         start: (N,) int64, first state in the world's numbering.
         steps: (N,) int64, steps taken; the limit where the target was not reached.
         collisions: (N,) int64, blocked moves.
-        reached: (N,) bool, the target was reached before the limit.
+        reached: (N,) bool, the target was reached within the limit.
         shortest_path_steps: (N,) int64, fewest steps from the start to the target.
         zone_steps: (N, Z) int64, steps that arrived in each zone (`zones.Zone`); the target is in none.
         looped: (N,) bool, found before the limit to be in a circle of actions without choice, so never to arrive.

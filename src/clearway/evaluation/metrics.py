@@ -48,7 +48,7 @@ def shortest_path_steps(table: EpisodeTable) -> np.ndarray:
 
 
 def success(table: EpisodeTable) -> np.ndarray:
-    """1 where the target was reached before the limit, (N,)."""
+    """1 where the target was reached within the limit, (N,)."""
     return table.reached.astype(np.float64)
 
 

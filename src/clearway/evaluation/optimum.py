@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import torch
 
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import by_table
-from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Yardstick, task_of, yardstick
+from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Task, Yardstick, task_of, yardstick
 from clearway.reward import Reward
 from clearway.world.world import World
 
@@ -55,28 +56,34 @@ def world_yardsticks(
         entropy_weight: see there.
         starts: (M, E) int64 states in the world's numbering, to average over, see `episodes.episode_starts`; None: all.
     """
-    zone, table = world.zone.cpu().numpy(), reward.table(world.moves())  # of all scenes together, as training pays it
     found = []
-    for target, scene in enumerate(world.target_scene.tolist()):
-        first, last = world.scene_offset[scene : scene + 2].tolist()
-        task = task_of(world.graph(scene), zone[first:last], world.scene_state(target), table[:, first:last])
-        exact = yardstick(task, discount, entropy_weight, None if starts is None else starts[target] - first)
+    for target, (scene, task) in enumerate(zip(world.target_scene.tolist(), world_tasks(world, reward), strict=True)):
+        own = None if starts is None else starts[target] - int(world.scene_offset[scene])
+        exact = yardstick(task, discount, entropy_weight, own)
         found.append(TargetYardstick(world.scene_names[scene], task.target, exact))
     return found
 
 
-def optimum_agents(world: World, yardsticks: list[TargetYardstick]) -> tuple[Agent, Agent]:
-    """Agents of the optimal and of the soft policy of a world's yardsticks."""
-    rows = [
-        (target, slice(*world.scene_offset[scene : scene + 2].tolist()))
-        for target, scene in enumerate(world.target_scene.tolist())
-    ]
-    optimal = torch.zeros(world.target_count, world.state_count, world.next_state.shape[1])
-    soft = torch.zeros_like(optimal)
-    for (target, states), found in zip(rows, yardsticks, strict=True):
-        optimal[target, states] = torch.from_numpy(found.yardstick.optimal_policy).float()
-        soft[target, states] = torch.from_numpy(found.yardstick.soft_policy).float()
-    return by_table(world, optimal.to(world.device)), by_table(world, soft.to(world.device))
+def world_tasks(world: World, reward: Reward) -> list[Task]:
+    """The decision problems of all targets of a world, each in its own scene."""
+    zone, table = world.zone.cpu().numpy(), reward.table(world.moves())  # of all scenes together, as training pays it
+    found = []
+    for target, scene in enumerate(world.target_scene.tolist()):
+        own = _states_of(world, scene)
+        found.append(task_of(world.graph(scene), zone[own], world.scene_state(target), table[:, own]))
+    return found
+
+
+def policies_agent(world: World, policies: Sequence[np.ndarray]) -> Agent:
+    """An agent that walks to each target of a world by a policy of its scene: probabilities (S, A)."""
+    table = torch.zeros(world.target_count, world.state_count, world.next_state.shape[1])
+    for target, (scene, policy) in enumerate(zip(world.target_scene.tolist(), policies, strict=True)):
+        table[target, _states_of(world, scene)] = torch.from_numpy(policy).float()
+    return by_table(world, table.to(world.device))
+
+
+def _states_of(world: World, scene: int) -> slice:
+    return slice(*world.scene_offset[scene : scene + 2].tolist())
 
 
 def _figures(expected: Expected) -> dict[str, float | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -9,9 +10,10 @@ from typing import Any
 
 from clearway.agents.agent import Agent
 from clearway.agents.named import AgentMaker
-from clearway.errors import RunError
+from clearway.errors import RunError, SceneError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
-from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, optimum_agents, world_yardsticks
+from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, policies_agent, world_tasks
+from clearway.evaluation.oracle import optimal_policy, soft_policy
 from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH, evaluate_agents
 from clearway.evaluation.summary import Evaluation, Trained
 from clearway.learn.load import TrainedAgent, run_world
@@ -83,15 +85,21 @@ def evaluate_runs(
 
 
 def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Agent]:
-    """What would be best under each reward, exactly, and where the published loss comes to rest (see `oracle`)."""
+    """What would be best under each reward, exactly, and where the published loss comes to rest (see `oracle`).
+
+    Warns:
+        UserWarning: it comes to rest nowhere under some reward, whose row is left out.
+    """
     found: dict[str, Agent] = {}
     for reward in dict.fromkeys(reward for reward in rewards if reward.is_known):
-        exact = world_yardsticks(world, reward)
-        best, soft = optimum_agents(world, exact)
-        if not reward.clip:
-            _, soft = optimum_agents(world, world_yardsticks(world, replace(reward, clip=True)))
-        found[f"{OPTIMUM} ({reward.name}{'' if reward.clip else ', unclipped'})"] = best
-        found[f"{SOFT_FIXED_POINT} ({reward.name})"] = soft
+        best = [optimal_policy(task) for task in world_tasks(world, reward)]
+        found[f"{OPTIMUM} ({reward.name}{'' if reward.clip else ', unclipped'})"] = policies_agent(world, best)
+        name = f"{SOFT_FIXED_POINT} ({reward.name})"
+        try:
+            soft = [soft_policy(task) for task in world_tasks(world, replace(reward, clip=True))]
+            found[name] = policies_agent(world, soft)
+        except SceneError as fault:
+            warnings.warn(f"no row {name!r}: {fault.source}, {fault.problem}", stacklevel=3)
     return found
 
 

@@ -50,15 +50,16 @@ def state_of(out: Path, job: Job, under_way: bool) -> RunState:
     """The state of a job's run, from its files."""
     rows = run_folder(out, job.run).metrics()
     last = rows[-1] if rows else {"frames": 0, "seconds": 0.0, "solved_targets": 0}
-    frames, all_frames = int(last["frames"]), job.run.learner.frames
-    speed = frames / last["seconds"] if last["seconds"] else None
+    all_frames = job.run.learner.frames
+    frames = min(int(last["frames"]), all_frames)
+    speed = int(last["frames"]) / last["seconds"] if last["seconds"] else None
     if is_done(out, job):
         state = "done"
     elif not under_way:
         state = "waiting"
     else:
         state = "trying" if frames >= all_frames else "training"
-    left = max(0, all_frames - frames) / speed if speed else None
+    left = (all_frames - frames) / speed if speed else None
     targets = sum(len(own) for own in job.run.targets)
     return RunState(job.run.name, state, frames, all_frames, speed, int(last["solved_targets"]), targets, left)
 

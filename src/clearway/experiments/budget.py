@@ -40,22 +40,27 @@ class Budget:
     mark: str = ""
 
     def changed(self, rooms: Sequence[RoomName] | None = None, frames: int | None = None) -> Budget:
-        """The budget with other rooms, or with the same number of frames for every learner; None changes nothing."""
-        found = self if rooms is None else replace(self, rooms=tuple(rooms))
+        """The budget with other rooms, or with the same number of frames for every learner; None changes nothing.
+
+        More frames than it has take its mark away.
+        """
+        found = self if rooms is None else replace(self, rooms=tuple(dict.fromkeys(rooms)))
         if frames is None:
             return found
-        return replace(found, frames=frames, default_frames=frames)
+        return replace(found, frames=frames, default_frames=frames, mark=self.mark if frames <= self.frames else "")
 
-    @property
-    def warning(self) -> str:
-        """What stands on top of a report: where the budget spends less than the paper did."""
+    def warning(self, scenes: int) -> str:
+        """What stands on top of a report of so many scenes: where the budget spends less than the paper did."""
         if self.mark:
             return self.mark
         found = []
-        if set(self.rooms) < set(PAPER.rooms):
-            found.append(f"{len(self.rooms)} of {len(PAPER.rooms)} rooms")
+        if scenes < len(PAPER.rooms):
+            found.append(f"{scenes} of {len(PAPER.rooms)} scenes")
         if self.frames < PAPER.frames:
             found.append(f"{self.frames:,} frames in the main experiment instead of the paper's {PAPER.frames:,}")
+        if self.episodes_per_target < PAPER.episodes_per_target:
+            episodes = f"{self.episodes_per_target} episodes a target"
+            found.append(f"{episodes} instead of {PAPER.episodes_per_target}, of {self.step_limit:,} steps at most")
         return f"Less than the paper's budget: {'; '.join(found)}." if found else ""
 
 
@@ -75,7 +80,7 @@ SMOKE = Budget(
     whole_grid=False,
     mark=(
         "Smoke budget: shows that everything runs here, and what a report looks like. It cannot show which agent is "
-        "better: its trainings end before anything is learnt, and two seeds decide nothing."
+        "better: its trainings end before anything is learnt."
     ),
 )
 """Shows within minutes that everything runs; its figures say nothing about the paper."""

@@ -21,8 +21,7 @@ def corrected(section: Section) -> Section:
     claims = list(section.claims)
     families: dict[str, list[int]] = {}
     for number, claim in enumerate(claims):
-        learner, colon, _ = claim.text.partition(":")
-        families.setdefault(learner if colon else "", []).append(number)
+        families.setdefault(claim.learner, []).append(number)
     for numbers in families.values():
         told = [claims[number].p for number in numbers]
         for number, own, p in zip(numbers, told, holm([1.0 if p is None else p for p in told]), strict=True):

@@ -7,8 +7,9 @@ import time
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
+from pathlib import Path
 
-from clearway.experiments.job import request_of
+from clearway.experiments.job import frames_reached, request_of
 from clearway.experiments.plan import Job, PlannedRun
 from clearway.torch_threads import torch_threads
 
@@ -16,25 +17,36 @@ TRIED_S = 2.0
 """A kind of learner is tried for so long, after its first update."""
 
 
-def told_time(jobs: Sequence[Job], left: Sequence[Job], workers: int | None, threads: int) -> str:
-    """How many runs are to be trained, and for how long at least, in a line.
+def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int | None, threads: int) -> str:
+    """How many runs are to be trained, or only tried, and for how long training takes at least, in a line.
 
     Runs side by side are held for as fast as one alone; so many share memory and caches, and take longer.
     Where nobody knows how many there will be (`workers` None, on a Ray cluster), it is the time of all of them, one
     after the other.
+
+    Args:
+        out: folder of the reproduction: what has been trained there takes no time.
+        jobs: all of the plan.
+        left: those that are not done.
+        workers: jobs side by side.
+        threads: of each.
     """
-    counted = f"{len(jobs)} runs, {len(left)} to be trained"
-    if not left:
-        return f"{counted}: all is there"
+    frames = [(job.run, job.run.learner.frames - frames_reached(out, job.run)) for job in left]
+    to_train = [(run, count) for run, count in frames if count]
+    counted = f"{len(jobs)} runs, {len(to_train)} to be trained"
+    if tried := len(left) - len(to_train):
+        counted += f", {tried} only to be evaluated"
+    if not to_train:
+        return counted if left else f"{counted}: all is there"
     speeds: dict[str, float] = {}
     seconds, longest = 0.0, 0.0
-    for run in (job.run for job in left):
+    for run, count in to_train:
         kind = _kind(run)
         if kind not in speeds:
             speeds[kind] = frames_per_second(run, threads)
-        seconds += run.learner.frames / speeds[kind]
-        longest = max(longest, run.learner.frames / speeds[kind])
-    beside = min(workers or 1, len(left))
+        seconds += count / speeds[kind]
+        longest = max(longest, count / speeds[kind])
+    beside = min(workers or 1, len(to_train))
     how, least = (f"{beside} at a time", " at least") if workers else ("one after the other", "")
     return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}"
 

@@ -31,7 +31,7 @@ class HardTargets:
     Attributes:
         targets: states, ascending.
         hardness: of each.
-        rank: of each among all states, 1 for the hardest.
+        rank: of each among the states of the largest component, 1 for the hardest.
         apart_cells: by which all of them lie apart.
     """
 
@@ -68,6 +68,7 @@ def hard_targets(scene: Scene, count: int = TARGETS_PER_SCENE, apart_cells: int 
     """The hardest states of a scene by the rule above."""
     values = hardness(scene)
     order = np.argsort(-values, kind="stable")
+    order = order[scene.components[order] == 0]  # from elsewhere no way leads there
     cells = np.rint(scene.locations_m / scene.cell_size_m).astype(np.int64)
     taken: list[int] = []
     apart = apart_cells

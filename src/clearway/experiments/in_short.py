@@ -30,10 +30,13 @@ def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
         )
     lines = []
     for further, whose in ((False, "the paper's claims"), (True, "further claims")):
-        learners = dict.fromkeys(claim.text.partition(":")[0] for claim in claims if claim.further == further)
-        for learner in learners:
-            own = [c for c in claims if c.further == further and c.text.startswith(f"{learner}:")]
-            lines.append(f"{learner}, {whose}. {_told(own)}")
+        by_learner: dict[str, list[Claim]] = {}
+        for claim in claims:
+            if claim.further == further:
+                by_learner.setdefault(claim.learner, []).append(claim)
+        for learner, own in by_learner.items():
+            about = f"{learner}, {whose}" if learner else whose.capitalize()
+            lines.append(f"{about}. {_told(own)}")
     more = len(lines) - MOST_LINES
     return tuple(lines) if more <= 0 else (*lines[: MOST_LINES - 1], f"And {more + 1} more lines, below.")
 
@@ -41,7 +44,7 @@ def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
 def _told(claims: Sequence[Claim]) -> str:
     parts = []
     for verdict in VERDICTS:
-        texts = [claim.text.partition(": ")[2] for claim in claims if claim.verdict == verdict]
+        texts = [claim.told.removesuffix(".") for claim in claims if claim.verdict == verdict]
         if texts:
             more = f"; and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
             parts.append(f"{verdict.capitalize()} ({len(texts)}): {'; '.join(texts[:NAMED])}{more}.")

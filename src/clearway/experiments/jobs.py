@@ -17,7 +17,7 @@ from clearway.errors import RunError
 from clearway.experiments.job import do, run_folder
 from clearway.experiments.plan import Job
 from clearway.learn.run_folder import METRICS_FILE
-from clearway.spread.workers import ATTEMPTS, Work, workers_for
+from clearway.spread.workers import ATTEMPTS, Work, core_count, workers_for
 
 POLL_S = 0.2
 JOB_BYTES = 1_000_000_000  # a job on the four default rooms was seen to take 650 MB
@@ -29,8 +29,7 @@ def affordable_workers(wanted: int | None, threads: int) -> int:
     Warns:
         UserWarning: memory holds fewer than were wanted.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    asked = wanted or max(1, cores // threads)
+    asked = wanted or max(1, core_count() // threads)
     free = _free_bytes()
     found = asked if free is None else max(1, min(asked, free // JOB_BYTES))
     if free is not None and wanted is not None and found < wanted:

@@ -54,6 +54,9 @@ class PlannedRun:
     seed: int
     zone_level: ZoneLevel = "pose"
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "targets", _plain(self.targets))
+
     @property
     def paid(self) -> Reward:
         """The reward as training pays it, see `paid_by`."""
@@ -97,6 +100,9 @@ class Trial:
     step_limit: int = STEP_LIMIT
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "targets", _plain(self.targets))
+
     @cached_property
     def name(self) -> str:
         """Name of its file in the run's folder."""
@@ -137,8 +143,13 @@ class Job:
     trials: tuple[Trial | LiveTrial, ...]
 
 
+def _plain(targets: Iterable[Iterable[int]]) -> TargetSets:
+    """Targets that may be numbers of NumPy's, which no JSON file takes, as Python's."""
+    return tuple(tuple(int(target) for target in own) for own in targets)
+
+
 def _digest(content: object) -> str:
-    """Of JSON values, and numbers of NumPy's."""
+    """Of JSON values, and numbers of NumPy's, as settings may hold."""
     text = json.dumps(content, sort_keys=True, default=lambda number: number.item())
     return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_LENGTH]
 

@@ -5,7 +5,7 @@ An entry point of the group `clearway.experiments` is an `Experiment`, whose sec
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from clearway.errors import ClearwayError, PluginError, kind_and_reason
@@ -40,7 +40,7 @@ def plugged_experiment(plugin: Plugin) -> Experiment:
     def section(setting: Setting) -> Section:
         with _faults_of(plugin, "section"):
             given = found.section(setting)
-            fault = _fault(given, plugin.name)
+            fault = _fault(given, plugin.name, [scene.name for scene in setting.scenes])
         if fault:
             raise PluginError(f"{plugin}: {fault}. Ask its authors")
         return given
@@ -48,8 +48,8 @@ def plugged_experiment(plugin: Plugin) -> Experiment:
     return Experiment(jobs, section)
 
 
-def _fault(section: object, name: str) -> str:
-    """Why it is no section of that name that a report can hold; empty where it is one."""
+def _fault(section: object, name: str, scenes: Sequence[str]) -> str:
+    """Why it is no section of that name that a report of some scenes can hold; empty where it is one."""
     if not isinstance(section, Section):
         return f"section gives {section!r:.60}, expected a Section"
     if section.name != name:
@@ -63,6 +63,10 @@ def _fault(section: object, name: str) -> str:
         return f"its section has {others[0]!r:.60} where a text is expected"
     if wrong := [part.name for part in (*section.tables, *section.pictures) if not is_name(part.name)]:
         return f"no file can be called {wrong[0]!r:.60}, as a table or figure is"
+    if empty := [figure.name for figure in section.figures if not figure.series]:
+        return f"its figure {empty[0]!r:.60} has no series"
+    if strange := [shown.scene for shown in section.maps if shown.scene not in scenes]:
+        return f"it has a map of {strange[0]!r:.60}, expected one of {', '.join(scenes)}"
     return ""
 
 

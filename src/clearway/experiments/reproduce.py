@@ -111,7 +111,7 @@ def reproduce(
     left = [job for job in jobs if not is_done(request.out, job)]
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
     if tell is not None:
-        tell(told_time(jobs, left, workers, request.threads))
+        tell(told_time(request.out, jobs, left, workers, request.threads))
     with board(request.out, jobs, show_progress) as show:
         run_jobs(request.out, left, workers=workers, threads=request.threads, show=show, ray=request.ray)
     return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
@@ -196,16 +196,15 @@ def _question(request: ReproduceRequest) -> str:
 
 
 def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
-    names = _known(request)
+    jobs, sections = list[Job](), list[Section]()
     with torch_threads(1):  # the work is too small for more, and stands still for them while trainings have the cores
-        sections = [_section(name, setting) for name in names]
+        for found in map(experiment, _known(request)):
+            own = found.jobs(setting)
+            missing = unfinished(setting.out, own)  # before it is read: a run that ends meanwhile may be left out of it
+            sections.append(replace(corrected(found.section(setting)), missing=missing))
+            jobs += own
     _check_files(sections)
-    return Reproduction(tuple(request.commands), tuple(request.changes), setting, planned(setting, names), sections)
-
-
-def _section(name: str, setting: Setting) -> Section:
-    found = experiment(name)
-    return replace(corrected(found.section(setting)), missing=unfinished(setting.out, found.jobs(setting)))
+    return Reproduction(tuple(request.commands), tuple(request.changes), setting, merged(jobs), sections)
 
 
 def _check_files(sections: Sequence[Section]) -> None:

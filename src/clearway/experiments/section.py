@@ -136,6 +136,17 @@ class Claim:
     counted: bool = False
 
     @property
+    def learner(self) -> str:
+        """Whom it is of: what stands before a colon; empty where there is none."""
+        learner, colon, _ = self.text.partition(": ")
+        return learner if colon else ""
+
+    @property
+    def told(self) -> str:
+        """The text without its learner."""
+        return self.text.removeprefix(f"{self.learner}: ")
+
+    @property
     def judged(self) -> bool:
         """It rests on runs enough; without, the verdict is undecided."""
         return self.counted or self.p is not None

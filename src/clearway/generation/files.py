@@ -17,13 +17,12 @@ from clearway.generation.plans import generated_plan
 from clearway.generation.request import GENERATOR_VERSION, SIZE_PX, Request, other_version
 from clearway.rooms.build import build_floor_plan, check_mujoco
 from clearway.rooms.library import cached_plan_scene
-from clearway.rooms.render import core_count
 from clearway.rooms.render_worker import renderer_environment
 from clearway.scenes.contents import check_contents
 from clearway.scenes.floor_plans import GENERATED
 from clearway.scenes.scene import EncoderRecord, Provenance, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
-from clearway.spread.workers import ATTEMPTS, Work, workers_for
+from clearway.spread.workers import ATTEMPTS, Work, core_count, workers_for
 
 if TYPE_CHECKING:
     from clearway.perception.encoder import Encoder

@@ -69,15 +69,18 @@ def _unpack(path: Path, folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
             members = _wanted(path, archive, suffixes)
             size = os.fstat(file.fileno()).st_size
             left = min(MAX_BYTES, BLOCK_BYTES + MAX_RATIO * size)  # members may share their bytes
-            for member in members:
-                left -= _copy(path, archive, member, folder / PurePosixPath(member.filename).name, left)
+            for name, member in members.items():
+                left -= _copy(path, archive, member, folder / name, left)
     except _FAULTS as fault:
         raise SceneError(path, f"cannot be unpacked ({reason_of(fault)})", GET_ANOTHER) from fault
     return sorted(folder.iterdir())
 
 
-def _wanted(path: Path, archive: zipfile.ZipFile, suffixes: tuple[str, ...]) -> list[zipfile.ZipInfo]:
-    """The members to unpack; every member is looked at, because a bad one makes the whole archive suspect."""
+def _wanted(path: Path, archive: zipfile.ZipFile, suffixes: tuple[str, ...]) -> dict[str, zipfile.ZipInfo]:
+    """The members to unpack, by their names without folders.
+
+    Every member is looked at, because a bad one makes the whole archive suspect.
+    """
     members = archive.infolist()
     if len(members) > MAX_MEMBERS:
         raise SceneError(path, f"holds {len(members)} files, expected up to {MAX_MEMBERS}", GET_ANOTHER)
@@ -98,7 +101,7 @@ def _wanted(path: Path, archive: zipfile.ZipFile, suffixes: tuple[str, ...]) -> 
         wanted[name.name] = member
     if not wanted:
         raise SceneError(path, f"holds no scene file ({', '.join(suffixes)})", "Give another archive")
-    return list(wanted.values())
+    return wanted
 
 
 def _copy(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path, most: int) -> int:

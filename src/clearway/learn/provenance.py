@@ -12,6 +12,7 @@ from typing import Any
 
 from clearway.plugins import Plugin, find_plugin, plugins
 from clearway.reward import Reward
+from clearway.spread.workers import core_count
 from clearway.version import __version__
 
 PACKAGES = ("torch", "numpy", "scipy", "gymnasium", "mujoco", "transformers")
@@ -79,13 +80,12 @@ def hardware(device: str | None = None) -> dict[str, Any]:
     from clearway.model.precision import multiplies_bfloat16
 
     where = torch.device(device or "cpu")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "machine": platform.machine(),
         "system": platform.system(),
         "processor": _processor(),
         "memory_gib": _memory_gib(),
-        "cores": cores,
+        "cores": core_count(),
         "threads": torch.get_num_threads(),
         "bfloat16": multiplies_bfloat16(where),
         **({} if device is None else {"device": device}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,14 +59,20 @@ class RunSummary:
 
 
 def find_runs(folder: Path) -> list[RunFolder]:
-    """The runs in a folder, itself or below it, by path.
+    """The runs in a folder, itself or below it, by path; not in a run's own folders, nor where a dot begins the name.
 
     Raises:
         RunError: there is no such folder.
     """
     if not folder.is_dir():
         raise RunError(f"{folder}: no such folder. Name one that holds runs")
-    return [RunFolder(path.parent) for path in sorted(folder.rglob(RUN_FILE))]
+    found = []
+    for path, folders, files in os.walk(folder):  # takes no offence at folders that go meanwhile
+        if RUN_FILE in files:
+            found.append(Path(path))
+            folders.clear()
+        folders[:] = [name for name in folders if not name.startswith(".")]
+    return [RunFolder(path) for path in sorted(found)]
 
 
 def run_summary(folder: RunFolder) -> RunSummary:

@@ -9,7 +9,7 @@ SUCCESS = "statistics.recent_success"  # of the trainers' tensors, see `EpisodeS
 
 
 def unsolved_targets(folder: RunFolder) -> dict[str, tuple[int, ...]]:
-    """Targets that not all of their latest training episodes reached: state ids by scene name.
+    """Targets that not all of their latest training episodes reached, or that had too few: state ids by scene name.
 
     Empty where all are solved, and where the checkpoint does not tell: of another package's algorithm, and of own goals
     in several scenes, among which the given targets cannot be told apart.

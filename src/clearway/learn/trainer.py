@@ -110,7 +110,7 @@ class Trainer:
 
     @property
     def frames_per_update(self) -> int:
-        """Frames that one update uses; the last may use fewer."""
+        """Frames that one update uses."""
         return self.env_count * self.learner.rollout_steps
 
     @property

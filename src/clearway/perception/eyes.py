@@ -33,7 +33,7 @@ CARD_FILE, WEIGHTS_FILE = "eyes.json", "eyes.safetensors"
 FORMAT_VERSION = 2
 SHIPPED = Path(__file__).parent / "weights"
 MEAN, STD = (0.45, 0.45, 0.45), (0.25, 0.25, 0.25)  # of colours from 0 to 1
-MAX_WIDTH, MAX_SIDE_PX = 4096, 512  # of a network; a card that asks for more is refused
+MAX_WIDTH, MAX_SIDE_PX = 4096, 512  # of a network's layers and pictures; a card that asks for more is refused
 MAX_WEIGHTS_BYTES = 256 * 1024**2
 STATISTICS = ("running_mean", "running_var", "whereabouts_seen", "stood")
 """Buffers that are kept as they are; all else is kept in half precision."""
@@ -168,6 +168,7 @@ def read_card(folder: Path) -> EyesCard:
 
 def read_eyes(folder: Path) -> Eyes:
     """The eyes in a folder, frozen. Raises EncoderError where they are not as they were written."""
+    import torch
     from safetensors import SafetensorError
     from safetensors.torch import load
 
@@ -175,6 +176,11 @@ def read_eyes(folder: Path) -> Eyes:
 
     card = read_card(folder)
     content = _weights(folder, card)
+    with torch.device("meta"):  # takes no memory
+        count = sum(values.numel() for values in Eyes(card.shape).parameters())
+    if count > MAX_WEIGHTS_BYTES // 2:  # in half precision
+        problem = f"{folder / CARD_FILE}: a network of {count:,} parameters, more than {WEIGHTS_FILE} can hold"
+        raise EncoderError(f"{problem}. Get the eyes again")
     try:
         eyes = Eyes(card.shape)
         state = {name: tensor.float() for name, tensor in load(content).items()}

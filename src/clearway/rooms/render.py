@@ -7,7 +7,6 @@ must be able to render.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -18,7 +17,7 @@ import numpy as np
 from clearway.errors import RenderError
 from clearway.progress import work_progress
 from clearway.rooms.render_worker import Camera, binary_model, open_camera, renderer_environment, take
-from clearway.spread.workers import Work, Workers, workers_for
+from clearway.spread.workers import Work, Workers, core_count, workers_for
 
 if TYPE_CHECKING:
     import mujoco
@@ -130,8 +129,3 @@ def _share_size(shots: int, processes: int) -> int:
 
 def _shares(shots: Sequence[Shot], size: int) -> Iterator[Sequence[Shot]]:
     return (shots[first : first + size] for first in range(0, len(shots), size))
-
-
-def core_count() -> int:
-    """Number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from clearway.errors import SceneError
-from clearway.files import written_whole
 from clearway.scenes.file_pictures import BLOCK_PICTURES
+from clearway.scenes.hdf5 import written
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import DISTANCE_TABLE_STATES
 from clearway.scenes.validate import check_scene
@@ -22,7 +21,7 @@ def export_thor_v1(scene: Scene, path: Path) -> None:
 
     Raises:
         SceneError: the scene is unsound, lacks pictures or features, has too many states for a distance table, or its
-            headings are not four (published loaders know no others).
+            headings are not four (published loaders know no others); or it cannot be written.
     """
     check_scene(scene, path)
     if scene.features is None or scene.observations is None:
@@ -32,7 +31,7 @@ def export_thor_v1(scene: Scene, path: Path) -> None:
         raise SceneError(scene.name, problem, f"Export scenes of up to {DISTANCE_TABLE_STATES}")
     if scene.heading_count != 4:
         raise SceneError(scene.name, f"has {scene.heading_count} headings, expected 4", "Export another scene")
-    with written_whole(path) as part, h5py.File(part, "w", libver=("earliest", "v108")) as file:
+    with written(path, libver=("earliest", "v108")) as file:
         file["graph"] = scene.graph.astype(np.int64)
         file["location"] = scene.locations_m
         file["rotation"] = scene.headings_deg

@@ -92,10 +92,10 @@ def _opened(path: Path) -> h5py.File:
 
 
 @contextmanager
-def written(path: Path) -> Iterator[h5py.File]:
+def written(path: Path, libver: tuple[str, str] = HDF5_VERSION) -> Iterator[h5py.File]:
     """A new HDF5 file for `path`, written whole or not at all. Raises SceneError where it cannot be written."""
     try:
-        with written_whole(path) as part, h5py.File(part, "w", libver=HDF5_VERSION) as file:
+        with written_whole(path) as part, h5py.File(part, "w", libver=libver) as file:
             yield file
     except (OSError, RuntimeError) as fault:  # HDF5 raises the second where the disk fills up as a file is closed
         problem = f"cannot be written ({reason_of(fault)})"

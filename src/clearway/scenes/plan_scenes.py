@@ -96,12 +96,11 @@ def plan_of(scene: Scene) -> FloorPlan:
     try:
         parts = scene.made_by.notes.get(PLAN_NOTE, {})
         assert isinstance(parts, dict)
-        areas = tuple(Area(use, tuple(low), tuple(high)) for use, low, high in parts.get("areas", ()))
+        areas = tuple(Area(use, _cell(low), _cell(high)) for use, low, high in parts.get("areas", ()))
         pieces = parts.get("furniture", ())
-        furniture = tuple(Furnishing(kind, tuple(low), tuple(high), front) for kind, low, high, front in pieces)
-        assert all([type(at) for at in (*one.low, *one.high)] == [int] * 4 for one in furniture)
+        furniture = tuple(Furnishing(kind, _cell(low), _cell(high), front) for kind, low, high, front in pieces)
         walls, doors = (np.array(parts.get(name, []), np.int64).reshape(-1, 2) for name in ("walls", "doors"))
-    except (AssertionError, TypeError, ValueError) as fault:
+    except (AssertionError, TypeError, ValueError, OverflowError) as fault:
         raise SceneError(scene.name, "the record of its floor plan is damaged", REBUILD) from fault
     blocked = cells[pairs[ahead == BLOCKED]]
     plan = FloorPlan(scene.name, cells, blocked, size_m, walls=walls, doors=doors, areas=areas, furniture=furniture)
@@ -110,3 +109,11 @@ def plan_of(scene: Scene) -> FloorPlan:
     if not same or not np.array_equal(headings_deg, scene.headings_deg) or not np.array_equal(graph, scene.graph):
         raise SceneError(scene.name, "its poses are not those of a floor plan", REBUILD)
     return plan
+
+
+def _cell(given: object) -> tuple[int, int]:
+    """A cell, or an end of some, as a record holds it. Raises TypeError where it is none."""
+    match given:
+        case [int(first), int(second)]:
+            return first, second
+    raise TypeError("no cell")

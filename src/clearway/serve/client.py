@@ -254,7 +254,7 @@ def picture_file(picture: object) -> tuple[bytes, str]:
     from PIL import Image
 
     file = io.BytesIO()
-    Image.fromarray(checked_picture(np.asarray(picture))).save(file, "PNG", compress_level=1)
+    Image.fromarray(checked_picture(picture)).save(file, "PNG", compress_level=1)
     return file.getvalue(), "image/png"
 
 

@@ -10,6 +10,7 @@ import asyncio
 import errno
 import json
 import logging
+import math
 import socket
 import subprocess
 import time
@@ -28,6 +29,7 @@ from clearway.serve.limits import Limits
 from clearway.serve.shares import FairTurns, Shares
 
 NICENESS, SLOW_NICENESS = 5, 19  # yields to the agent; to all others
+FAILED_S = 10.0  # for which a service is not ready after a decoder could not be started
 SUSPECT_S = 60.0  # for which the pictures of a session are decoded slowly, one of which has overrun
 MOST_REFUSAL_BYTES = 500  # of a decoder's
 MOST_OVERRUNS_S = 1.0  # of decoding lately in vain for a token, beyond which its new sessions are decoded slowly
@@ -208,13 +210,17 @@ class Decoders:
     def __init__(self, limits: Limits) -> None:
         self._quick = Lane(limits, [0, *[NICENESS] * limits.decoders], limits.decode_s)
         self._slow = Lane(limits, [SLOW_NICENESS], limits.slow_decode_s)
-        self._limits, self._overruns, self._failed = limits, Shares(), False
+        self._limits, self._overruns, self._failed_s = limits, Shares(), -math.inf
         self.replaced = 0  # decoders that were ended
 
     @property
     def stalled(self) -> bool:
-        """Pictures are not decoded as they should be."""
-        return self._failed or self._quick.stalled
+        """Pictures are not decoded as they should be.
+
+        Where no decoder could be started it is so for a while, and then no more: a service that is sent no pictures
+        would never learn that decoders start again.
+        """
+        return time.monotonic() - self._failed_s < FAILED_S or self._quick.stalled
 
     def start(self) -> None:
         """Let decoders be ready for the first pictures. Raises OSError."""
@@ -262,11 +268,11 @@ class Decoders:
             self.replaced += 1
             raise
         except OSError as fault:
-            self._failed = True
+            self._failed_s = time.monotonic()
             logging.getLogger("clearway.serve").error("no decoder can be started (%s)", fault.strerror)
             raise Fault("overloaded", "no picture can be decoded now. Try again") from fault
         except Fault:  # a decoder has answered, if only to refuse the picture
-            self._failed = False
+            self._failed_s = -math.inf
             raise
-        self._failed = False
+        self._failed_s = -math.inf
         return picture

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import gc
-import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 from clearway.errors import ClearwayError
-from clearway.spread.workers import Work, workers_for
+from clearway.spread.workers import Work, core_count, workers_for
 
 MANY = 500  # things from which on processes are started
 AT_ONCE = 50  # things in a part
@@ -36,7 +35,7 @@ def of_each(
     Raises:
         ClearwayError: what the function raised, or a process died.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = core_count()
     if len(things) < MANY or cores == 1:
         yield from map(function, things if ahead is None else ahead(things))
         return

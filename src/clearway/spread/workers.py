@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -58,6 +59,11 @@ class Workers(Generic[Part, Result]):
         """What becomes of the parts, in their order; the first error of any is raised as soon as it is known."""
         tasks = (self.submit(part) for part in parts)
         yield from (task.result() for task in tasks) if self.here else _in_order(deque(tasks))
+
+
+def core_count() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from clearway.errors import RenderError, SceneError
 from clearway.rooms.build import check_mujoco
-from clearway.rooms.render import core_count
 from clearway.rooms.render_worker import renderer_environment
 from clearway.scenes.thor_v1 import read_scene
-from clearway.spread.workers import ATTEMPTS, Work, workers_for
+from clearway.spread.workers import ATTEMPTS, Work, core_count, workers_for
 from clearway.views.settings import ViewSettings, differing
 from clearway.views.shard import is_shard, read_shard, room_key, write_shard
 from clearway.views.take import room_views

@@ -21,11 +21,11 @@ from clearway.perception.cache import Entry, cached, joint_key
 from clearway.rooms.build import check_mujoco, shaping_versions
 from clearway.rooms.detail import taken_fast
 from clearway.rooms.library import sources_hash
-from clearway.rooms.render import core_count, render
+from clearway.rooms.render import render
 from clearway.rooms.render_worker import renderer_environment
 from clearway.scenes.scene import Scene
 from clearway.scenes.sensors import RGB
-from clearway.spread.workers import Work, workers_for
+from clearway.spread.workers import Work, core_count, workers_for
 from clearway.views.placing import STATES, PlacedTake, TakePlaces, rearranges, stream, take_seeds
 from clearway.views.settings import ViewSettings
 from clearway.views.shard import room_key

@@ -201,7 +201,7 @@ class Navigation:
         self.elapsed = torch.where(ended, 0, self.elapsed)
 
     def reseed(self, seeds: Tensor, index: Tensor) -> None:
-        """Begin the random streams of the environments in index (B,) anew, from seeds (B,) int64."""
+        """Begin the streams of starts and targets of the environments in index (B,) anew, from seeds (B,) int64."""
         self.start_stream.reseed(seeds, index)
         self.target_stream.reseed(seeds, index)
 

@@ -246,6 +246,14 @@ def test_a_process_that_cannot_be_started_is_told_of(monkeypatch: pytest.MonkeyP
             trainer.update()
 
 
+def test_a_checkpoint_of_before_sights_were_drawn_is_gone_on_from() -> None:
+    with closing(async_trainer(1000, processes=1)) as trainer:
+        tensors = {name: tensor for name, tensor in trainer.tensors().items() if not name.endswith("sights_drawn")}
+        assert len(tensors) == len(trainer.tensors()) - 1
+        trainer.load_tensors(tensors, 100, 1)
+        assert trainer.frames == 100
+
+
 def test_shared_tensors_keep_shapes_types_and_values() -> None:
     tables = world_tensors(small_world())
     shared = SharedTensors.holding(tables)

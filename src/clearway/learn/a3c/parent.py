@@ -142,7 +142,8 @@ class AsyncTrainer:
         assert not self._processes, "the workers are under way"
         for part, name in PLACES.items():
             for key, tensor in part_of(self.shared, part).items():
-                tensor.copy_(tensors[f"{name}.{key}"])
+                if key != "navigation.sights_drawn" or f"{name}.{key}" in tensors:  # not in checkpoints of before
+                    tensor.copy_(tensors[f"{name}.{key}"])
         self.statistics.load_tensors(part_of(tensors, "statistics"))
         self.frames, self.updates = frames, updates
 
