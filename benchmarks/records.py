@@ -2,6 +2,9 @@
 
     python benchmarks/records.py pack reproduction docs/records/memory.tar.xz
     python benchmarks/records.py unpack docs/records/memory.tar.xz again && clearway report again
+    python benchmarks/records.py pack reproduction docs/records/rooms.tar.xz --only scenes    # large, and never another
+    python benchmarks/records.py pack reproduction docs/records/runs.tar.xz --only runs
+    python benchmarks/records.py unpack docs/records/rooms.tar.xz docs/records/runs.tar.xz again
 
 Kept are settings, metrics and every episode of every run, and the scenes but for their pictures; not the weights, nor
 where the folder lay.
@@ -16,7 +19,7 @@ import re
 import sys
 import tarfile
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,29 +30,32 @@ from clearway.scenes.thor_v1 import read_scene, write_scene
 OF_A_RUN = ("run.json", "metrics.jsonl", f"{TRIALS}/*.json")
 
 
-def pack(folder: Path, record: Path) -> None:
-    """Write the record of a reproduction's folder, the same bytes whenever it is the same."""
+def pack(folder: Path, record: Path, parts: Sequence[str] = (SCENES, RUNS)) -> None:
+    """Write the record of parts of a reproduction's folder, the same bytes whenever it is the same."""
     record.parent.mkdir(parents=True, exist_ok=True)
     part = record.with_name(f"{record.name}.part")
     with tarfile.open(part, "w:xz", preset=9) as archive:
-        for path in sorted(_kept(folder)):
+        for path in sorted(_kept(folder, parts)):
             name = path.relative_to(folder).as_posix()
             _add(archive, name, _without_pictures(path) if path.suffix == ".h5" else _by_its_name(path, folder))
     part.rename(record)
 
 
-def unpack(record: Path, folder: Path) -> None:
-    """Make the folder of a record, which must not be there yet."""
+def unpack(records: Sequence[Path], folder: Path) -> None:
+    """Make the folder of one or more records, which must not be there yet."""
     folder.mkdir(parents=True)
-    with tarfile.open(record, "r:xz") as archive:
-        archive.extractall(folder, filter="data")
+    for record in records:
+        with tarfile.open(record, "r:xz") as archive:
+            archive.extractall(folder, filter="data")
 
 
-def _kept(folder: Path) -> Iterator[Path]:
-    yield from folder.glob("*.json")
-    yield from (folder / SCENES).rglob("*.h5")
-    for pattern in OF_A_RUN:
-        yield from (folder / RUNS).glob(f"*/{pattern}")
+def _kept(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
+    if SCENES in parts:
+        yield from (folder / SCENES).rglob("*.h5")
+    if RUNS in parts:
+        yield from folder.glob("*.json")
+        for pattern in OF_A_RUN:
+            yield from (folder / RUNS).glob(f"*/{pattern}")
 
 
 def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
@@ -75,12 +81,18 @@ def main() -> None:
     """Pack or unpack."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("pack", "unpack"))
-    parser.add_argument("source", type=Path)
-    parser.add_argument("made", type=Path)
+    parser.add_argument("source", type=Path, nargs="+", help="a folder to be packed, or records to be unpacked")
+    parser.add_argument("made", type=Path, help="the record, or the folder")
+    parser.add_argument("--only", choices=(SCENES, RUNS), help="pack these alone")
     args = parser.parse_args()
-    if args.what == "unpack" and args.made.exists():
+    if args.what == "pack":
+        if len(args.source) != 1:
+            sys.exit(f"error: {len(args.source)} folders for one record. Pack them one by one")
+        pack(args.source[0], args.made, (args.only,) if args.only else (SCENES, RUNS))
+    elif args.made.exists():
         sys.exit(f"error: {args.made}: is there already. Name a new folder")
-    (pack if args.what == "pack" else unpack)(args.source, args.made)
+    else:
+        unpack(args.source, args.made)
 
 
 if __name__ == "__main__":

@@ -274,8 +274,9 @@ def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
 @pytest.mark.parametrize("record", sorted((DOCS / "records").glob("*.tar.xz")), ids=lambda path: path.name)
 def test_a_record_does_not_say_where_its_folder_lay(record: Path) -> None:
     with tarfile.open(record, "r:xz") as archive:
-        settings = [member for member in archive if member.name.endswith(("run.json", "reproduction.json"))]
-        assert len(settings) >= 2
+        members = archive.getmembers()
+        settings = [member for member in members if member.name.endswith(("run.json", "reproduction.json"))]
+        assert len(settings) >= 2 or all(member.name.endswith(".h5") for member in members)  # rooms alone
         for member in settings:
             file = archive.extractfile(member)
             assert file is not None and not re.search(rb'(?:"| )/\w', file.read()), member.name

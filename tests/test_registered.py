@@ -35,6 +35,7 @@ SECTIONS = {part.partition("\n")[0].strip("# "): part for part in split(PAGE.rea
 RECORDS = ROOT / "docs" / "records"
 ASKED_FIRST = {
     "bedroom-fresh": {38},
+    "four-rooms-default": {64, 65},
     "hard-bathroom": {58},
     "shuffles-bathroom": {61, 62},
     "step-size-bathroom": {60},

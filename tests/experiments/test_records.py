@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_record_comes_to_the_same_sections(folder: Path, tmp_path: Path) -> None:
     record, again = tmp_path / "record.tar.xz", tmp_path / "again"
     RECORDS["pack"](folder, record)
-    RECORDS["unpack"](record, again)
+    RECORDS["unpack"]([record], again)
     assert not list(again.rglob("*.safetensors"))
     assert gather(again).sections == gather(folder).sections
     assert not gather(again).sections[0].missing
@@ -41,9 +41,23 @@ def test_a_record_comes_to_the_same_sections(folder: Path, tmp_path: Path) -> No
 def test_what_a_record_says_decides(folder: Path, tmp_path: Path) -> None:
     record, again = tmp_path / "record.tar.xz", tmp_path / "again"
     RECORDS["pack"](folder, record)
-    RECORDS["unpack"](record, again)
+    RECORDS["unpack"]([record], again)
     next((again / "runs").glob("bc-*/trials/*.json")).unlink()
     assert gather(again).sections[0].missing
+
+
+def test_scenes_and_runs_may_be_two_records(folder: Path, tmp_path: Path) -> None:
+    records = [tmp_path / f"{part}.tar.xz" for part in ("scenes", "runs")]
+    for record in records:
+        RECORDS["pack"](folder, record, [record.name.partition(".")[0]])
+    RECORDS["unpack"](records, tmp_path / "again")
+    RECORDS["pack"](folder, tmp_path / "whole.tar.xz")
+    RECORDS["unpack"]([tmp_path / "whole.tar.xz"], tmp_path / "other")
+    files = [
+        {path.relative_to(top): path.read_bytes() for path in top.rglob("*") if path.is_file()}
+        for top in (tmp_path / "again", tmp_path / "other")
+    ]
+    assert files[0] == files[1] and gather(tmp_path / "again").sections == gather(folder).sections
 
 
 def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:

@@ -18,9 +18,10 @@ def benchmark(name: str) -> dict[str, Any]:
     return runpy.run_path(str(DOCS.parent / "benchmarks" / f"{name}.py"))
 
 
-def unpack(record: str, folder: Path) -> None:
-    """Write what a record holds to a new folder."""
-    benchmark("records")["unpack"](DOCS / "records" / f"{record}.tar.xz", folder)
+def unpack(record: str, folder: Path, *further: str) -> None:
+    """Write what a record holds, and further ones, to a new folder."""
+    records = [DOCS / "records" / f"{name}.tar.xz" for name in (record, *further)]
+    benchmark("records")["unpack"](records, folder)
 
 
 def section_of(page: str, title: str) -> str:

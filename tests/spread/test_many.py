@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from clearway.errors import ClearwayError
-from clearway.spread import many
+from clearway.spread import many, workers
 
 
 def halved(number: int) -> tuple[int, int]:
@@ -22,7 +22,7 @@ def halved(number: int) -> tuple[int, int]:
 def processes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(many, "MANY", 10)
     monkeypatch.setattr(many, "AT_ONCE", 4)
-    monkeypatch.setattr(many.os, "sched_getaffinity", lambda pid: {0, 1}, raising=False)
+    monkeypatch.setattr(workers.os, "sched_getaffinity", lambda pid: {0, 1}, raising=False)
 
 
 @pytest.mark.usefixtures("processes")

@@ -1,0 +1,155 @@
+"""What the pages say of the default recipe in four rooms is what its record comes to."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from clearway.experiments.reproduce import REQUEST_FILE, gather
+from clearway.experiments.section import ReportTable, Section
+from helpers.published import (
+    EVIDENCE,
+    RESULTS,
+    assert_judged,
+    assert_shown,
+    assert_written,
+    check_beside,
+    numbers,
+    rows_of,
+    seconds_of_runs,
+    section_of,
+    unpack,
+    words_of,
+)
+
+RUN = ["quality", "table1", "fig3", "fig4", "table2", "fig5"]
+"""Of the experiments that the record was made for; of the others no run is complete."""
+ROOMS = ("bathroom", "bedroom", "living_room", "kitchen")
+PAGE = section_of(EVIDENCE, "Four rooms\n")
+
+
+def rows(table: ReportTable) -> list[dict]:
+    """By heading."""
+    return [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+
+
+@pytest.mark.slow
+def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    folder = tmp_path / "four"
+    unpack("four-rooms-default", folder, "four-rooms")
+    request = json.loads((folder / REQUEST_FILE).read_text())
+    (folder / REQUEST_FILE).write_text(json.dumps({**request, "names": RUN}))
+    sections = {section.name: section for section in gather(folder).sections}
+    assert list(sections) == RUN
+    assert all(name.startswith("bc-") for section in sections.values() for name in section.missing)
+    assert [name for name, section in sections.items() if section.missing] == ["table2"]
+    told = rows_of(PAGE)
+    check_quality(sections["quality"], told)
+    claims = [claim for name in RUN[1:] for claim in sections[name].claims]
+    shown = [row for row in told if len(row) == 7 and row[1] in ("holds", "does not hold", "undecided")]
+    assert [row[0] for row in shown] == [claim.text.removeprefix("default: ") for claim in claims]
+    for claim, (_, verdict, own, other, difference, p, corrected) in zip(claims, shown, strict=True):
+        assert_judged(claim, verdict, p, corrected, own, other, difference)
+    check_rooms(sections["table1"], told)
+    check_hard(sections["table2"])
+    check_unseen(sections["fig5"])
+    check_settled(sections["fig4"])
+    spent = seconds_of_runs(folder, "ppo-*")
+    least, most = (int(end) for end in words_of(r"AMD EPYC, (\d+) to (\d+) s of training", PAGE).groups())
+    assert (least, most) == (round(min(spent)), round(max(spent)))
+
+
+def check_quality(section: Section, told: list[list[str]]) -> None:
+    """Five trainings against the criteria; and what the results say of them."""
+    (claim,) = section.claims
+    assert claim.verdict == "holds" and claim.counted
+    own = [row for row in rows(section.tables[0]) if row["agent"] == "collision-aware"]
+    shown = [row for row in told if len(row) == 5 and row[0].isdigit()]
+    assert len(own) == len(shown) == 5
+    for row, (seed, solved, ratio, worst, collisions) in zip(own, shown, strict=True):
+        assert (seed, solved) == (str(row["seed"]), row["targets solved"])
+        written, where = worst.rstrip(")").split(" (")
+        assert where == row["which is the worst"].replace("_", " ")
+        for text, name in ((ratio, "x the shortest path"), (written, "worst target"), (collisions, "collisions")):
+            assert_written(text, row[name], name)
+    assert "[question 64 (e0525e6)]" in RESULTS
+
+
+def check_rooms(section: Section, told: list[list[str]]) -> None:
+    """Table 1, room by room."""
+    table = section.tables[0]
+    by_agent: dict[str, dict[str, dict]] = {}
+    for row in rows(table):
+        if row["learner"] == "default":
+            by_agent.setdefault(row["agent"], {})[row["figure"]] = row
+    for agent, own in by_agent.items():
+        ((_, *cells, steps, collisions, failed),) = [row for row in told if len(row) == 8 and row[0] == agent]
+        assert_shown(steps, own["steps"]["average"], own["steps"]["95 %"])
+        assert_shown(collisions, own["collisions"]["average"], own["collisions"]["95 %"])
+        assert failed == own["steps"]["failed targets"]
+        for cell, room in zip(cells, ROOMS, strict=True):
+            for text, figure in zip(cell.split(", "), ("steps", "collisions"), strict=True):
+                assert_written(text, own[figure][room], f"{figure} of {agent} in {room}")
+    beside = [row for row in told if len(row) == 8]
+    named = {
+        "planner on a learnt map",
+        "nearest picture",
+        "Q-learning",
+        "behaviour cloning",
+        "shortest path",
+        "random walk",
+    }
+    assert check_beside(beside, table.rows, 5, 6) == named
+    ((*_, lost),) = [row for row in beside if row[0].startswith("Q-learning")]
+    assert lost == next(row["failed targets"] for row in rows(table) if row["learner"] == "q-learning")
+    (line,) = [line for line in RESULTS.splitlines() if "[question 65 (e0525e6)]" in line]
+    for agent, own in by_agent.items():
+        assert_written(words_of(rf"(0\.\d+) by `{agent}`", line)[1], own["collisions"]["average"], agent)
+
+
+def check_hard(section: Section) -> None:
+    """Table 2's agents."""
+    found = {(row["figure"], row["agent"]): row for row in rows(section.tables[0]) if row["learner"] == "default"}
+    settled = {row["agent"]: row for row in rows(section.tables[-1])}
+    shown = [row for row in rows_of(PAGE.partition("Hard targets")[2]) if len(row) == 5 and row[0] in settled]
+    assert len(shown) == 3
+    for agent, after, steps, collisions, failed in shown:
+        after, ran = after.split("), ")
+        assert_shown(after, settled[agent]["frames"], settled[agent]["95 %"])
+        assert ran == f"{settled[agent]['settled']} of 5" and failed == found["steps", agent]["failed targets"]
+        for cell, figure in ((steps, "steps"), (collisions, "collisions")):
+            assert_shown(cell, found[figure, agent]["average"], found[figure, agent]["95 %"])
+
+
+def check_unseen(section: Section) -> None:
+    """Figure 5: a row a distance."""
+    found = {(str(row["steps away"]), row["learner"], row["agent"]): row for row in rows(section.tables[0])}
+    shown = [row for row in rows_of(PAGE.partition("Unseen targets")[2]) if len(row) == 6 and row[1].isdigit()]
+    assert len(shown) == 5
+    who = (("default", "shortest"), ("default", "collision-aware"))
+    for away, targets, *cells, mapped, walked in shown:
+        steps = away.partition(" ")[0]
+        for cell, (learner, agent) in zip(cells, who, strict=True):
+            row = found[steps, learner, agent]
+            assert targets == str(row["targets"])
+            success, within, spl = cell.split(", ")
+            assert_shown(success, row["sc"], row["95 % of sc"], scale=100)
+            assert_written(within.rstrip(" %"), 100 * row["sc within 4 x shortest"], cell)
+            assert_written(spl.rstrip(" %"), 100 * row["SPL"], cell)
+        others = (mapped, "planner on a learnt map", "110,900 frames"), (walked, None, "random walk")
+        for cell, learner, agent in others:
+            row = found[steps, learner, agent]
+            for text, name in zip(numbers(cell), ("sc", "sc within 4 x shortest", "SPL"), strict=True):
+                assert_written(text, 100 * row[name], cell)
+
+
+def check_settled(section: Section) -> None:
+    """Figure 4's tables: when training settled, and how the agents stood halfway."""
+    for row in rows(section.tables[1]):
+        low, high = row["95 %"].split(" to ")
+        assert f"under `{row['agent']}` after {row['frames']:,.0f} frames ({low} to {high})" in PAGE
+    half = [row for row in rows(section.tables[0]) if row["frames"] == 1_500_000]
+    steps, collisions = ([row[name] for row in half] for name in ("steps", "collisions"))
+    told = words_of(r"they take ([\d.]+) and ([\d.]+) steps, with ([\d.]+) and ([\d.]+) collisions", PAGE).groups()
+    for text, value in zip(told, (*steps, *collisions), strict=True):
+        assert_written(text, value, "halfway")
