@@ -81,7 +81,7 @@ def asked(text: str) -> set[tuple[int, str]]:
 
 def numbers_of(questions: str) -> set[int]:
     """Those that a row names."""
-    told = re.sub(r"figures? \d+(?: and \d+)*|\d+ M frames", "", questions.partition(" of ")[0])
+    told = re.sub(r"(?:figures?|tables?) \d+(?: and \d+)*|\d+ M frames", "", questions.partition(" of ")[0])
     ranges = re.findall(r"(\d+)(?: to (\d+))?", told)
     return {number for first, last in ranges for number in range(int(first), int(last or first) + 1)}
 
