@@ -29,6 +29,7 @@ from helpers.published import (
     section_of,
     unpack,
 )
+from helpers.report_tables import by_heading
 
 
 def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
@@ -44,7 +45,7 @@ def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     (section,) = found.sections
     assert not section.missing
     (table,) = section.tables
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     lines = RESULTS.splitlines()
     told = [line.strip("|").split("|") for line in lines if line.startswith("| planner on a learnt map")]
     assert len(told) == 3

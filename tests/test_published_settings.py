@@ -30,6 +30,7 @@ from helpers.published import (
     section_of,
     unpack,
 )
+from helpers.report_tables import by_heading
 
 BESIDE = {"planner on a learnt map", "nearest picture", "shortest path", "random walk"}
 LEARNERS = {"Q-learning", "behaviour cloning"}
@@ -46,7 +47,7 @@ def test_hard_targets_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Pa
     for section, frames in zip(sections[1:], ("1 M", "2 M"), strict=True):
         assert not section.missing
         table, late = section.tables[0], section.tables[-1]
-        for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+        for row in by_heading(late):
             ((settled, *cells, lost),) = [cells for agent, of, *cells in lines if (agent, of) == (row["agent"], frames)]
             settled, ran = settled.split("), ")
             assert_shown(settled, row["frames"], row["95 %"])
@@ -231,7 +232,7 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
     (section,) = gather(tmp_path / "off-grid").sections
     assert not section.missing
     (table,) = section.tables
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     lines = section_of(EVIDENCE, "Five seeds, published settings").splitlines()
     figures = [heading for heading in table.headings[4:] if not heading.startswith("95 %")]
     means = [row for row in rows if row["setting"] == "all settings, mean"]

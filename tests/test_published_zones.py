@@ -28,6 +28,7 @@ from helpers.published import (
     section_of,
     unpack,
 )
+from helpers.report_tables import by_heading
 
 AGENTS = r"collision-aware|dearer|shuffled|shortest"
 
@@ -76,7 +77,7 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     assert not section.missing and not of_cells.missing
     check_zones_of_cells(of_cells)
     table = section.tables[-1]
-    rows = {row["agent"]: row for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows)}
+    rows = {row["agent"]: row for row in by_heading(table)}
     told = {
         "shortest": "| shortest | 812",
         "dearer": "| steps as dear as zones",
@@ -99,7 +100,7 @@ def test_zones_or_a_larger_step_is_what_its_record_comes_to(tmp_path: Path) -> N
     ]
     assert f"{min(seconds):.0f} to {round(max(seconds), -1):,.0f} s a run" in evidence
     table = section.tables[0]
-    for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows):
+    for row in by_heading(table):
         if row["seeds"] == 5:
             name = row["agent"] if row["learner"] == "paper" else row["learner"]
             (line,) = [line for line in evidence.splitlines() if line.startswith(f"| {name} |")]
@@ -134,9 +135,9 @@ def test_zones_at_several_step_sizes_are_what_their_record_comes_to(tmp_path: Pa
     part = section_of(EVIDENCE, "Zones, at several step sizes")
     lines = rows_of(part)
     table, late = section.tables[0], section.tables[-1]
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     assert len(late.rows) == 2 * len(step_size.ALL)
-    for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+    for row in by_heading(late):
         step = str(row["learner"]).removeprefix("paper, ")
         ((frames, *cells, lost),) = [cells for size, agent, *cells in lines if (size, agent) == (step, row["agent"])]
         frames, ran = frames.rsplit(", ", 1)
@@ -181,7 +182,7 @@ def check_results_of_shuffles(table: ReportTable, late: ReportTable) -> None:
     """The right half of a table of the results."""
     lines = rows_of(section_of(RESULTS, "Zones, or a larger step?"))
     names = {"own shuffle": "zones of shuffled poses"}
-    for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+    for row in by_heading(late):
         agent = names.get(str(row["agent"]), row["agent"])
         ((*_, frames, collisions),) = [line for line in lines if line[0] == agent]
         frames, ran = frames.split("), ")
@@ -234,7 +235,7 @@ def test_zones_shuffled_anew_and_time_in_the_zones_are_what_their_record_comes_t
     part = section_of(EVIDENCE, "Zones shuffled anew")
     lines = rows_of(part)
     table, late = shuffled.tables[0], shuffled.tables[-1]
-    for row in (dict(zip(late.headings, row, strict=True)) for row in late.rows):
+    for row in by_heading(late):
         ((frames, steps, collisions, lost),) = [cells for agent, *cells in lines if agent == row["agent"]]
         frames, settled = frames.split("), ")
         assert_shown(frames, row["frames"], row["95 %"])

@@ -11,8 +11,9 @@ from clearway.experiments.job import unfinished
 from clearway.experiments.learnt_maps import PLANNER, on_maps
 from clearway.experiments.other_learners import other_learners
 from clearway.experiments.plan import NEAREST
-from clearway.experiments.section import ReportTable, Section
+from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
+from helpers.report_tables import by_heading
 from helpers.small_setting import do_here, small_setting
 
 MOST = "7,500 frames"
@@ -24,18 +25,13 @@ def setting(tmp_path: Path) -> Setting:
     return small_setting(tmp_path)
 
 
-def rows(table: ReportTable) -> list[dict]:
-    """By heading."""
-    return [dict(zip(table.headings, row, strict=True)) for row in table.rows]
-
-
 @pytest.mark.parametrize("experiment", [table1, hard_tables.TABLE2, hard_tables.TABLE3])
 def test_the_paper_s_tables_hold_agents_on_maps_and_other_learners(setting: Setting, experiment: object) -> None:
     setting = replace(setting, learners={"paper": setting.learners["paper"]})
     targets = None if experiment is table1 else hard_tables.chosen(setting)
     do_here(setting.out, all_jobs(other_learners(setting, targets)), threads=1)
     section: Section = experiment.section(setting)
-    steps = [row for row in rows(section.tables[0]) if row["figure"] == "steps"]
+    steps = [row for row in by_heading(section.tables[0]) if row["figure"] == "steps"]
     found = {row["learner"]: row for row in steps}
     for learner in (PLANNER, NEAREST, "q-learning", "bc"):
         assert found[learner]["seeds"] == 2
@@ -49,7 +45,7 @@ def test_the_paper_s_tables_hold_agents_on_maps_and_other_learners(setting: Sett
     assert len(exact) == 1 + 2 * (3 + unclipped)  # two policies of each reward as the paper's learner is paid it
     left = unfinished(setting.out, experiment.jobs(setting))
     assert not any(name.startswith(("bc-", "q-learning-")) for name in left)
-    assert {row["learner"] for row in rows(section.tables[1])} == {PLANNER, NEAREST, "q-learning", "bc"}
+    assert {row["learner"] for row in by_heading(section.tables[1])} == {PLANNER, NEAREST, "q-learning", "bc"}
     assert not [claim for claim in section.claims if claim.text.startswith(("bc:", "q-learning:"))]
 
 
@@ -62,7 +58,7 @@ def test_other_learners_are_missing_until_they_are_trained(setting: Setting) -> 
 def test_a_map_knows_targets_that_nobody_was_given(setting: Setting) -> None:
     for experiment, count in ((fig5, 5), (fig6, 2)):
         section = experiment.section(setting)
-        own = [row for row in rows(section.tables[0]) if str(row["learner"]).startswith(PLANNER)]
+        own = [row for row in by_heading(section.tables[0]) if str(row["learner"]).startswith(PLANNER)]
         assert len(own) == count
         assert [row["SPL"] for row in own if row["agent" if experiment is fig5 else "learner"].endswith(MOST)] == (
             pytest.approx([1.0] * (5 if experiment is fig5 else 1))

@@ -35,6 +35,7 @@ from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import EncoderRecord
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.zones import Zone, scene_zones
+from helpers.report_tables import by_heading
 from helpers.small_live import walkable_live
 from helpers.small_runs import small_learner
 from helpers.small_setting import BUDGET, FRAMES, small_setting
@@ -135,7 +136,7 @@ def test_trials_of_trained_agents_keep_their_names() -> None:
 def test_tables_hold_who_needs_no_training(setting: Setting) -> None:
     walked(setting, lambda reward, seed: {"contacts": 1.0 + seed})
     (table,) = off_grid.section(setting).tables
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     own = [row for row in rows if row["learner"] in ("nearest picture", "walked")]
     assert {row["reward"] for row in own} == {"4,700 frames", "random walk"}
     assert all((row["seeds"], row["contacts"]) == (5, 3.0) for row in own)

@@ -37,6 +37,7 @@ from clearway.experiments.setting import Setting
 from clearway.reward import COLLISION_AWARE
 from clearway.viz import report
 from clearway.viz.report import HTML, JSON, MARKDOWN, write_report
+from helpers.report_tables import by_heading
 from helpers.small_pictures import shrink_pictures
 from helpers.small_setting import FRAMES, small_setting
 
@@ -186,7 +187,7 @@ def test_figures_halfway_and_in_the_end_are_those_of_their_trials(
 
 def test_figure4_stands_beside_what_memory_solves(sections: dict[str, Section]) -> None:
     table, (first, _) = sections["fig4"].tables[0], sections["table1"].tables
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     beside = [row for row in rows if row["learner"] not in ("paper", "default")]
     assert [(row["learner"], row["agent"], row["frames"], row["seeds"]) for row in beside] == [
         ("planner on a learnt map", None, 7_500, 2),
@@ -328,7 +329,7 @@ def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dic
 
 def test_figure_5_averages_over_the_distances(sections: dict[str, Section]) -> None:
     table, _ = sections["fig5"].tables
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     for kind in {(row["learner"], row["agent"]) for row in rows}:
         own = [row for row in rows if (row["learner"], row["agent"]) == kind]
         assert [row["steps away"] for row in own] == [1, 2, 4, 8, "average"]
@@ -346,7 +347,7 @@ def test_accumulated_steps_end_at_the_sums_of_the_targets(setting: Setting) -> N
 
 def test_the_analysis_knows_that_clipping_matters(setting: Setting, sections: dict[str, Section]) -> None:
     (table,) = sections["analysis"].tables
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
 
     def collisions(beta: float, clipped: bool) -> float:
         (found,) = [
@@ -483,7 +484,7 @@ def test_memory_says_what_a_map_holds_of_the_frames_it_was_learnt_in(sections: d
     (table,), (figure,) = section.tables, section.figures
     (line,) = figure.series
     assert list(line.x) == sorted(line.x) and line.y[0] < line.y[-1] == 1.0
-    rows = [dict(zip(table.headings, row, strict=True)) for row in table.rows]
+    rows = by_heading(table)
     by_frames = [row["steps"] for row in rows if row["agent"] == learnt_maps.PLANNER]
     best = min(row["steps"] for row in rows)
     assert by_frames[-1] == best and by_frames[0] > best  # nobody takes fewer than the shortest paths

@@ -16,6 +16,7 @@ from clearway.experiments.reproduce import planned
 from clearway.experiments.section import Claim
 from clearway.experiments.setting import Setting
 from clearway.zones import Zone
+from helpers.report_tables import by_heading
 from helpers.small_setting import do_here, small_setting
 
 
@@ -32,7 +33,7 @@ def test_shares_are_those_of_the_episodes(setting: Setting) -> None:
     do_here(own.out, jobs, threads=1)
     section = zone_time.section(own)
     (table,) = section.tables
-    rows = {row["agent"]: row for row in (dict(zip(table.headings, row, strict=True)) for row in table.rows)}
+    rows = {row["agent"]: row for row in by_heading(table)}
     shares = []
     for found in (episodes_of(own.out, job.run, job.trials[0]) for job in jobs if job.run.reward.name == "bump"):
         assert found is not None
