@@ -2,7 +2,7 @@
 
     python benchmarks/records.py pack reproduction docs/records/memory.tar.xz
     python benchmarks/records.py unpack docs/records/memory.tar.xz again && clearway report again
-    python benchmarks/records.py pack reproduction docs/records/rooms.tar.xz --only scenes    # large, and never another
+    python benchmarks/records.py pack reproduction docs/records/rooms.tar.xz --only scenes    # once, as they are large
     python benchmarks/records.py pack reproduction docs/records/runs.tar.xz --only runs
     python benchmarks/records.py unpack docs/records/rooms.tar.xz docs/records/runs.tar.xz again
 
@@ -89,6 +89,8 @@ def main() -> None:
         if len(args.source) != 1:
             sys.exit(f"error: {len(args.source)} folders for one record. Pack them one by one")
         pack(args.source[0], args.made, (args.only,) if args.only else (SCENES, RUNS))
+    elif args.only:
+        sys.exit("error: --only is for packing. Leave it out")
     elif args.made.exists():
         sys.exit(f"error: {args.made}: is there already. Name a new folder")
     else:

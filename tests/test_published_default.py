@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from clearway.experiments.reproduce import REQUEST_FILE, gather
-from clearway.experiments.section import ReportTable, Section
+from clearway.experiments.section import Section
 from helpers.published import (
+    DOCS,
     EVIDENCE,
     RESULTS,
     assert_judged,
@@ -21,16 +22,14 @@ from helpers.published import (
     unpack,
     words_of,
 )
+from helpers.report_tables import by_heading
 
 RUN = ["quality", "table1", "fig3", "fig4", "table2", "fig5"]
 """Of the experiments that the record was made for; of the others no run is complete."""
+VERDICTS = ("holds", "does not hold", "undecided")
+REGISTERED = (DOCS / "registered.md").read_text(encoding="utf-8")
 ROOMS = ("bathroom", "bedroom", "living_room", "kitchen")
 PAGE = section_of(EVIDENCE, "Four rooms\n")
-
-
-def rows(table: ReportTable) -> list[dict]:
-    """By heading."""
-    return [dict(zip(table.headings, row, strict=True)) for row in table.rows]
 
 
 @pytest.mark.slow
@@ -46,10 +45,11 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     told = rows_of(PAGE)
     check_quality(sections["quality"], told)
     claims = [claim for name in RUN[1:] for claim in sections[name].claims]
-    shown = [row for row in told if len(row) == 7 and row[1] in ("holds", "does not hold", "undecided")]
+    shown = [row for row in told if len(row) == 7 and row[1] in VERDICTS]
     assert [row[0] for row in shown] == [claim.text.removeprefix("default: ") for claim in claims]
     for claim, (_, verdict, own, other, difference, p, corrected) in zip(claims, shown, strict=True):
         assert_judged(claim, verdict, p, corrected, own, other, difference)
+    check_words({claim.text.removeprefix("default: "): claim.verdict for claim in claims})
     check_rooms(sections["table1"], told)
     check_hard(sections["table2"])
     check_unseen(sections["fig5"])
@@ -63,7 +63,7 @@ def check_quality(section: Section, told: list[list[str]]) -> None:
     """Five trainings against the criteria; and what the results say of them."""
     (claim,) = section.claims
     assert claim.verdict == "holds" and claim.counted
-    own = [row for row in rows(section.tables[0]) if row["agent"] == "collision-aware"]
+    own = [row for row in by_heading(section.tables[0]) if row["agent"] == "collision-aware"]
     shown = [row for row in told if len(row) == 5 and row[0].isdigit()]
     assert len(own) == len(shown) == 5
     for row, (seed, solved, ratio, worst, collisions) in zip(own, shown, strict=True):
@@ -72,14 +72,35 @@ def check_quality(section: Section, told: list[list[str]]) -> None:
         assert where == row["which is the worst"].replace("_", " ")
         for text, name in ((ratio, "x the shortest path"), (written, "worst target"), (collisions, "collisions")):
             assert_written(text, row[name], name)
-    assert "[question 64 (e0525e6)]" in RESULTS
+    assert "all ten do, as do five of fresh seeds (time not asked, [question 64 (e0525e6)]" in RESULTS
+    assert "64: yes, all five." in REGISTERED
+
+
+def check_words(verdicts: dict[str, str]) -> None:
+    """What the results and the register say of the claims together."""
+    (line,) = [line for line in RESULTS.splitlines() if "[question 65 (e0525e6)]" in line]
+    held, failed, left = ({text for text, own in verdicts.items() if own == verdict} for verdict in VERDICTS)
+    assert (len(verdicts), len(held), len(failed), len(left)) == (19, 6, 4, 9)
+    assert "Of 19 claims with the default recipe six hold, four do not, nine are undecided: among these whether" in line
+    assert "of the 19 claims of table 1, figures 3, 4 and 5, and table 2, six hold, four do not, nine are" in REGISTERED
+    for words in ("fewer collisions than with the shortest-path reward", "learns faster", "generalises better"):
+        assert not [text for text in held | failed if text.startswith(words)]
+    assert {text.partition(" (")[0].partition(" on hard")[0] for text in held} == {
+        *("no more steps than with the shortest-path reward", "no more steps than with a penalty for bumping"),
+        *("success falls with distance", "hard targets are harder"),
+    }
+    assert {text.partition(" (")[0].partition(" on hard")[0] for text in failed} == {
+        "fewer collisions than with a penalty for bumping",
+        "less than a tenth of the collisions with the shortest-path reward",
+        "halfway is close to the end",
+    }
 
 
 def check_rooms(section: Section, told: list[list[str]]) -> None:
     """Table 1, room by room."""
     table = section.tables[0]
     by_agent: dict[str, dict[str, dict]] = {}
-    for row in rows(table):
+    for row in by_heading(table):
         if row["learner"] == "default":
             by_agent.setdefault(row["agent"], {})[row["figure"]] = row
     for agent, own in by_agent.items():
@@ -101,7 +122,7 @@ def check_rooms(section: Section, told: list[list[str]]) -> None:
     }
     assert check_beside(beside, table.rows, 5, 6) == named
     ((*_, lost),) = [row for row in beside if row[0].startswith("Q-learning")]
-    assert lost == next(row["failed targets"] for row in rows(table) if row["learner"] == "q-learning")
+    assert lost == next(row["failed targets"] for row in by_heading(table) if row["learner"] == "q-learning")
     (line,) = [line for line in RESULTS.splitlines() if "[question 65 (e0525e6)]" in line]
     for agent, own in by_agent.items():
         assert_written(words_of(rf"(0\.\d+) by `{agent}`", line)[1], own["collisions"]["average"], agent)
@@ -109,9 +130,13 @@ def check_rooms(section: Section, told: list[list[str]]) -> None:
 
 def check_hard(section: Section) -> None:
     """Table 2's agents."""
-    found = {(row["figure"], row["agent"]): row for row in rows(section.tables[0]) if row["learner"] == "default"}
-    settled = {row["agent"]: row for row in rows(section.tables[-1])}
-    shown = [row for row in rows_of(PAGE.partition("Hard targets")[2]) if len(row) == 5 and row[0] in settled]
+    found = {(row["figure"], row["agent"]): row for row in by_heading(section.tables[0]) if row["learner"] == "default"}
+    settled = {row["agent"]: row for row in by_heading(section.tables[-1])}
+    (claim,) = [claim for claim in section.claims if "hard targets are harder" in claim.text]
+    further = r"go ([\d.]+) % further than the shortest paths to them, ([\d.]+) % to the usual ones"
+    for text, name in zip(words_of(further, PAGE).groups(), ("first", "second"), strict=True):
+        assert_written(text, 100 * (claim.numbers[name].value - 1), "detours")
+    shown = [row for row in rows_of(PAGE.partition("**Hard targets**")[2]) if len(row) == 5 and row[0] in settled]
     assert len(shown) == 3
     for agent, after, steps, collisions, failed in shown:
         after, ran = after.split("), ")
@@ -123,8 +148,8 @@ def check_hard(section: Section) -> None:
 
 def check_unseen(section: Section) -> None:
     """Figure 5: a row a distance."""
-    found = {(str(row["steps away"]), row["learner"], row["agent"]): row for row in rows(section.tables[0])}
-    shown = [row for row in rows_of(PAGE.partition("Unseen targets")[2]) if len(row) == 6 and row[1].isdigit()]
+    found = {(str(row["steps away"]), row["learner"], row["agent"]): row for row in by_heading(section.tables[0])}
+    shown = [row for row in rows_of(PAGE.partition("**Unseen targets**")[2]) if len(row) == 6 and row[1].isdigit()]
     assert len(shown) == 5
     who = (("default", "shortest"), ("default", "collision-aware"))
     for away, targets, *cells, mapped, walked in shown:
@@ -145,10 +170,10 @@ def check_unseen(section: Section) -> None:
 
 def check_settled(section: Section) -> None:
     """Figure 4's tables: when training settled, and how the agents stood halfway."""
-    for row in rows(section.tables[1]):
+    for row in by_heading(section.tables[1]):
         low, high = row["95 %"].split(" to ")
         assert f"under `{row['agent']}` after {row['frames']:,.0f} frames ({low} to {high})" in PAGE
-    half = [row for row in rows(section.tables[0]) if row["frames"] == 1_500_000]
+    half = [row for row in by_heading(section.tables[0]) if row["frames"] == 1_500_000]
     steps, collisions = ([row[name] for row in half] for name in ("steps", "collisions"))
     told = words_of(r"they take ([\d.]+) and ([\d.]+) steps, with ([\d.]+) and ([\d.]+) collisions", PAGE).groups()
     for text, value in zip(told, (*steps, *collisions), strict=True):

@@ -174,6 +174,7 @@ def test_a_seed_repeats() -> None:
     assert episode(env, 5) == episode(env, 5) == episode(other, 5)
     assert episode(env, 5) != episode(env, 6)
     assert episode(env, np.int64(5)) == episode(other, 5)
+    assert env.reset(seed=[5])[1] == other.reset(seed=5)[1]
 
 
 def test_it_goes_on_after_pickling() -> None:

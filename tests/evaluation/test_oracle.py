@@ -222,6 +222,7 @@ def test_where_the_soft_policy_does_not_settle_its_row_is_left_out(monkeypatch: 
     scene = grid_scene(1, width=5, depth=5)
     world = make_world([scene], {scene.name: [0]})
     monkeypatch.setattr(oracle, "MOST_ROUNDS", 100)  # it does not in 1,000 either
-    with pytest.warns(UserWarning, match=r"no row 'soft fixed point \(.*\)': target 0, the soft policy did not settle"):
-        agents = _optima(world, [SHORTEST, COLLISION_AWARE.with_changes(beta=0.02)])
-    assert len(agents) == 3 and sum(name.startswith("soft") for name in agents) == 1
+    strange = COLLISION_AWARE.with_changes(beta=0.02)
+    with pytest.warns(UserWarning, match=r"no row 'soft fixed point \(.*\)': grid, target 0: the soft policy") as told:
+        agents = _optima(world, [SHORTEST, strange, replace(strange, clip=True)])
+    assert len(told) == 1 and len(agents) == 4 and sum(name.startswith("soft") for name in agents) == 1

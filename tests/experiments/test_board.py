@@ -26,7 +26,7 @@ def test_a_run_s_state_is_read_from_its_files(tmp_path: Path) -> None:
     assert done.frames_per_s > 0
     (trial,) = (tmp_path / "runs" / run.name / "trials").iterdir()
     trial.unlink()
-    assert state_of(tmp_path, job, under_way=True).state == "trying"
+    assert state_of(tmp_path, job, under_way=True).state == "evaluating"
     assert state_of(tmp_path, job, under_way=False).state == "waiting"
 
 
@@ -38,7 +38,7 @@ def test_an_update_that_goes_beyond_the_frames_asked_for_counts_them_alone(tmp_p
     row = {"frames": FRAMES + 40, "seconds": 2.0, "solved_targets": 0}
     (folder.path / METRICS_FILE).write_text(json.dumps(row) + "\n")
     found = state_of(tmp_path, Job(run, (setting.trial(),)), under_way=True)
-    assert (found.state, found.frames, found.seconds_left) == ("trying", FRAMES, 0)
+    assert (found.state, found.frames, found.seconds_left) == ("evaluating", FRAMES, 0)
     assert found.frames_per_s == (FRAMES + 40) / 2
 
 
@@ -77,7 +77,7 @@ def test_the_files_of_a_run_that_is_done_are_read_once(tmp_path: Path, monkeypat
 STATES = [
     RunState("a", "done", 800, 800, 10.0, 5, 5, 0.0),
     RunState("b", "training", 400, 800, 100.0, 2, 5, 4.0),
-    RunState("c", "trying", 800, 800, 100.0, 2, 5, 0.0),
+    RunState("c", "evaluating", 800, 800, 100.0, 2, 5, 0.0),
     RunState("d", "waiting", 0, 800, None, 0, 5, None),
 ]
 

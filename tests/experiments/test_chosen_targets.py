@@ -137,3 +137,14 @@ def test_training_sets_grow_and_never_hold_what_is_held_out(tmp_path: Path) -> N
             assert not set(own) & set(held_out[number])
             before[number] = set(own)
         assert group.trial.targets == held_out
+
+
+@pytest.mark.parametrize("table", [hard_tables.TABLE2, hard_tables.TABLE3])
+def test_whether_hard_targets_are_harder_is_asked_before_the_others_are_there(
+    tmp_path: Path, table: hard_tables.HardTable
+) -> None:
+    """As Holm's rule counts it: a verdict would be taken back when they come."""
+    setting = small_setting(tmp_path)
+    claims = [claim for claim in table.section(setting).claims if "detours" in claim.text]
+    assert len(claims) == len(setting.learners)
+    assert {(claim.verdict, claim.evidence) for claim in claims} == {("undecided", hard_tables.NO_EASY)}

@@ -1,19 +1,19 @@
 """How long a plan will take is told before it begins."""
 
-import json
 import time
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
 
 import pytest
+import torch
 
 from clearway.experiments import expected_time
 from clearway.experiments.expected_time import frames_per_second, told_time
 from clearway.experiments.job import run_folder
 from clearway.experiments.reproduce import planned
+from clearway.learn.checkpoint import Progress, write_checkpoint
 from clearway.learn.presets import PAPER_A3C
-from clearway.learn.run_folder import METRICS_FILE
 from helpers.small_setting import small_setting
 
 
@@ -35,9 +35,9 @@ def test_what_has_been_trained_takes_no_time(tmp_path: Path, monkeypatch: pytest
     (first, second), frames = jobs[:2], jobs[0].run.learner.frames
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
     for run, reached in ((first.run, frames + 3), (second.run, frames // 2)):  # the last update may go beyond
-        folder = run_folder(tmp_path, run)
-        folder.path.mkdir(parents=True)
-        (folder.path / METRICS_FILE).write_text(json.dumps({"frames": reached, "seconds": 1.0}) + "\n")
+        write_checkpoint(
+            run_folder(tmp_path, run).checkpoints, {"weight": torch.zeros(1)}, {}, Progress(reached, 1, 1.0)
+        )
     assert told_time(tmp_path, jobs, [first, second], 1, 1) == (
         f"{len(jobs)} runs, 1 to be trained, 1 only to be evaluated, 1 at a time: 1 h 00 min of training here at least"
     )

@@ -1,3 +1,4 @@
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,6 +126,8 @@ def test_a_job_without_trials_is_done_once_it_is_trained(tmp_path: Path) -> None
     assert not is_done(tmp_path, job) and unfinished(tmp_path, [job]) == (job.run.name,)
     do(tmp_path, job, threads=1)
     assert is_done(tmp_path, job) and not unfinished(tmp_path, [job])
+    shutil.rmtree(run_folder(tmp_path, job.run).checkpoints)  # its figures alone are no agent
+    assert not is_done(tmp_path, job)
 
 
 def test_targets_may_be_numpy_s(tmp_path: Path) -> None:

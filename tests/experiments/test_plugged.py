@@ -18,7 +18,7 @@ from helpers.small_setting import small_setting
 
 MADE = """
 from clearway.experiments.experiment import Experiment
-from clearway.experiments.section import ReportFigure, ReportMap, ReportTable, Section
+from clearway.experiments.section import Claim, ReportFigure, ReportMap, ReportTable, Section
 def table(name): return ReportTable(name, "Seeds", ("seed",), ((1,),))
 def drawn(**parts): return lambda setting: Section("odd", "", "", **parts)
 """
@@ -64,6 +64,10 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         (
             "Experiment(lambda s: [], lambda s: Section('odd', '', '', (table('../a'),)))",
             r"no file can be called '\.\./a', as a table or figure is",
+        ),
+        (
+            "Experiment(lambda s: [], drawn(claims=(Claim('it is better', 'holds', 'seen'),)))",
+            "its claim 'it is better' has a verdict, and neither p nor that it was counted",
         ),
         (
             "Experiment(lambda s: [], drawn(figures=(ReportFigure('a', 'A', 'x', 'y', ()),)))",

@@ -172,6 +172,7 @@ def test_a_missing_or_changed_model_is_one_line(scene: Scene, hall: Path, tmp_pa
         ("world", {"spawn_m": [1.0]}, "model's world is damaged"),
         ("world", {"extent_m": "all"}, "model's world is damaged"),
         ("world", {"floor_m": 10**400}, "model's world is damaged"),
+        ("world", {"floor_m": 1e300}, "model's world is damaged"),
         ("world", {"floor_m": float("nan")}, "model's world is damaged"),
         ("world", {"unfelt_too": 1}, "model's world is damaged"),
     ],

@@ -164,6 +164,12 @@ def test_a_seed_repeats_pictures_and_all(make: Make) -> None:
     assert walked(env, 3) != walked(env, 4)
 
 
+def test_a_seed_may_be_an_integer_of_numpy_s_or_one_in_a_list(make):
+    env = make()
+    plain = env.reset(seed=3)[1]
+    assert env.reset(seed=np.int64(3))[1] == env.reset(seed=[3])[1] == plain
+
+
 @pytest.mark.slow
 def test_perturbations_change_what_is_seen_and_not_the_target(plain: LiveImageGoalEnv, make: Make) -> None:
     ends = {"start": (0.25, 0.25, 0.0), "target": (0.25, 2.25, 180.0)}  # from where furniture is seen

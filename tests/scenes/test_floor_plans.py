@@ -267,6 +267,7 @@ DAMAGED_AREAS = (
     {"areas": [["bathroom", [0], [1]]]},
     {"areas": [["bathroom", ["a", 0], [1, 1]]]},
     {"areas": [["bathroom", [0, 0], [1, 1.5]]]},
+    {"areas": [["bathroom", [True, 0], [1, 1]]]},
 )
 DAMAGED_FURNITURE = (
     {"furniture": [["sofa", [9, 9, 9], [9], "south"]]},

@@ -160,7 +160,7 @@ class ImageGoalEnv(gymnasium.Env[Observation, int]):
         """
         if seed is not None:
             seed_words(seed, 1)  # before Gymnasium, which raises other errors
-        super().reset(seed=None if seed is None else int(seed))  # it takes no integer of NumPy's
+        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)  # it takes none of NumPy's
         if options and RESET_MASK in options:
             raise EnvError(f"options['{RESET_MASK}'] is for vector environments. Leave it out")
         observation, info = self._batch.reset(seed=seed, options=options)

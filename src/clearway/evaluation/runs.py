@@ -90,17 +90,27 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Agent]:
     Warns:
         UserWarning: it comes to rest nowhere under some reward, whose row is left out.
     """
-    found: dict[str, Agent] = {}
+    found: dict[str, Agent | None] = {}
     for reward in dict.fromkeys(reward for reward in rewards if reward.is_known):
         best = [optimal_policy(task) for task in world_tasks(world, reward)]
         found[f"{OPTIMUM} ({reward.name}{'' if reward.clip else ', unclipped'})"] = policies_agent(world, best)
         name = f"{SOFT_FIXED_POINT} ({reward.name})"
+        if name not in found:  # a reward may come clipped and unclipped
+            found[name] = _soft_fixed_point(world, replace(reward, clip=True), name)
+    return {name: agent for name, agent in found.items() if agent is not None}
+
+
+def _soft_fixed_point(world: World, reward: Reward, name: str) -> Agent | None:
+    """Where the loss comes to rest; None, and a warning, where it does nowhere."""
+    policies = []
+    for scene, task in zip(world.target_scene.tolist(), world_tasks(world, reward), strict=True):
         try:
-            soft = [soft_policy(task) for task in world_tasks(world, replace(reward, clip=True))]
-            found[name] = policies_agent(world, soft)
+            policies.append(soft_policy(task))
         except SceneError as fault:
-            warnings.warn(f"no row {name!r}: {fault.source}, {fault.problem}", stacklevel=3)
-    return found
+            where = f"{world.scene_names[scene]}, {fault.source}"
+            warnings.warn(f"no row {name!r}: {where}: {fault.problem}", stacklevel=4)
+            return None
+    return policies_agent(world, policies)
 
 
 def _trained(agent: TrainedAgent) -> Trained:

@@ -29,7 +29,7 @@ class RunState:
 
     Attributes:
         name: of the run.
-        state: "waiting", "training", "trying" (its trials) or "done".
+        state: "waiting", "training", "evaluating" or "done".
         frames, all_frames: trained, of how many.
         frames_per_s: of its training so far; None before the first figures.
         solved, targets: targets that its recent training episodes reached, of how many.
@@ -58,7 +58,7 @@ def state_of(out: Path, job: Job, under_way: bool) -> RunState:
     elif not under_way:
         state = "waiting"
     else:
-        state = "trying" if frames >= all_frames else "training"
+        state = "evaluating" if frames >= all_frames else "training"
     left = (all_frames - frames) / speed if speed else None
     targets = sum(len(own) for own in job.run.targets)
     return RunState(job.run.name, state, frames, all_frames, speed, int(last["solved_targets"]), targets, left)
@@ -156,7 +156,7 @@ def state_table(states: Sequence[RunState]) -> Table:
     table = Table(title=title, caption=f"training under way needs another {clock(seconds)} of processor time")
     for heading in ("run", "state", "frames", "frames/s", "solved", "left"):
         table.add_column(heading, justify="left" if heading in ("run", "state") else "right", no_wrap=heading != "run")
-    shown = sorted(states, key=lambda state: ("training", "trying", "waiting", "done").index(state.state))
+    shown = sorted(states, key=lambda state: ("training", "evaluating", "waiting", "done").index(state.state))
     for state in shown[:MOST_ROWS]:
         table.add_row(
             state.name,

@@ -9,6 +9,9 @@ from clearway.choices import BudgetName, RoomName
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.rooms import ROOM_NAMES
 
+LEARNT_FRAMES = 100_000
+"""With fewer, no learner has settled in any of the default rooms."""
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -42,15 +45,15 @@ class Budget:
     def changed(self, rooms: Sequence[RoomName] | None = None, frames: int | None = None) -> Budget:
         """The budget with other rooms, or with the same number of frames for every learner; None changes nothing.
 
-        More frames than it has take its mark away.
+        So many that something is learnt take its mark away.
         """
         found = self if rooms is None else replace(self, rooms=tuple(dict.fromkeys(rooms)))
         if frames is None:
             return found
-        return replace(found, frames=frames, default_frames=frames, mark=self.mark if frames <= self.frames else "")
+        return replace(found, frames=frames, default_frames=frames, mark=self.mark if frames < LEARNT_FRAMES else "")
 
     def warning(self, scenes: int) -> str:
-        """What stands on top of a report of so many scenes: where the budget spends less than the paper did."""
+        """What stands on top of a report of so many scenes: where it has less of anything than the paper."""
         if self.mark:
             return self.mark
         found = []

@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from clearway.experiments.job import frames_reached, request_of
+from clearway.experiments.job import frames_left, request_of
 from clearway.experiments.plan import Job, PlannedRun
 from clearway.torch_threads import torch_threads
 
@@ -18,7 +18,7 @@ TRIED_S = 2.0
 
 
 def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int | None, threads: int) -> str:
-    """How many runs are to be trained, or only tried, and for how long training takes at least, in a line.
+    """How many runs are to be trained, or only evaluated, and for how long training takes at least, in a line.
 
     Runs side by side are held for as fast as one alone; so many share memory and caches, and take longer.
     Where nobody knows how many there will be (`workers` None, on a Ray cluster), it is the time of all of them, one
@@ -31,11 +31,11 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
         workers: jobs side by side.
         threads: of each.
     """
-    frames = [(job.run, job.run.learner.frames - frames_reached(out, job.run)) for job in left]
+    frames = [(job.run, frames_left(out, job.run)) for job in left]
     to_train = [(run, count) for run, count in frames if count]
     counted = f"{len(jobs)} runs, {len(to_train)} to be trained"
-    if tried := len(left) - len(to_train):
-        counted += f", {tried} only to be evaluated"
+    if trained := len(left) - len(to_train):
+        counted += f", {trained} only to be evaluated"
     if not to_train:
         return counted if left else f"{counted}: all is there"
     speeds: dict[str, float] = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from clearway.experiments.verdicts import judged_more, judged_no_more
 from clearway.world.world import World
 
 FILE = "hard_targets.json"
+NO_EASY = "No complete runs of table 1's targets. Ask for table1, too."
 RULE = (
     "hard targets: the largest product of a random walk's steps and the share of collision poses on shortest paths, "
     "at least 4 cells apart or as far as they can be"
@@ -70,7 +71,7 @@ class HardTable:
     def _beside_easy(self, setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
         """Hard targets are harder than the main experiment's after its frames, and no more so after twice as many.
 
-        Undecided until the main experiment has trained its agents; under both of the paper's rewards together.
+        Under both of the paper's rewards together; undecided, as it counts, until the main experiment is there.
         """
         scenes = np.arange(len(setting.scenes))
         main, world, hard_world = compared(setting, PAIR), setting.world(), setting.world(chosen(setting))
@@ -78,10 +79,11 @@ class HardTable:
             easy, hard = _detours(setting, main, learner, world), _detours(setting, groups, learner, hard_world)
             if self.frames_factor == 1:
                 text = f"{learner}: hard targets are harder (larger detours)"
-                yield judged_more(text, "x shortest paths", hard, easy, scenes)
+                claim = judged_more(text, "x shortest paths", hard, easy, scenes)
             else:
                 text = f"{learner}: {self.frames_factor} times the frames repair hard targets (no larger detours)"
-                yield judged_no_more(text, "x shortest paths", hard, easy, scenes)
+                claim = judged_no_more(text, "x shortest paths", hard, easy, scenes)
+            yield claim if len(easy) else replace(claim, evidence=NO_EASY)
 
     def _groups(self, setting: Setting) -> list[Group]:
         return compared(setting, REWARDS, targets=chosen(setting), frames_factor=self.frames_factor)

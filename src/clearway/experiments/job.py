@@ -36,16 +36,15 @@ def trial_path(out: Path, run: PlannedRun, trial: Trial | LiveTrial) -> Path:
     return run_folder(out, run).path / TRIALS / f"{trial.name}.json"
 
 
-def frames_reached(out: Path, run: PlannedRun) -> int:
-    """How far a run's training has come, in frames; no more than are asked for."""
-    rows = run_folder(out, run).metrics()
-    return min(int(rows[-1]["frames"]), run.learner.frames) if rows else 0
+def frames_left(out: Path, run: PlannedRun) -> int:
+    """How many frames a run's training has before it, from its newest checkpoint on."""
+    return max(0, run.learner.frames - run_folder(out, run).trained_frames())
 
 
 def is_done(out: Path, job: Job) -> bool:
     """All of the job's trials have been walked; where it has none, its run has been trained."""
     if not job.trials:
-        return frames_reached(out, job.run) == job.run.learner.frames
+        return not frames_left(out, job.run)
     return all(trial_path(out, job.run, trial).exists() for trial in job.trials)
 
 

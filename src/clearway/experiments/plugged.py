@@ -63,6 +63,8 @@ def _fault(section: object, name: str, scenes: Sequence[str]) -> str:
         return f"its section has {others[0]!r:.60} where a text is expected"
     if wrong := [part.name for part in (*section.tables, *section.pictures) if not is_name(part.name)]:
         return f"no file can be called {wrong[0]!r:.60}, as a table or figure is"
+    if bare := [claim.text for claim in section.claims if claim.verdict != "undecided" and not claim.judged]:
+        return f"its claim {bare[0]!r:.60} has a verdict, and neither p nor that it was counted"
     if empty := [figure.name for figure in section.figures if not figure.series]:
         return f"its figure {empty[0]!r:.60} has no series"
     if strange := [shown.scene for shown in section.maps if shown.scene not in scenes]:

@@ -29,7 +29,7 @@ SOURCE = "mjcf"
 SHOWN_GROUPS = (0, 1, 2)  # as MuJoCo's own viewer starts
 NEAR_M = 0.05  # nothing nearer is drawn
 DIGEST_LENGTH = 16
-FARTHEST = 1e9  # a number of a record, metres
+FARTHEST_M = 1e9  # a number of a record
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ def _alike(value: object, expected: object, name: str) -> bool:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= FARTHEST
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= FARTHEST_M
 
 
 def _lower(words: str) -> str:

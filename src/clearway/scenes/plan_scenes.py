@@ -114,6 +114,6 @@ def plan_of(scene: Scene) -> FloorPlan:
 def _cell(given: object) -> tuple[int, int]:
     """A cell, or an end of some, as a record holds it. Raises TypeError where it is none."""
     match given:
-        case [int(first), int(second)]:
+        case [int(first), int(second)] if bool not in (type(first), type(second)):
             return first, second
     raise TypeError("no cell")
