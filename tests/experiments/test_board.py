@@ -18,7 +18,9 @@ def test_a_run_s_state_is_read_from_its_files(tmp_path: Path) -> None:
     setting = small_setting(tmp_path, seeds=1)
     (run,) = setting.runs(setting.learners["default"], COLLISION_AWARE)
     job = Job(run, (setting.trial(),))
-    assert state_of(tmp_path, job, under_way=False) == RunState(run.name, "waiting", 0, FRAMES, None, 0, 5, None)
+    assert state_of(tmp_path, job, under_way=False) == RunState(
+        run.name, run.kind, "waiting", 0, FRAMES, None, 0, 5, None
+    )
     assert state_of(tmp_path, job, under_way=True).state == "training"
     do(tmp_path, job, threads=1)
     done = state_of(tmp_path, job, under_way=False)
@@ -44,9 +46,9 @@ def test_an_update_that_goes_beyond_the_frames_asked_for_counts_them_alone(tmp_p
 
 def test_the_table_shows_what_is_under_way_first() -> None:
     states = [
-        RunState("finished", "done", 800, 800, 10.0, 5, 5, 0.0),
-        RunState("idle", "waiting", 0, 800, None, 0, 5, None),
-        RunState("busy", "training", 400, 800, 100.0, 2, 5, 4.0),
+        RunState("finished", "ppo", "done", 800, 800, 10.0, 5, 5, 0.0),
+        RunState("idle", "ppo", "waiting", 0, 800, None, 0, 5, None),
+        RunState("busy", "ppo", "training", 400, 800, 100.0, 2, 5, 4.0),
     ]
     text = StringIO()
     Console(file=text, width=120).print(state_table(states))
@@ -75,21 +77,31 @@ def test_the_files_of_a_run_that_is_done_are_read_once(tmp_path: Path, monkeypat
 
 
 STATES = [
-    RunState("a", "done", 800, 800, 10.0, 5, 5, 0.0),
-    RunState("b", "training", 400, 800, 100.0, 2, 5, 4.0),
-    RunState("c", "evaluating", 800, 800, 100.0, 2, 5, 0.0),
-    RunState("d", "waiting", 0, 800, None, 0, 5, None),
+    RunState("a", "ppo", "done", 800, 800, 10.0, 5, 5, 0.0),
+    RunState("b", "ppo", "training", 400, 800, 100.0, 2, 5, 4.0),
+    RunState("c", "ppo", "evaluating", 800, 800, 100.0, 2, 5, 0.0),
+    RunState("d", "ppo", "waiting", 0, 800, None, 0, 5, None),
 ]
 
 
 def test_a_line_says_how_many_runs_are_done_and_when_all_will_be() -> None:
-    assert pace(STATES, frames_before=1_000, seconds=100.0) == (
-        "runs: 1 of 4 done, 2 under way, 0:02:00 of training left at this pace"  # 1,000 frames in 100 s, 1,200 to go
-    )
-    for frames, seconds in ((2_000, 100.0), (1_000, 59.0)):
-        assert pace(STATES, frames, seconds) == "runs: 1 of 4 done, 2 under way"
-    ended = [STATES[0], STATES[2]]  # evaluation is not told of
-    assert pace(ended, frames_before=400, seconds=100.0) == "runs: 1 of 2 done, 1 under way"
+    # so far 2,000 frames in 80 + 4 + 8 s; 1,200 to go, two at a time
+    assert pace(STATES) == "runs: 1 of 4 done, 2 under way, 0:00:37 of training left at this pace"
+    assert pace([STATES[0], STATES[2]]) == "runs: 1 of 2 done, 1 under way"  # evaluation is not told of
+    assert pace([STATES[0], STATES[3]]) == "runs: 1 of 2 done, 0 under way"
+    assert pace(STATES[3:]) == "runs: 0 of 1 done, 0 under way"
+
+
+def test_each_kind_of_run_goes_on_at_its_own_pace() -> None:
+    """1,000 slow frames at 10 a second, and 10,000 quick ones at 1,000 a second; the longest run takes all the time."""
+    slow = [
+        RunState("a", "bc", "done", 800, 800, 10.0, 5, 5, 0.0),
+        RunState("b", "bc", "waiting", 0, 1_000, None, 0, 5, None),
+    ]
+    quick = [RunState(name, "ppo", "training", 5_000, 10_000, 1_000.0, 5, 5, 5.0) for name in "cd"]
+    assert pace([*slow, *quick]) == "runs: 1 of 4 done, 2 under way, 0:01:40 of training left at this pace"
+    assert pace(quick) == "runs: 0 of 2 done, 2 under way, 0:00:05 of training left at this pace"
+    assert pace([*slow[1:], *quick]).endswith(", 2 under way, 0:00:05 of training left at this pace at least")
 
 
 def test_where_nobody_watches_lines_stand_instead_of_a_table(

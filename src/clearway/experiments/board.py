@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 SECONDS_BETWEEN_LOOKS = 2.0
 MOST_ROWS = 12
-LEAST_S = 60.0
-"""Before, most of the time went into beginning."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +28,7 @@ class RunState:
 
     Attributes:
         name: of the run.
+        kind: what its speed depends on, see `PlannedRun.kind`.
         state: "waiting", "training", "evaluating" or "done".
         frames, all_frames: trained, of how many.
         frames_per_s: of its training so far; None before the first figures.
@@ -37,6 +37,7 @@ class RunState:
     """
 
     name: str
+    kind: str
     state: str
     frames: int
     all_frames: int
@@ -61,7 +62,8 @@ def state_of(out: Path, job: Job, under_way: bool) -> RunState:
         state = "evaluating" if frames >= all_frames else "training"
     left = (all_frames - frames) / speed if speed else None
     targets = sum(len(own) for own in job.run.targets)
-    return RunState(job.run.name, state, frames, all_frames, speed, int(last["solved_targets"]), targets, left)
+    solved = int(last["solved_targets"])
+    return RunState(job.run.name, job.run.kind, state, frames, all_frames, speed, solved, targets, left)
 
 
 class Looks:
@@ -113,31 +115,41 @@ def board(out: Path, jobs: Sequence[Job], visible: bool) -> Iterator[Callable[[S
 
 
 def _lines(looks: Looks) -> Callable[[Sequence[Job]], None]:
-    began = time.monotonic()
-    times, before = LineTimes(began), sum(state.frames for state in looks.states())
+    times = LineTimes(time.monotonic())
 
     def show(under_way: Sequence[Job]) -> None:
-        now = time.monotonic()
-        if times.is_due(now):
-            print(pace(looks.states(under_way), before, now - began), file=sys.stderr, flush=True)
+        if times.is_due(time.monotonic()):
+            print(pace(looks.states(under_way)), file=sys.stderr, flush=True)
 
     return show
 
 
-def pace(states: Sequence[RunState], frames_before: int, seconds: float) -> str:
-    """How many runs are done, and how long the rest of training takes if it goes on as fast; without evaluation.
+def pace(states: Sequence[RunState]) -> str:
+    """How many runs are done, and how long the rest of training takes if so many go on side by side; no evaluation.
 
-    Args:
-        states: of all runs.
-        frames_before: of all runs together, when the command began.
-        seconds: since then.
+    Each run is taken to be as fast as those of its kind have been. Where there is none yet, the time is the least.
     """
     done, waiting = _count(states)
-    told = f"runs: {done} of {len(states)} done, {len(states) - done - waiting} under way"
-    frames, all_frames = sum(state.frames for state in states), sum(state.all_frames for state in states)
-    if frames <= frames_before or frames == all_frames or seconds < LEAST_S:
+    beside = len(states) - done - waiting
+    told = f"runs: {done} of {len(states)} done, {beside} under way"
+    slowness = _slowness(states)
+    to_train = [state for state in states if state.frames < state.all_frames]
+    known = [(state.all_frames - state.frames) * slowness[state.kind] for state in to_train if state.kind in slowness]
+    if not known or not beside:
         return told
-    return f"{told}, {clock((all_frames - frames) * seconds / (frames - frames_before))} of training left at this pace"
+    least = " at least" if len(known) < len(to_train) else ""
+    return f"{told}, {clock(max([*known, sum(known) / beside]))} of training left at this pace{least}"
+
+
+def _slowness(states: Sequence[RunState]) -> dict[str, float]:
+    """Seconds a frame of each kind of run that has been trained for a while."""
+    frames: dict[str, int] = defaultdict(int)
+    seconds: dict[str, float] = defaultdict(float)
+    for state in states:
+        if state.frames_per_s:
+            frames[state.kind] += state.frames
+            seconds[state.kind] += state.frames / state.frames_per_s
+    return {kind: seconds[kind] / count for kind, count in frames.items()}
 
 
 def _count(states: Sequence[RunState]) -> tuple[int, int]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import asdict, replace
 from pathlib import Path
 
 from clearway.experiments.job import frames_left, request_of
-from clearway.experiments.plan import Job, PlannedRun
+from clearway.experiments.plan import Job, PlannedRun, TargetSets
 from clearway.torch_threads import torch_threads
 
 TRIED_S = 2.0
@@ -38,10 +36,10 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
         counted += f", {trained} only to be evaluated"
     if not to_train:
         return counted if left else f"{counted}: all is there"
-    speeds: dict[str, float] = {}
+    speeds: dict[tuple[str, TargetSets], float] = {}
     seconds, longest = 0.0, 0.0
     for run, count in to_train:
-        kind = _kind(run)
+        kind = run.kind, run.targets
         if kind not in speeds:
             speeds[kind] = frames_per_second(run, threads)
         seconds += count / speeds[kind]
@@ -60,12 +58,6 @@ def frames_per_second(run: PlannedRun, threads: int) -> float:
             trainer.update()
         taken = time.perf_counter() - began
     return max(trainer.frames - frames, 1) / taken
-
-
-def _kind(run: PlannedRun) -> str:
-    """What speed depends on."""
-    settings = asdict(replace(run.learner, frames=1))
-    return json.dumps([run.learner.algorithm, settings, run.targets], sort_keys=True)
 
 
 def _duration(seconds: float) -> str:

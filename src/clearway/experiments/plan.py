@@ -68,6 +68,12 @@ class PlannedRun:
         return max(1, self.learner.frames // 2)
 
     @cached_property
+    def kind(self) -> str:
+        """What the speed of its training depends on: the learner's settings, but not for how many frames."""
+        settings = asdict(replace(self.learner, frames=1))
+        return json.dumps([self.learner.algorithm, settings], sort_keys=True)
+
+    @cached_property
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
