@@ -101,7 +101,7 @@ def test_each_kind_of_run_goes_on_at_its_own_pace() -> None:
     quick = [RunState(name, "ppo", "training", 5_000, 10_000, 1_000.0, 5, 5, 5.0) for name in "cd"]
     assert pace([*slow, *quick]) == "runs: 1 of 4 done, 2 under way, 0:01:40 of training left at this pace"
     assert pace(quick) == "runs: 0 of 2 done, 2 under way, 0:00:05 of training left at this pace"
-    assert pace([*slow[1:], *quick]).endswith(", 2 under way, 0:00:05 of training left at this pace at least")
+    assert pace([*slow[1:], *quick]).endswith(", 2 under way, at least 0:00:05 of training left at this pace")
 
 
 def test_where_nobody_watches_lines_stand_instead_of_a_table(

@@ -137,8 +137,8 @@ def pace(states: Sequence[RunState]) -> str:
     known = [(state.all_frames - state.frames) * slowness[state.kind] for state in to_train if state.kind in slowness]
     if not known or not beside:
         return told
-    least = " at least" if len(known) < len(to_train) else ""
-    return f"{told}, {clock(max([*known, sum(known) / beside]))} of training left at this pace{least}"
+    least = "at least " if len(known) < len(to_train) else ""
+    return f"{told}, {least}{clock(max([*known, sum(known) / beside]))} of training left at this pace"
 
 
 def _slowness(states: Sequence[RunState]) -> dict[str, float]:

@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from clearway.experiments.job import frames_left, request_of
-from clearway.experiments.plan import Job, PlannedRun, TargetSets
+from clearway.experiments.plan import Job, PlannedRun
 from clearway.torch_threads import torch_threads
 
 TRIED_S = 2.0
@@ -36,14 +36,13 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
         counted += f", {trained} only to be evaluated"
     if not to_train:
         return counted if left else f"{counted}: all is there"
-    speeds: dict[tuple[str, TargetSets], float] = {}
+    speeds: dict[str, float] = {}
     seconds, longest = 0.0, 0.0
     for run, count in to_train:
-        kind = run.kind, run.targets
-        if kind not in speeds:
-            speeds[kind] = frames_per_second(run, threads)
-        seconds += count / speeds[kind]
-        longest = max(longest, count / speeds[kind])
+        if run.kind not in speeds:
+            speeds[run.kind] = frames_per_second(run, threads)
+        seconds += count / speeds[run.kind]
+        longest = max(longest, count / speeds[run.kind])
     beside = min(workers or 1, len(to_train))
     how, least = (f"{beside} at a time", " at least") if workers else ("one after the other", "")
     return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}"
