@@ -275,6 +275,7 @@ def test_a_smoke_run_of_more_frames_learns_something() -> None:
     smoke = BUDGETS["smoke"]
     for few in (None, 100, smoke.frames + 1, 99_999):
         assert smoke.changed(frames=few).warning(1).endswith("its trainings end before anything is learnt.")
+    assert "before anything is learnt" not in smoke.changed(frames=100_000).warning(1)
     assert smoke.changed(frames=5_000_000).warning(4) == (
         "Less than the paper's budget: 5,000,000 frames in the main experiment instead of the paper's 10,000,000; "
         "10 episodes a target instead of 100, of 500 steps at most."

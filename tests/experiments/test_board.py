@@ -1,4 +1,6 @@
 import json
+import shutil
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -44,6 +46,23 @@ def test_an_update_that_goes_beyond_the_frames_asked_for_counts_them_alone(tmp_p
     assert found.frames_per_s == (FRAMES + 40) / 2
 
 
+def test_a_run_that_waits_has_come_as_far_as_its_newest_checkpoint(tmp_path: Path) -> None:
+    """Whatever its metrics say: what was trained after it is lost. One whose trials are there is done without any."""
+    setting = small_setting(tmp_path, seeds=1)
+    (run,) = setting.runs(setting.learners["default"], COLLISION_AWARE)
+    job = Job(run, (setting.trial(),))
+    do(tmp_path, job, threads=1)
+    (trial,) = (tmp_path / "runs" / run.name / "trials").iterdir()
+    kept = trial.read_bytes()
+    trial.unlink()
+    assert state_of(tmp_path, job, under_way=False).frames == FRAMES
+    shutil.rmtree(run_folder(tmp_path, run).checkpoints)
+    assert state_of(tmp_path, job, under_way=False).frames == 0
+    trial.write_bytes(kept)
+    run_folder(tmp_path, run).metrics_path.unlink()
+    assert state_of(tmp_path, job, under_way=False).frames == FRAMES
+
+
 def test_the_table_shows_what_is_under_way_first() -> None:
     states = [
         RunState("finished", "ppo", "done", 800, 800, 10.0, 5, 5, 0.0),
@@ -85,8 +104,10 @@ STATES = [
 
 
 def test_a_line_says_how_many_runs_are_done_and_when_all_will_be() -> None:
-    # so far 2,000 frames in 80 + 4 + 8 s; 1,200 to go, two at a time
+    # so far 2,000 frames in 80 + 4 + 8 s; the longest run has 800 to go
     assert pace(STATES) == "runs: 1 of 4 done, 2 under way, 0:00:37 of training left at this pace"
+    more = [*STATES, *[replace(STATES[3], name=name) for name in "ef"]]  # 2,800 frames, two runs at a time
+    assert pace(more) == "runs: 1 of 6 done, 2 under way, 0:01:04 of training left at this pace"
     assert pace([STATES[0], STATES[2]]) == "runs: 1 of 2 done, 1 under way"  # evaluation is not told of
     assert pace([STATES[0], STATES[3]]) == "runs: 1 of 2 done, 0 under way"
     assert pace(STATES[3:]) == "runs: 0 of 1 done, 0 under way"

@@ -164,7 +164,7 @@ def test_a_seed_repeats_pictures_and_all(make: Make) -> None:
     assert walked(env, 3) != walked(env, 4)
 
 
-def test_a_seed_may_be_an_integer_of_numpy_s_or_one_in_a_list(make):
+def test_a_seed_may_be_an_integer_of_numpy_s_or_one_in_a_list(make: Make) -> None:
     env = make()
     plain = env.reset(seed=3)[1]
     assert env.reset(seed=np.int64(3))[1] == env.reset(seed=[3])[1] == plain

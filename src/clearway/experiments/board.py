@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clearway.experiments.job import is_done, run_folder
+from clearway.experiments.job import frames_left, is_done, run_folder
 from clearway.experiments.plan import Job
 from clearway.progress import LineTimes
 
@@ -48,18 +48,18 @@ class RunState:
 
 
 def state_of(out: Path, job: Job, under_way: bool) -> RunState:
-    """The state of a job's run, from its files."""
+    """The state of a job's run, from its files: its metrics while it is under way, else its newest checkpoint."""
     rows = run_folder(out, job.run).metrics()
     last = rows[-1] if rows else {"frames": 0, "seconds": 0.0, "solved_targets": 0}
     all_frames = job.run.learner.frames
-    frames = min(int(last["frames"]), all_frames)
     speed = int(last["frames"]) / last["seconds"] if last["seconds"] else None
     if is_done(out, job):
-        state = "done"
+        state, frames = "done", all_frames
     elif not under_way:
-        state = "waiting"
+        state, frames = "waiting", all_frames - frames_left(out, job.run)
     else:
-        state = "evaluating" if frames >= all_frames else "training"
+        frames = min(int(last["frames"]), all_frames)
+        state = "evaluating" if frames == all_frames else "training"
     left = (all_frames - frames) / speed if speed else None
     targets = sum(len(own) for own in job.run.targets)
     solved = int(last["solved_targets"])
@@ -127,7 +127,8 @@ def _lines(looks: Looks) -> Callable[[Sequence[Job]], None]:
 def pace(states: Sequence[RunState]) -> str:
     """How many runs are done, and how long the rest of training takes if so many go on side by side; no evaluation.
 
-    Each run is taken to be as fast as those of its kind have been. Where there is none yet, the time is the least.
+    Each run is taken to be as fast as those of its kind in the folder have been, wherever they were trained. Where
+    there is none yet, the time is the least.
     """
     done, waiting = _count(states)
     beside = len(states) - done - waiting
@@ -142,7 +143,7 @@ def pace(states: Sequence[RunState]) -> str:
 
 
 def _slowness(states: Sequence[RunState]) -> dict[str, float]:
-    """Seconds a frame of each kind of run that has been trained for a while."""
+    """Seconds a frame of each kind of run that has figures."""
     frames: dict[str, int] = defaultdict(int)
     seconds: dict[str, float] = defaultdict(float)
     for state in states:

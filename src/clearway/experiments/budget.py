@@ -10,7 +10,7 @@ from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
 from clearway.rooms import ROOM_NAMES
 
 LEARNT_FRAMES = 100_000
-"""With fewer, no learner has settled in any of the default rooms."""
+"""Fewer than any run that learns from rewards took to settle in a default room; the quickest took 168,000."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from clearway.experiments.verdicts import judged_more, judged_no_more
 from clearway.world.world import World
 
 FILE = "hard_targets.json"
-NO_EASY = "No complete runs of table 1's targets. Ask for table1, too."
+NO_EASY = "No complete runs on the usual targets yet (experiment table1)."
 RULE = (
     "hard targets: the largest product of a random walk's steps and the share of collision poses on shortest paths, "
     "at least 4 cells apart or as far as they can be"

@@ -14,7 +14,7 @@ from clearway.evaluation.episode_files import read_episodes, write_episodes
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
 from clearway.experiments.live_trial import walk_live
 from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial
-from clearway.learn.checkpoint import newest_checkpoint
+from clearway.learn.checkpoint import checkpoints, frames_in, newest_checkpoint
 from clearway.learn.load import load_agent
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, set_threads, train
@@ -37,8 +37,9 @@ def trial_path(out: Path, run: PlannedRun, trial: Trial | LiveTrial) -> Path:
 
 
 def frames_left(out: Path, run: PlannedRun) -> int:
-    """How many frames a run's training has before it, from its newest checkpoint on."""
-    return max(0, run.learner.frames - run_folder(out, run).trained_frames())
+    """How many frames a run's training has before it, by the name of its newest checkpoint."""
+    there = checkpoints(run_folder(out, run).checkpoints)
+    return max(0, run.learner.frames - (frames_in(there[-1].name) if there else 0))
 
 
 def is_done(out: Path, job: Job) -> bool:

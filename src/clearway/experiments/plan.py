@@ -70,8 +70,7 @@ class PlannedRun:
     @cached_property
     def kind(self) -> str:
         """What the speed of its training depends on: the learner's settings, but not for how many frames."""
-        settings = asdict(replace(self.learner, frames=1))
-        return json.dumps([self.learner.algorithm, settings], sort_keys=True)
+        return _as_json([self.learner.algorithm, asdict(replace(self.learner, frames=1))])
 
     @cached_property
     def name(self) -> str:
@@ -155,9 +154,12 @@ def _plain(targets: Iterable[Iterable[int]]) -> TargetSets:
 
 
 def _digest(content: object) -> str:
+    return hashlib.sha256(_as_json(content).encode()).hexdigest()[:DIGEST_LENGTH]
+
+
+def _as_json(content: object) -> str:
     """Of JSON values, and numbers of NumPy's, as settings may hold."""
-    text = json.dumps(content, sort_keys=True, default=lambda number: number.item())
-    return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_LENGTH]
+    return json.dumps(content, sort_keys=True, default=lambda number: number.item())
 
 
 def merged(jobs: Iterable[Job]) -> list[Job]:
