@@ -15,6 +15,7 @@ from helpers.published import (
     assert_shown,
     assert_written,
     check_beside,
+    check_ends,
     numbers,
     rows_of,
     seconds_of_runs,
@@ -62,6 +63,7 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     check_hard(sections["table2"], "3 M")
     check_hard(sections["table3"], "6 M")
     check_harder(sections["table2"], sections["table3"])
+    check_ends(sections["fig3"], PAGE)
     check_unseen(sections["fig5"])
     check_settled(sections["fig4"])
     ends = words_of(TIMES, PAGE).groups()

@@ -224,6 +224,28 @@ def test_figure_3_shows_the_best_and_the_worst_seed(setting: Setting, sections: 
             assert ends[f"{agent}, best"] <= ends[f"{agent}, worst"]
 
 
+def test_figure_3_tells_the_ends_of_seeds_and_of_targets_beside_maps_and_a_random_walk(
+    setting: Setting, sections: dict[str, Section]
+) -> None:
+    (table,) = sections["fig3"].tables
+    rows = {(row["figure"], row["learner"], row["agent"]): row for row in by_heading(table)}
+    of_table1 = {(row["figure"], row["learner"], row["agent"]): row for row in by_heading(sections["table1"].tables[0])}
+    by_target = by_heading(sections["table1"].tables[1])
+    maps = {learner for _, learner, _ in rows} - {None, *setting.learners}
+    assert len(maps) == 2 and len(rows) == 2 * (2 * len(setting.learners) + len(maps) + 1)
+    for (metric, learner, agent), row in rows.items():
+        average = of_table1[metric, learner or "walked", agent]["average"]
+        assert row["best seed"] <= average * (1 + 1e-12) and average <= row["worst seed"] * (1 + 1e-12)
+        if learner is None:
+            assert row["best seed"] == row["worst seed"] and row["seeds"] is None
+            continue
+        own = [each for each in by_target if (each["learner"], each["agent"]) == (learner, agent)]
+        worst = [max(each[metric] for each in own if each["seed"] == seed) for seed in {each["seed"] for each in own}]
+        assert row["seeds"] == len(worst) > 1
+        assert row["worst target"] == pytest.approx(np.mean(worst)) and row["of any seed"] == max(worst)
+        assert min(worst) <= row["worst target"] <= max(worst)
+
+
 def test_sets_tried_together_are_those_of_the_seeds_that_all_have() -> None:
     first, second = (
         generalisation.Tried(

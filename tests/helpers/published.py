@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from clearway.experiments.section import Claim
+from clearway.experiments.section import Claim, Section
+from helpers.report_tables import by_heading
 
 DOCS = Path(__file__).parents[2] / "docs"
 RESULTS, EVIDENCE = ((DOCS / name).read_text(encoding="utf-8") for name in ("results.md", "evidence.md"))
@@ -70,6 +71,29 @@ def assert_shown(cell: str, value: float, interval: str, scale: float = 1) -> No
 def ends_of(interval: str) -> list[float]:
     """Those of an interval in a report."""
     return [float(end) for end in numbers(interval.replace(",", ""))]
+
+
+def check_ends(section: Section, page: str) -> None:
+    """Figure 3's table of collisions: every kind of agent that it has, as recorded."""
+    recorded = {
+        row["agent"] if row["learner"] in ("paper", "default", None) else row["learner"]: row
+        for row in by_heading(section.tables[0])
+        if row["figure"] == "collisions"
+    }
+    told: set[str] = set()
+    for agents, best, worst, target, of_any in rows_of(page.partition("**Figure 3 in numbers**")[2].split("\n\n")[1])[
+        1:
+    ]:
+        names, _, frames = agents.partition(", ")
+        for name in names.split("; "):
+            row = recorded[name]
+            assert_written(best, row["best seed"], name)
+            assert_written(worst or best, row["worst seed"], name)
+            assert_shown(target, row["worst target"], row["95 %"] or "")
+            assert_written(of_any, row["of any seed"], name)
+            assert frames in ("", row["agent"])
+            told.add(name)
+    assert told == set(recorded)
 
 
 UNTRAINED = {"q-learning": "Q-learning", "bc": "behaviour cloning"}

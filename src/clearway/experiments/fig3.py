@@ -6,12 +6,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from clearway.evaluation.across_seeds import mean_estimate
 from clearway.evaluation.episodes import EpisodeTable
 from clearway.experiments.convergence import ONE_TARGET
-from clearway.experiments.groups import PAIR, Group, all_jobs, compared
+from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.job import episodes_of
-from clearway.experiments.plan import Job
-from clearway.experiments.section import Claim, ReportFigure, Section, Series
+from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
+from clearway.experiments.plan import RANDOM_WALK, Job
+from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less, with_failures
 from clearway.reward import COLLISION_AWARE, SHORTEST
@@ -52,9 +54,42 @@ def section(setting: Setting) -> Section:
             "Best and worst are the seeds whose sum over all episodes in that scene is smallest and largest, for steps "
             "and for collisions by themselves. The paper prints its figures as a picture alone."
         ),
+        tables=(_table(setting, groups),),
         figures=tuple(figure for figure in figures if figure.series),
         claims=tuple(_claims(setting, groups)),
     )
+
+
+def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
+    """The best and the worst of each kind of agent over all scenes, by seeds and by targets."""
+    world, trial = setting.world(), setting.trial()
+    found: list[tuple[str | None, str, Scores]] = [
+        (group.learner, group.agent, group.scores(setting.out, world.target_count)) for group in groups
+    ]
+    found += [(*mapped.called, mapped.scores) for mapped in on_maps(setting, trial)]
+    found.append((None, RANDOM_WALK, random_walk(world, trial)))
+    rows = tuple(
+        (metric, learner, agent, None if learner is None else len(own), *_ends(own, metric, world.target_scene.numpy()))
+        for metric in FIGURES
+        for learner, agent, own in found
+    )
+    notes = (
+        "An episode's mean. The best and the worst seed's are over scenes; the worst target is the one with the most, "
+        "in each run by itself.",
+        ABOUT_MAPS,
+    )
+    headings = ("figure", "learner", "agent", "seeds", "best seed", "worst seed", "worst target", "95 %", "of any seed")
+    return ReportTable("fig3", "Best and worst", headings, rows, notes)
+
+
+def _ends(own: Scores, metric: str, target_scene: np.ndarray) -> tuple[Value, ...]:
+    """The best and the worst seed's figure, that of the worst target, its interval, and the worst of all."""
+    if not len(own):
+        return (None,) * 5
+    of_seeds = own.in_scenes(metric, target_scene).mean(1)
+    worst = own.of(metric).max(axis=1, keepdims=True)
+    estimate = mean_estimate(worst, ONE_TARGET)
+    return of_seeds.min(), of_seeds.max(), estimate.value, estimate.ends, worst.max()
 
 
 def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
