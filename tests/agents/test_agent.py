@@ -9,9 +9,9 @@ import torch
 
 from clearway.agents.agent import FEATURES, POSE, Agent, Decisions, Observation, joined, rows
 from clearway.agents.by_features import FeatureAgent
-from clearway.agents.by_pose import RandomWalk, network_on_poses, shortest_paths
+from clearway.agents.by_pose import RandomWalk, by_policies, network_on_poses, shortest_paths
 from clearway.agents.selection import Argmax, ArgmaxUntried
-from clearway.evaluation.optimum import policies_agent, world_tasks
+from clearway.evaluation.optimum import world_tasks
 from clearway.evaluation.oracle import Task, optimal_policy, soft_policy
 from clearway.learn.q_learning import QLearning, TrainedTable
 from clearway.learn.run_record import record_of
@@ -39,7 +39,7 @@ def network(world: World) -> Agent:
 
 
 def optimum(world: World, policy: Callable[[Task], np.ndarray]) -> Agent:
-    return policies_agent(world, [policy(task) for task in world_tasks(world, COLLISION_AWARE)])
+    return by_policies(world, [policy(task) for task in world_tasks(world, COLLISION_AWARE)])
 
 
 AGENTS: dict[str, tuple[Callable[[World], Agent], bool]] = {

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from clearway.agents.agent import POSE
-from clearway.agents.by_pose import PoseAgent, RandomWalk, by_table, network_on_poses, shortest_paths
+from clearway.agents.by_pose import PoseAgent, RandomWalk, by_policies, network_on_poses, shortest_paths
 from clearway.errors import AgentError
 from clearway.model.lookup import LookupNetwork
 from clearway.world.world import make_world
@@ -67,12 +67,14 @@ def test_a_target_that_the_world_does_not_have_is_no_target():
         agent.reset({POSE: np.array([8, 4])}, np.array([1, 2]))
 
 
-def test_a_table_is_read_at_the_newest_pose_and_the_own_target():
-    world = make_world([corridor_scene(2)], {"corridor": [0, 4]})
-    table = torch.rand(2, 8, 4, generator=torch.Generator().manual_seed(0))
-    history, target = torch.tensor([[1, 2, 7], [7, 2, 3]]), torch.tensor([1, 0])
-    found = told_after(by_table(world, table), world, history, target)
-    assert torch.equal(found, torch.stack([table[1, 7], table[0, 3]]))
+def test_a_policy_is_read_at_the_newest_pose_for_the_own_target_in_its_scene():
+    world = make_world([corridor_scene(2, feature_count=32), grid_scene(1)], {"corridor": [0, 4], "grid": [5, 7]})
+    states = world.scene_offset.diff().tolist()
+    rng = np.random.default_rng(0)
+    policies = [rng.random((states[scene], 4), dtype=np.float32) for scene in (0, 0, 1, 1)]
+    history = torch.tensor([[1, 2, 7], [7, 2, 3], [8, 8, 8], [9, 9, states[0] + states[1] - 1]])
+    found = told_after(by_policies(world, policies), world, history, torch.tensor([1, 0, 2, 3]))
+    assert found.tolist() == [policies[target][pose].tolist() for target, pose in ((1, 7), (0, 3), (2, 0), (3, -1))]
 
 
 @pytest.mark.parametrize("scale", [1.0, 8.0])

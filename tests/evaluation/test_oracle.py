@@ -8,10 +8,11 @@ import pytest
 import torch
 
 from clearway.agents.agent import Agent
+from clearway.agents.by_pose import by_policies
 from clearway.errors import SceneError
 from clearway.evaluation import oracle
 from clearway.evaluation.episodes import episode_starts, run_episodes
-from clearway.evaluation.optimum import TargetYardstick, policies_agent, world_yardsticks
+from clearway.evaluation.optimum import TargetYardstick, world_yardsticks
 from clearway.evaluation.oracle import action_values, make_task, optimal_policy, soft_policy, yardstick
 from clearway.evaluation.runs import _optima
 from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
@@ -146,7 +147,7 @@ def test_figures_from_given_starts_are_means_over_those() -> None:
 
 def acting(world: World, found: list[TargetYardstick], kind: str) -> Agent:
     """By the optimal or the soft policies of a world's yardsticks."""
-    return policies_agent(world, [getattr(each.yardstick, f"{kind}_policy") for each in found])
+    return by_policies(world, [getattr(each.yardstick, f"{kind}_policy") for each in found])
 
 
 def test_the_world_s_starts_are_those_of_the_episodes() -> None:

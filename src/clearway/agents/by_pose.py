@@ -5,7 +5,7 @@ Axis letters: B episodes, K poses of history (newest last), A actions, M targets
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -110,6 +110,16 @@ def shortest_paths(world: World) -> PoseAgent:
     return PoseAgent(world, rule)
 
 
-def by_table(world: World, table: Tensor) -> PoseAgent:
-    """By a table of probabilities (M, S, A)."""
-    return PoseAgent(world, lambda history, target: (table[target, history[:, -1]], None))
+def by_policies(world: World, policies: Sequence[np.ndarray]) -> PoseAgent:
+    """By a policy for each target of a world: probabilities (S, A) of its scene; elsewhere it has none."""
+    table = torch.cat([torch.from_numpy(policy).float() for policy in policies]).to(world.device)
+    begins = torch.tensor([0, *map(len, policies[:-1])], device=world.device).cumsum(0)
+
+    def rule(history: Tensor, target: Tensor) -> tuple[Tensor, None]:
+        scene, pose = world.target_scene[target], history[:, -1]
+        first = world.scene_offset[scene]
+        there = (pose >= first) & (pose < world.scene_offset[scene + 1])
+        row = begins[target] + torch.where(there, pose - first, 0)
+        return torch.where(there[:, None], table[row], 0.0), None
+
+    return PoseAgent(world, rule)

@@ -1,15 +1,11 @@
-"""The exact yardsticks of `oracle` for a world: as figures, and as agents."""
+"""The exact yardsticks of `oracle` for all targets of a world."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
-from clearway.agents.agent import Agent
-from clearway.agents.by_pose import by_table
 from clearway.evaluation.oracle import DISCOUNT, ENTROPY_WEIGHT, Expected, Task, Yardstick, task_of, yardstick
 from clearway.reward import Reward
 from clearway.world.world import World
@@ -69,21 +65,9 @@ def world_tasks(world: World, reward: Reward) -> list[Task]:
     zone, table = world.zone.cpu().numpy(), reward.table(world.moves())  # of all scenes together, as training pays it
     found = []
     for target, scene in enumerate(world.target_scene.tolist()):
-        own = _states_of(world, scene)
+        own = slice(*world.scene_offset[scene : scene + 2].tolist())
         found.append(task_of(world.graph(scene), zone[own], world.scene_state(target), table[:, own]))
     return found
-
-
-def policies_agent(world: World, policies: Sequence[np.ndarray]) -> Agent:
-    """An agent that walks to each target of a world by a policy of its scene: probabilities (S, A)."""
-    table = torch.zeros(world.target_count, world.state_count, world.next_state.shape[1])
-    for target, (scene, policy) in enumerate(zip(world.target_scene.tolist(), policies, strict=True)):
-        table[target, _states_of(world, scene)] = torch.from_numpy(policy).float()
-    return by_table(world, table.to(world.device))
-
-
-def _states_of(world: World, scene: int) -> slice:
-    return slice(*world.scene_offset[scene : scene + 2].tolist())
 
 
 def _figures(expected: Expected) -> dict[str, float | None]:

@@ -9,10 +9,11 @@ from types import MappingProxyType
 from typing import Any
 
 from clearway.agents.agent import Agent
+from clearway.agents.by_pose import by_policies
 from clearway.agents.named import AgentMaker
 from clearway.errors import RunError, SceneError
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
-from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, policies_agent, world_tasks
+from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_tasks
 from clearway.evaluation.oracle import optimal_policy, soft_policy
 from clearway.evaluation.protocol import RANDOM, SHORTEST_PATH, evaluate_agents
 from clearway.evaluation.summary import Evaluation, Trained
@@ -93,7 +94,7 @@ def _optima(world: World, rewards: Sequence[Reward]) -> dict[str, Agent]:
     found: dict[str, Agent | None] = {}
     for reward in dict.fromkeys(reward for reward in rewards if reward.is_known):
         best = [optimal_policy(task) for task in world_tasks(world, reward)]
-        found[f"{OPTIMUM} ({reward.name}{'' if reward.clip else ', unclipped'})"] = policies_agent(world, best)
+        found[f"{OPTIMUM} ({reward.name}{'' if reward.clip else ', unclipped'})"] = by_policies(world, best)
         name = f"{SOFT_FIXED_POINT} ({reward.name})"
         if name not in found:  # a reward may come clipped and unclipped
             found[name] = _soft_fixed_point(world, replace(reward, clip=True), name)
@@ -110,7 +111,7 @@ def _soft_fixed_point(world: World, reward: Reward, name: str) -> Agent | None:
             where = f"{world.scene_names[scene]}, {fault.source}"
             warnings.warn(f"no row {name!r}: {where}: {fault.problem}", stacklevel=4)
             return None
-    return policies_agent(world, policies)
+    return by_policies(world, policies)
 
 
 def _trained(agent: TrainedAgent) -> Trained:
