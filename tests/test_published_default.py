@@ -25,16 +25,17 @@ from helpers.published import (
 )
 from helpers.report_tables import by_heading
 
-RUN = ["quality", "table1", "fig3", "fig4", "table2", "table3", "fig5"]
-"""Of the experiments that the record was made for; of the others no run is complete."""
+RUN = ["quality", "table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6"]
+"""The experiments that question 65 names."""
 VERDICTS = ("holds", "does not hold", "undecided")
 REGISTERED = (DOCS / "registered.md").read_text(encoding="utf-8")
+REWARDS = ("shortest", "bump", "collision-aware")
 ROOMS = ("bathroom", "bedroom", "living_room", "kitchen")
 PAGE = section_of(EVIDENCE, "Four rooms\n")
 HARD = PAGE.partition("**Hard targets**")[2].partition("**Unseen targets**")[0]
 TIMES = (
-    r"AMD EPYC, (\d+) to (\d+) s of training a run \(four of thirty: (\d+) to (\d+) s\), "
-    r"(\d+) to (\d+) s with 6 M frames"
+    r"AMD EPYC, (\d+) to (\d+) s of training a run \(four of 35: (\d+) to (\d+) s\), "
+    r"(\d+) to (\d+) s with 6 M frames, (\d+) to (\d+) s with more targets than 20"
 )
 BESIDE = {
     *("planner on a learnt map", "nearest picture", "behaviour cloning", "Q-learning"),
@@ -52,7 +53,7 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     assert list(sections) == RUN
     assert [name for name, section in sections.items() if section.missing] == []
     told = rows_of(PAGE)
-    check_quality(sections["quality"], told)
+    check_quality(sections["quality"], rows_of(PAGE.partition("**That")[0]))
     claims = [claim for name in RUN[1:] for claim in sections[name].claims]
     shown = [row for row in told if len(row) == 7 and row[1] in VERDICTS]
     assert [row[0] for row in shown] == [claim.text.removeprefix("default: ") for claim in claims]
@@ -65,11 +66,13 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     check_harder(sections["table2"], sections["table3"])
     check_ends(sections["fig3"], PAGE)
     check_unseen(sections["fig5"])
+    check_held_out(sections["fig6"])
     check_settled(sections["fig4"])
     ends = words_of(TIMES, PAGE).groups()
-    spent = {frames: sorted(seconds_of_runs(folder, f"ppo-*-{frames}-*")) for frames in ("3M", "6M")}
-    assert len(spent["3M"]) == 30
-    for own in (spent["3M"][:26], spent["3M"][26:], spent["6M"]):
+    usual = sorted(s for reward in REWARDS for s in seconds_of_runs(folder, f"ppo-{reward}-20t-3M-*"))
+    longer, more = (sorted(seconds_of_runs(folder, f"ppo-*{name}-*")) for name in ("20t-6M", "[0468]0t-3M"))
+    assert (len(usual), len(longer), len(more)) == (35, 15, 20)
+    for own in (usual[:31], usual[31:], longer, more):
         assert [int(end) for end in ends[:2]] == [round(own[0]), round(own[-1])]
         ends = ends[2:]
 
@@ -95,14 +98,17 @@ def check_words(verdicts: dict[str, str]) -> None:
     """What the results and the register say of the claims together."""
     (line,) = [line for line in RESULTS.splitlines() if "[question 65 (e0525e6)]" in line]
     held, failed, left = ({text for text, own in verdicts.items() if own == verdict} for verdict in VERDICTS)
-    assert (len(verdicts), len(held), len(failed), len(left)) == (25, 9, 4, 12)
+    assert (len(verdicts), len(held), len(failed), len(left)) == (27, 10, 4, 13)
     assert (
-        "Of 25 claims with the default recipe nine hold, four do not, twelve are undecided: among these whether" in line
+        "Of 27 claims with the default recipe ten hold, four do not, thirteen are undecided: among these whether"
+        in line
     )
-    assert "of the 25 claims of tables 1 to 3 and figures 3, 4 and 5, nine hold, four do not, twelve are" in REGISTERED
+    assert "65: of the 27 claims ten hold, four do not, thirteen are undecided" in REGISTERED
     for words in ("fewer collisions than with the shortest-path reward", "learns faster", "generalises better"):
         assert not [text for text in held | failed if text.startswith(words)]
-    assert {text.partition(" (")[0].partition(" on hard")[0] for text in held} == {
+    (direct,) = {text for text in held if "45 training targets" in text}
+    assert direct.endswith("(higher SPL)")
+    assert {text.partition(" (")[0].partition(" on hard")[0] for text in held - {direct}} == {
         *("no more steps than with the shortest-path reward", "no more steps than with a penalty for bumping"),
         *("success falls with distance", "hard targets are harder", "2 times the frames repair hard targets"),
     }
@@ -196,6 +202,25 @@ def check_unseen(section: Section) -> None:
             row = found[steps, learner, agent]
             for text, name in zip(numbers(cell), ("sc", "sc within 4 x shortest", "SPL"), strict=True):
                 assert_written(text, 100 * row[name], cell)
+
+
+def check_held_out(section: Section) -> None:
+    """Figure 6: a row for each set of targets trained on, and for what stands beside; and what the results say."""
+    table = section.tables[0]
+    found = {str(row["targets a scene"] or row["learner"]): row for row in by_heading(table)}
+    part = PAGE.partition("**Held-out targets**")[2].partition("**Figure 3")[0]
+    shown = rows_of(part)[1:]
+    assert [row[0] for row in shown] == list(found)
+    for name, learnt, *cells in shown:
+        row = found[name]
+        if learnt:
+            assert_written(learnt.rstrip(" %"), 100 * row["sc on trained targets"], name)
+        estimates = ("sc", "95 % of sc"), ("sc within 4 x shortest", "95 % of that"), ("SPL", "95 % of SPL")
+        for cell, (figure, interval) in zip(cells, estimates, strict=True):
+            assert_shown(cell, row[figure], row[interval] or "", scale=100)
+    told = words_of(r"find others more directly \(([\d.]+) % SPL, of five ([\d.]+) %\)", RESULTS).groups()
+    for text, count in zip(told, ("45", "5"), strict=True):
+        assert_written(text, 100 * found[count]["SPL"], count)
 
 
 def check_settled(section: Section) -> None:

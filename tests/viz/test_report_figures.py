@@ -34,6 +34,14 @@ def test_others_stay_linear(tmp_path: Path, drawn: list[Figure]) -> None:
     assert drawn[0].axes[0].get_yscale() == "linear"
 
 
+def test_eight_series_are_told_apart_by_their_lines_and_by_their_marks(tmp_path: Path, drawn: list[Figure]) -> None:
+    series = tuple(Series(str(number), [0, 1], [number, number]) for number in range(8))
+    draw_report_figure(ReportFigure("f", "Many", "x", "y", series), tmp_path / "f.png")
+    lines = [line for line in drawn[0].axes[0].lines if line.get_label().isdigit()]
+    assert len(lines) == len({line.get_color() for line in lines}) == len({line.get_marker() for line in lines}) == 8
+    assert len({str(line._dash_pattern) for line in lines}) == 8
+
+
 def interval_figure(count: int) -> ReportFigure:
     """A rising line of `count` points, one above and one below each."""
     x = list(map(float, range(count)))

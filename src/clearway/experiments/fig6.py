@@ -53,8 +53,7 @@ def section(setting: Setting) -> Section:
     on_map = {own.called: Tried(own.scores, target_scene) for own in mapped}
     rows: list[tuple[Value, ...]] = []
     by_target: list[tuple[Value, ...]] = []
-    flat = {RANDOM_WALK: walked} | {", ".join(kind): figures for kind, figures in on_map.items()}
-    points = {label: [(float(count), figures) for count in TRAINED] for label, figures in flat.items()}
+    points: dict[str, list[tuple[float, Tried]]] = {}
     for count in TRAINED:
         for group, own in zip(_groups(setting, count), _on_trained(setting, count), strict=True):
             figures = Tried(group.scores(setting.out, world.target_count), target_scene)
@@ -64,6 +63,8 @@ def section(setting: Setting) -> Section:
     for kind, figures in on_map.items():
         rows.append((None, ", ".join(kind), len(figures.scores), None, *figures.cells()))
         by_target += [(None, *row) for row in figures.by_target(world, *kind)]
+        points[", ".join(kind)] = [(count, figures) for count in TRAINED]
+    points[RANDOM_WALK] = [(count, walked) for count in TRAINED]
     rows.append((None, RANDOM_WALK, None, None, *walked.cells()))
     headings = ("targets a scene", "learner", "seeds", "sc on trained targets", *HEADINGS)
     title = "Success on held-out targets"

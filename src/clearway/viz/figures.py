@@ -68,6 +68,9 @@ CURVES = (
     LineStyle("#1b9e77", "#ffffff", (1.2, 1.2)),
     LineStyle("#8e2c9c", "#ffffff", (7, 2, 1.5, 2)),
     LineStyle("#7a6a00", "#ffffff", (3, 2)),
+    LineStyle("#22272e", "#ffffff", (1, 3)),
+    LineStyle("#56b4e9", "#ffffff", (10, 2)),
+    LineStyle("#c2185b", "#ffffff", (4, 1.5, 1, 1.5, 1, 1.5)),
 )
 """Of the first, second, ... run in a plot on white."""
 
