@@ -8,8 +8,10 @@ import numpy as np
 
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.evaluation.episodes import EpisodeTable
+from clearway.evaluation.metrics import by_scene
+from clearway.evaluation.protocol import SHORTEST_PATH
 from clearway.experiments.convergence import ONE_TARGET
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, compared, random_walk
+from clearway.experiments.groups import PAIR, Group, all_jobs, compared, random_walk
 from clearway.experiments.job import episodes_of
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
@@ -63,31 +65,37 @@ def section(setting: Setting) -> Section:
 def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     """The best and the worst of each kind of agent over all scenes, by seeds and by targets."""
     world, trial = setting.world(), setting.trial()
-    found: list[tuple[str | None, str, Scores]] = [
-        (group.learner, group.agent, group.scores(setting.out, world.target_count)) for group in groups
-    ]
-    found += [(*mapped.called, mapped.scores) for mapped in on_maps(setting, trial)]
-    found.append((None, RANDOM_WALK, random_walk(world, trial)))
-    rows = tuple(
-        (metric, learner, agent, None if learner is None else len(own), *_ends(own, metric, world.target_scene.numpy()))
-        for metric in FIGURES
-        for learner, agent, own in found
-    )
+    scene, walked = world.target_scene.numpy(), random_walk(world, trial)
+    learnt = [(group.learner, group.agent, group.scores(setting.out, world.target_count)) for group in groups]
+    learnt += [(*mapped.called, mapped.scores) for mapped in on_maps(setting, trial)]
+    rows: list[tuple[Value, ...]] = []
+    for metric in FIGURES:
+        fewest = walked.of("shortest_path_steps") if metric == "steps" else np.zeros((1, world.target_count))
+        rows += [(metric, learner, agent, len(own), *_ends(own.of(metric), scene)) for learner, agent, own in learnt]
+        rows += [
+            (metric, None, agent, None, *_ends(values, scene))
+            for agent, values in ((SHORTEST_PATH, fewest), (RANDOM_WALK, walked.of(metric)))
+        ]
     notes = (
         "An episode's mean. The best and the worst seed's are over scenes; the worst target is the one with the most, "
         "in each run by itself.",
         ABOUT_MAPS,
     )
     headings = ("figure", "learner", "agent", "seeds", "best seed", "worst seed", "worst target", "95 %", "of any seed")
-    return ReportTable("fig3", "Best and worst", headings, rows, notes)
+    return ReportTable("fig3", "Best and worst", headings, tuple(rows), notes)
 
 
-def _ends(own: Scores, metric: str, target_scene: np.ndarray) -> tuple[Value, ...]:
-    """The best and the worst seed's figure, that of the worst target, its interval, and the worst of all."""
-    if not len(own):
+def _ends(values: np.ndarray, target_scene: np.ndarray) -> tuple[Value, ...]:
+    """The best and the worst seed's figure, that of the worst target, its interval, and the worst of all.
+
+    Args:
+        values: (R, M).
+        target_scene: (M,) int.
+    """
+    if not len(values):
         return (None,) * 5
-    of_seeds = own.in_scenes(metric, target_scene).mean(1)
-    worst = own.of(metric).max(axis=1, keepdims=True)
+    of_seeds = by_scene(values[..., None], target_scene)[..., 0].mean(1)
+    worst = values.max(axis=1, keepdims=True)
     estimate = mean_estimate(worst, ONE_TARGET)
     return of_seeds.min(), of_seeds.max(), estimate.value, estimate.ends, worst.max()
 
