@@ -63,15 +63,6 @@ def test_a_training_goes_on_bit_for_bit_in_both_parts(world: World):
             assert torch.equal(tensor, whole.tensors()[name]), name
 
 
-@pytest.mark.parametrize(("frames", "used"), [(16 * 11, 16 * 11), (16 * 11 + 1, 16 * 12)])
-def test_no_more_frames_are_used_than_asked_for(world: World, frames: int, used: int):
-    trainer = trainer_of(world, replace(LEARNER, frames=frames))
-    trainer.update()
-    assert (trainer.frames, trainer.finished) == (16 * 8, False)
-    trainer.update()
-    assert (trainer.frames, trainer.finished) == (used, True)  # a step is one of all environments
-
-
 def test_a_seed_repeats_and_another_does_not(world: World):
     one, again, other = (trainer_of(world, seed=seed).update() for seed in (1, 1, 2))
     assert one == again != other

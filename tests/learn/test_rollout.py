@@ -149,5 +149,4 @@ def test_environments_begin_with_every_target_in_turn() -> None:
     trainer = small_trainer(small_learner(envs=13))  # 20 and 40 states
     assert trainer.env_count == 13
     assert trainer.navigation.target.tolist() == [0, 1, 2, 0] + [3, 4] * 4 + [3]
-    trainer.update()
-    assert trainer.frames == 13 * 8
+    assert trainer.frames_per_update == 13 * 8

@@ -40,7 +40,7 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, frames: int, number: int = sig
     whole = Trainer.update
 
     def update(trainer: Trainer) -> Figures:
-        if trainer.frames + trainer.env_count * trainer.learner.rollout_steps == frames:
+        if trainer.frames + trainer.frames_per_update == frames:
             signal.raise_signal(number)
         return whole(trainer)
 

@@ -62,10 +62,10 @@ class AdaptingTrainer(Trainer):
         """A rollout under the network's policy."""
         self._rotate()
         self.lookup.refresh()
-        rollout = self.collector.collect(self._next_steps())
+        rollout = self.collector.collect()
         self.statistics.add(rollout)
         self.observed.add(as_rows(rollout.history)[:, -1], as_rows(rollout.action), as_rows(rollout.arrived))
-        self.frames += self.env_count * rollout.steps
+        self.frames += self.frames_per_update
 
     def _lessons(self, lr: float) -> Figures:
         """Learn the best ways in the steps seen so far; figures are means over all steps of the optimiser."""

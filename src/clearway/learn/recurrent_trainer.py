@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn.functional import softplus
 
 from clearway.learn.figures import Figures, check_finite
-from clearway.learn.learner import geometric, linear, next_steps
+from clearway.learn.learner import geometric, linear
 from clearway.learn.named_tensors import joined, part_of
 from clearway.learn.optimiser import Adam, clip_gradients
 from clearway.learn.returns import generalised_advantages
@@ -142,7 +142,7 @@ class RecurrentTrainer:
             lr = geometric(learner.lr_start, learner.lr_end, frames - taught, left)
             entropy_weight = linear(learner.entropy_start, learner.entropy_end, frames - taught, left)
             figures = self._learn(walked, learner.epochs, lr, partial(self._paid_loss, entropy_weight))
-        self.frames += learner.envs * len(walked.action)
+        self.frames += learner.envs * learner.rollout_steps
         self.updates += 1
         check_finite(figures, self.frames)
         return figures
@@ -209,8 +209,8 @@ class RecurrentTrainer:
     @torch.no_grad()
     def _walk(self, teachers_share: float = 0.0) -> Walked:
         """T steps by the policy, some of them by the teacher."""
-        learner, rows, there, hidden_first = self.learner, [], [], self.hidden
-        for _ in range(next_steps(self.frames, learner.frames, learner.envs, learner.rollout_steps)):
+        rows, there, hidden_first = [], [], self.hidden
+        for _ in range(self.learner.rollout_steps):
             pairs, last, begins, target = self._seen(), self.last, self.begins, self.navigation.target
             best = self.teacher[target, self.navigation.state]
             said = self.network(pairs, last, self.hidden)

@@ -109,6 +109,11 @@ class Trainer:
         self.navigation.begin_staggered()
 
     @property
+    def frames_per_update(self) -> int:
+        """Frames that one update uses."""
+        return self.env_count * self.learner.rollout_steps
+
+    @property
     def finished(self) -> bool:
         """All frames of the settings are used."""
         return self.frames >= self.learner.frames
