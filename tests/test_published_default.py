@@ -1,10 +1,12 @@
 """What the pages say of the default recipe in four rooms is what its record comes to."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+from clearway.experiments import fig6
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from helpers.published import (
@@ -16,6 +18,7 @@ from helpers.published import (
     assert_written,
     check_beside,
     check_ends,
+    ends_of,
     numbers,
     rows_of,
     seconds_of_runs,
@@ -218,9 +221,26 @@ def check_held_out(section: Section) -> None:
         estimates = ("sc", "95 % of sc"), ("sc within 4 x shortest", "95 % of that"), ("SPL", "95 % of SPL")
         for cell, (figure, interval) in zip(cells, estimates, strict=True):
             assert_shown(cell, row[figure], row[interval] or "", scale=100)
-    told = words_of(r"find others more directly \(([\d.]+) % SPL, of five ([\d.]+) %\)", RESULTS).groups()
-    for text, count in zip(told, ("45", "5"), strict=True):
-        assert_written(text, 100 * found[count]["SPL"], count)
+    told = words_of(
+        r"held-out SPL is higher \(([\d.]+) %, not ([\d.]+); a random walk ([\d.]+), a planner ([\d.]+)\)", RESULTS
+    ).groups()
+    planner = "planner on a learnt map, 110,900 frames"
+    for text, name in zip(told, ("45", "5", "random walk", planner), strict=True):
+        assert_written(text, 100 * found[name]["SPL"], name)
+    assert all(min(ends_of(found[str(count)]["95 % of sc"])) < found["random walk"]["sc"] for count in fig6.TRAINED)
+    better = section.claims[-1].numbers["probability of improvement"]
+    assert f"with a probability of {better.value:.2f} ({'-'.join(f'{end:.2f}' for end in better.interval)})" in part
+    carrying = re.findall(r"(\w+(?: room)?) (\d+): (\d+) to (\d+) %", part)
+    assert len(carrying) == 2
+    for room, target, *shares in carrying:
+        for share, count in zip(shares, (5, 45), strict=True):
+            own = [
+                row["spl"]
+                for row in by_heading(section.tables[1])
+                if (row["targets a scene"], row["scene"], row["target"]) == (count, room.replace(" ", "_"), int(target))
+            ]
+            assert len(own) == 5
+            assert_written(share, 100 * sum(own) / 5, f"{room} {target}")
 
 
 def check_settled(section: Section) -> None:

@@ -75,6 +75,10 @@ def test_a_policy_is_read_at_the_newest_pose_for_the_own_target_in_its_scene():
     history = torch.tensor([[1, 2, 7], [7, 2, 3], [8, 8, 8], [9, 9, states[0] + states[1] - 1]])
     found = told_after(by_policies(world, policies), world, history, torch.tensor([1, 0, 2, 3]))
     assert found.tolist() == [policies[target][pose].tolist() for target, pose in ((1, 7), (0, 3), (2, 0), (3, -1))]
+    elsewhere = torch.tensor([[8, 8, 8], [8, 8, 7]])  # the grid's first pose, the corridor's last
+    assert told_after(by_policies(world, policies), world, elsewhere, torch.tensor([0, 2])).tolist() == [[0.0] * 4] * 2
+    with pytest.raises(AssertionError):
+        by_policies(world, policies[::-1])
 
 
 @pytest.mark.parametrize("scale", [1.0, 8.0])

@@ -112,6 +112,7 @@ def shortest_paths(world: World) -> PoseAgent:
 
 def by_policies(world: World, policies: Sequence[np.ndarray]) -> PoseAgent:
     """By a policy for each target of a world: probabilities (S, A) of its scene; elsewhere it has none."""
+    assert [len(policy) for policy in policies] == world.scene_offset.diff()[world.target_scene].tolist()
     table = torch.cat([torch.from_numpy(policy).float() for policy in policies]).to(world.device)
     begins = torch.tensor([0, *map(len, policies[:-1])], device=world.device).cumsum(0)
 

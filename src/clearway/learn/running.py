@@ -176,7 +176,7 @@ class Running:
             tell()
             self.view.show(trainer.frames, trainer.statistics.solved, trainer.statistics.target_count)
             if saves:
-                self._save(seconds)
+                self._save(seconds)  # gathers anew: a row that was told has begun the counts of episodes again
                 if meanwhile is not None:
                     meanwhile.begin(self.folder.path)
                 saved_at, saved_frames = time.monotonic(), trainer.frames
