@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clearway.experiments import shuffles, step_size, table1, zone_time
+from clearway.experiments import shuffles, step_size, table1, zone_time, zones_or_step
 from clearway.experiments.convergence import frames_until_settled, mark_steps
 from clearway.experiments.groups import compared
 from clearway.experiments.reproduce import gather
@@ -30,6 +30,7 @@ from helpers.published import (
 )
 from helpers.report_tables import by_heading
 
+MAPS = {"planner on a learnt map", "nearest picture"}
 AGENTS = r"collision-aware|dearer|shuffled|shortest"
 
 
@@ -131,6 +132,35 @@ def check_sooner(section: Section, evidence: str) -> None:
             assert abs(written - value) <= 500
         assert f"p = {p}, for 5 claims {corrected} (Holm)" in claim.evidence
         assert verdict == claim.verdict
+
+
+@pytest.mark.slow
+def test_zones_or_a_larger_step_in_four_rooms_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    folder = tmp_path / "four"
+    unpack("four-rooms", folder, "four-rooms-default", "four-rooms-zones")
+    (section,) = gather(folder).sections
+    assert not section.missing and {claim.verdict for claim in section.claims} == {"undecided"}
+    part = section_of(EVIDENCE, "In four rooms: zones")
+    check_sooner(section, part)
+    lines, table = rows_of(part), section.tables[0]
+    found = {(row["figure"], row["agent"]): row for row in by_heading(table) if row["learner"] == "default"}
+    settled = by_heading(section.tables[-1])
+    assert {row["agent"] for row in settled} == {"shortest", "collision-aware", "dearer", "shuffled"}
+    for row in settled:
+        ((_, after, steps, collisions, failed),) = [line for line in lines if line[0] == row["agent"]]
+        after, ran = after.split("), ")
+        assert_shown(after, row["frames"], row["95 %"])
+        assert ran == f"{row['settled']} of 5" and failed == found["steps", row["agent"]]["failed targets"]
+        for cell, figure in ((steps, "steps"), (collisions, "collisions")):
+            own = found[figure, row["agent"]]
+            assert_shown(cell, own["average"], own["95 %"])
+    frames = [row["frames"] for row in settled]
+    assert max(frames) / min(frames) < 1.03
+    assert check_beside(lines, table.rows, 2, 3) == MAPS | {"shortest path", "random walk"}
+    cost = -zones_or_step.mean_cost(gather(folder).setting)
+    assert f"every step costs {cost:.6f}" in part and "all settle within 3 %" in RESULTS
+    seconds = [s for reward in ("dearer", "shuffled") for s in seconds_of_runs(folder, f"ppo-{reward}-*")]
+    assert len(seconds) == 10 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in part
 
 
 @pytest.mark.slow

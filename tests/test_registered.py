@@ -36,6 +36,7 @@ RECORDS = ROOT / "docs" / "records"
 ASKED_FIRST = {
     "bedroom-fresh": {38},
     "four-rooms-default": {64, 65},
+    "four-rooms-zones": {66},
     "hard-bathroom": {58},
     "shuffles-bathroom": {61, 62},
     "step-size-bathroom": {60},
