@@ -39,6 +39,22 @@ def test_a_figure_that_differs_in_its_last_digit_is_seen() -> None:
 
 
 @pytest.mark.slow
+def test_the_page_names_every_record_and_how_many_runs_it_holds() -> None:
+    table = rows_of(EVIDENCE.partition("## Records\n")[2].partition("\n## ")[0])[1:]
+    told = [
+        (name.strip("`"), int(count))
+        for names, counts, _ in table
+        for name, count in zip(names.split(", "), counts.split(", "), strict=True)
+    ]
+    found = {}
+    for path in (DOCS / "records").glob("*.tar.xz"):
+        with tarfile.open(path) as members:
+            found[path.name.partition(".")[0]] = sum(name.endswith("/run.json") for name in members.getnames())
+    assert found.pop("four-rooms") == 0 and "`four-rooms` holds the rooms" in EVIDENCE
+    assert len(told) == len(found) and dict(told) == found
+
+
+@pytest.mark.slow
 def test_what_memory_solves_is_what_its_record_comes_to(tmp_path: Path) -> None:
     unpack("memory-bathroom", tmp_path / "memory")
     found = gather(tmp_path / "memory")
