@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 from pathlib import Path
 
 import numpy as np
@@ -64,18 +63,22 @@ def stratified_p(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
     return float((np.abs(together) >= abs(together[0, 0]) - 1e-9).mean())
 
 
+def _text(value: float) -> str:
+    """To four digits; frames whole."""
+    return f"{value:,.0f}" if value >= 1000 else f"{value:.4g}"
+
+
 def main() -> None:
-    """Print the table as JSON."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs=2)
     sets = [figures(folder) for folder in parser.parse_args().folders]
     shortest, aware = (reward.name for reward in PAIR)
-    table = {}
+    print(f"| {aware}, {shortest} | first set | second set | p of both |\n|---|---|---|---|")
     for figure in FIGURES:
         pairs = [(own[aware][figure], own[shortest][figure]) for own in sets]
-        means = [[float(kind.mean()) for kind in pair] for pair in pairs]
-        table[figure] = {"means": means, "p": stratified_p(pairs)}
-    print(json.dumps(table, indent=1))
+        means = (", ".join(_text(kind.mean()) for kind in pair) for pair in pairs)
+        print(f"| {figure} | {' | '.join(means)} | {stratified_p(pairs):.2g} |")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,9 @@ from __future__ import annotations
 
 import argparse
 import io
+import lzma
 import re
+import shutil
 import sys
 import tarfile
 import tempfile
@@ -24,6 +26,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from clearway.experiments.job import RUNS, TRIALS
+from clearway.experiments.reproduce import REQUEST_FILE
 from clearway.experiments.setting import SCENES
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
@@ -42,11 +45,16 @@ def pack(folder: Path, record: Path, parts: Sequence[str] = (SCENES, RUNS)) -> N
 
 
 def unpack(records: Sequence[Path], folder: Path) -> None:
-    """Make the folder of one or more records, which must not be there yet."""
-    folder.mkdir(parents=True)
-    for record in records:
-        with tarfile.open(record, "r:xz") as archive:
-            archive.extractall(folder, filter="data")
+    """Make the folder of one or more records, which must not be there yet; whole, or not at all."""
+    part = folder.with_name(f"{folder.name}.part")
+    part.mkdir(parents=True)
+    try:
+        for record in records:
+            with tarfile.open(record, "r:xz") as archive:
+                archive.extractall(part, filter="data")
+        part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def _kept(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
@@ -88,13 +96,20 @@ def main() -> None:
     if args.what == "pack":
         if len(args.source) != 1:
             sys.exit(f"error: {len(args.source)} folders for one record. Pack them one by one")
+        if not (args.source[0] / REQUEST_FILE).exists():
+            sys.exit(f"error: {args.source[0]}: no reproduction here. Name a folder that clearway reproduce made")
         pack(args.source[0], args.made, (args.only,) if args.only else (SCENES, RUNS))
     elif args.only:
         sys.exit("error: --only is for packing. Leave it out")
     elif args.made.exists():
         sys.exit(f"error: {args.made}: is there already. Name a new folder")
     else:
-        unpack(args.source, args.made)
+        try:
+            unpack(args.source, args.made)
+        except (OSError, EOFError, tarfile.TarError, lzma.LZMAError) as error:
+            sys.exit(f"error: {error}. Name records of docs/records, and a new folder")
+        except KeyboardInterrupt:
+            sys.exit("interrupted: nothing was unpacked")
 
 
 if __name__ == "__main__":

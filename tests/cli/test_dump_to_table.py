@@ -161,10 +161,12 @@ def test_a_run_goes_on_only_when_asked_to(clearway, trained, small):
 def test_training_ends_with_the_number_of_solved_targets(clearway, trained, small, tmp_path, solved, rows):
     run = tmp_path / "run"
     words = ("train", trained.scene, "--out", run, "--resume", *small)
-    assert clearway(*words).code == 0
+    begun = clearway(*words)
+    assert begun.code == 0 and f"{run}: there is no run to resume, so that one begins\n" in begun.err
     metrics = run / "metrics.jsonl"
     metrics.write_text(metrics.read_text().replace('"solved_targets": 0', f'"solved_targets": {solved}'))
     lines = clearway(*words).err.splitlines()
+    assert not [line for line in lines if "no run to resume" in line]
     short = " in its last episodes, of at most 40 steps each" if rows else ""
     told = f"{run}: trained, {solved} of 5 targets solved{short}. Next: clearway evaluate {run}{rows}"
     assert lines[-2 if rows else -1] == told

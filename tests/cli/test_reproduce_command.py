@@ -132,6 +132,11 @@ def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, first, out
     assert facts["hardware"].count("(1 run)") == 2
     assert "(2 runs)" in facts["versions"] and "torch" in facts["versions"]
     assert facts["first and last run begun"].count("+00:00") == 2
+    assert "say so" not in facts["first and last run begun"]
+    first_run = sorted((out / "runs").iterdir())[0] / "run.json"
+    first_run.write_text(json.dumps(json.loads(first_run.read_text()) | {"begun": None}))
+    facts = clearway("report", out, "--json").json["facts"]
+    assert facts["first and last run begun"].endswith(" (of the 1 of 2 runs that say so)")
     for folder, command in zip(sorted((out / "runs").iterdir()), (["/tmp/bump.py", "5"], ["-c"]), strict=True):
         record = json.loads((folder / "run.json").read_text())
         (folder / "run.json").write_text(json.dumps(record | {"command": command}))
@@ -171,6 +176,11 @@ def test_a_folder_without_a_reproduction_is_refused(clearway, tmp_path: Path, co
     if content is not None:
         (tmp_path / "reproduction.json").write_text(content)
     assert clearway("report", tmp_path).refusal(str(tmp_path), "clearway reproduce")
+
+
+def test_a_file_is_no_folder_of_a_reproduction(clearway, tmp_path: Path) -> None:
+    (tmp_path / "report.md").write_text("# Report")
+    assert clearway("report", tmp_path / "report.md").refusal("report.md: no reproduction here. Name a folder")
 
 
 def test_scenes_without_features_are_refused(clearway, dumps: Path, tmp_path: Path) -> None:

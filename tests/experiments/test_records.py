@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from clearway.errors import SceneError
 from clearway.experiments.reproduce import ReproduceRequest, gather, reproduce
 from clearway.scenes.thor_v1 import write_scene
 from helpers.small_setting import small_rooms
@@ -50,6 +51,12 @@ def test_scenes_and_runs_may_be_two_records(folder: Path, tmp_path: Path) -> Non
     records = [tmp_path / f"{part}.tar.xz" for part in ("scenes", "runs")]
     for record in records:
         RECORDS["pack"](folder, record, [record.name.partition(".")[0]])
+    RECORDS["unpack"](records[1:], tmp_path / "runs")
+    with pytest.raises(
+        SceneError, match=r"bathroom\.h5: this room of the reproduction is not there\. Unpack the record"
+    ):
+        gather(tmp_path / "runs")
+    assert not (tmp_path / "runs" / "scenes").exists()  # nothing was built
     RECORDS["unpack"](records, tmp_path / "again")
     RECORDS["pack"](folder, tmp_path / "whole.tar.xz")
     RECORDS["unpack"]([tmp_path / "whole.tar.xz"], tmp_path / "other")
@@ -65,3 +72,24 @@ def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> N
     RECORDS["pack"](folder, first)
     RECORDS["pack"](folder, second)
     assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("unpack", "nowhere.tar.xz", "new"), "nowhere.tar.xz'. Name records"),
+        (("unpack", "no.tar.xz", "new"), "Name records of docs/records, and a new folder"),
+        (("pack", ".", "new.tar.xz"), "no reproduction here"),
+        (("unpack", "no.tar.xz", "."), "is there already"),
+    ],
+)
+def test_what_is_no_record_is_refused_and_leaves_nothing(
+    words: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "no.tar.xz").write_text("no archive")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["records.py", *words])
+    with pytest.raises(SystemExit, match=said) as refusal:
+        RECORDS["main"]()
+    assert str(refusal.value).startswith("error: ") and str(refusal.value).count("\n") == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["no.tar.xz"]

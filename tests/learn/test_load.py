@@ -88,9 +88,14 @@ def test_a_scene_whose_features_changed_is_refused(tmp_path: Path) -> None:
     request = request_with_files(tmp_path)
     record = train(request, tmp_path / "run").read_record()
     assert [scene.name for scene in run_scenes(record)] == ["corridor", "grid"]
-    write_scene(changed(request.scenes[1]), tmp_path / "grid.h5")
+    given = tmp_path / "given" / "grid.h5"
+    given.parent.mkdir()
+    for path in (given, tmp_path / "grid.h5"):
+        write_scene(changed(request.scenes[1]), path)
     with pytest.raises(RunError, match=r"grid\.h5: not the scene that the run was trained on"):
         run_scenes(record)
+    with pytest.raises(RunError, match=r"given/grid\.h5: not the scene that the run was trained on"):
+        run_scenes(record, [given, tmp_path / "corridor.h5"])
 
 
 def test_files_given_replace_those_recorded_in_the_run_s_order(tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
         "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
         "features": setting.encoder,
         "seeds": ", ".join(map(str, setting.seeds)),
-        "evaluation": f"{budget.episodes_per_target} episodes a target, at most {budget.step_limit:,} steps",
+        "on the grid": f"{budget.episodes_per_target} episodes a target, at most {budget.step_limit:,} steps",
         "learners": "; ".join(learners),
         **made_by(out, found.jobs),
     }

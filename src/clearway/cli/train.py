@@ -106,6 +106,8 @@ class Train:
         targets = given_targets(self.targets, len(files))
         reward, learner = chosen_reward(self.reward, self.parameters), self._learner()
         out = self._folder(files, reward, learner)
+        if self.resume and self.copy_to is None and not RunFolder(out).exists:
+            say(f"{out}: there is no run to resume, so that one begins")
         try:
             result = train(
                 files,

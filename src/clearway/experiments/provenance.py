@@ -24,7 +24,7 @@ def made_by(out: Path, jobs: Sequence[Job]) -> dict[str, str]:
         return {"versions": facts_text(package_versions()), "hardware": facts_text(hardware())}
     return {
         "runs begun by": _counted([_told(record.command) for record in records]),
-        **_times([record.begun for record in records if record.begun]),
+        **_times([record.begun for record in records]),
         "versions": _counted([facts_text(dict(record.versions)) for record in records]),
         "hardware": _counted([facts_text(dict(record.hardware)) for record in records]),
     }
@@ -37,9 +37,11 @@ def _told(command: Sequence[str]) -> str:
     return shlex.join([*(("python", "-c") if called in ("", "-c") else (called,)), *command[1:]])
 
 
-def _times(begun: Sequence[str]) -> dict[str, str]:
-    """When the first and the last run began, where they say so."""
-    return {"first and last run begun": f"{min(begun)}, {max(begun)}"} if begun else {}
+def _times(begun: Sequence[str | None]) -> dict[str, str]:
+    """When the first and the last run began, of those that say so."""
+    told = [time for time in begun if time]
+    fewer = f" (of the {len(told)} of {len(begun)} runs that say so)" if len(told) < len(begun) else ""
+    return {"first and last run begun": f"{min(told)}, {max(told)}{fewer}"} if told else {}
 
 
 def _counted(answers: Sequence[str]) -> str:

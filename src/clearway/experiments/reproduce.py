@@ -104,7 +104,7 @@ def reproduce(
         ClearwayError: a scene cannot be had, or a run failed; what is complete stays.
         KeyboardInterrupt: the user interrupted; the same command goes on.
     """
-    setting = _setting(request, show_progress)
+    setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
     with written_whole(request.out / REQUEST_FILE) as part:
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
@@ -124,7 +124,7 @@ def gather(out: Path) -> Reproduction:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
     request = _read_request(out)
-    return _gathered(request, _setting(request, show_progress=False))
+    return _gathered(request, _setting(request, build=False))
 
 
 def _read_request(out: Path) -> ReproduceRequest:
@@ -133,7 +133,7 @@ def _read_request(out: Path) -> ReproduceRequest:
         content = read_json(path)
         dumps = [Path(dump) for dump in content.pop("dumps")]
         return _checked(ReproduceRequest(out=out, dumps=dumps, **content))
-    except FileNotFoundError as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
@@ -240,7 +240,7 @@ def _known(request: ReproduceRequest) -> list[str]:
     return known
 
 
-def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
+def _setting(request: ReproduceRequest, *, build: bool = True, show_progress: bool = False) -> Setting:
     return prepare(
         request.out,
         BUDGETS[request.budget].changed(request.rooms, request.frames),
@@ -250,6 +250,7 @@ def _setting(request: ReproduceRequest, show_progress: bool) -> Setting:
         first_seed=request.first_seed,
         learners=request.learners,
         changes=request.changes,
+        build=build,
         show_progress=show_progress,
     )
 

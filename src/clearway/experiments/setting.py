@@ -106,6 +106,7 @@ def prepare(
     first_seed: int = 0,
     learners: Sequence[LearnerName],
     changes: Sequence[str] = (),
+    build: bool = True,
     show_progress: bool = False,
 ) -> Setting:
     """The setting of a reproduction; default rooms are built, encoded and written to `out` the first time.
@@ -119,14 +120,15 @@ def prepare(
         first_seed: of them; the others follow it.
         learners: names among `LEARNERS`.
         changes: of settings of every learner, such as "lr_start=0.002".
+        build: False refuses default rooms that are not there yet.
         show_progress: draw progress bars.
 
     Raises:
-        SceneError: a dump cannot be read or has no features.
+        SceneError: a dump cannot be read or has no features; or a room is not there, and none is to be built.
         RunError: as of `changed_learners`.
     """
     own = changed_learners(learners, budget, changes)
-    paths = list(dumps)[: budget.most_scenes] if dumps else _room_files(out, budget, encoder, show_progress)
+    paths = list(dumps)[: budget.most_scenes] if dumps else _room_files(out, budget, encoder, build, show_progress)
     scenes = tuple(read_scene(path) for path in paths)
     for scene, path in zip(scenes, paths, strict=True):
         if scene.features is None:
@@ -157,7 +159,7 @@ def changed_learners(names: Sequence[LearnerName], budget: Budget, changes: Sequ
     return {name: with_settings(_budgeted(name, budget), changes) for name in names}
 
 
-def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) -> list[Path]:
+def _room_files(out: Path, budget: Budget, encoder: str, build: bool, show_progress: bool) -> list[Path]:
     """The default rooms with features, in files under `out`.
 
     A folder for each encoder and set of rooms: a random encoder is calibrated on all of them, so that the features of
@@ -165,7 +167,11 @@ def _room_files(out: Path, budget: Budget, encoder: str, show_progress: bool) ->
     """
     folder = out / SCENES / quote(encoder, safe="") / "+".join(budget.rooms)
     paths = [folder / f"{name}.h5" for name in budget.rooms]
-    if not all(path.exists() for path in paths):
+    missing = [path for path in paths if not path.exists()]
+    if missing and not build:
+        remedy = "Unpack the record that holds its rooms, too, or build them with clearway reproduce"
+        raise SceneError(missing[0], "this room of the reproduction is not there", remedy)
+    if missing:
         rooms = [cached_room_scene(name, progress=show_progress) for name in budget.rooms]
         for scene, path in zip(encode_scenes(rooms, encoder, progress=show_progress), paths, strict=True):
             write_scene(scene, path)

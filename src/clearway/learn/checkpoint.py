@@ -120,7 +120,7 @@ def newest_checkpoint(folder: Path) -> Path:
             warnings.warn(f"{error}; an earlier checkpoint is used", stacklevel=2)
     if checkpoints(folder):
         raise RunError(f"{folder}: every checkpoint is damaged. Restore one from a copy, or train again")
-    raise RunError(f"{folder}: no checkpoint found. Train first, or name another run")
+    raise RunError(f"{folder}: no checkpoint found. Train first, or name another run (records of runs hold no weights)")
 
 
 def read_progress(path: Path) -> Progress:

@@ -182,6 +182,7 @@ def run_scenes(
         loaded = [one if isinstance(one, Scene) else read_scene(one) for one in given]
         places = [_place_among(loaded, wanted) for wanted in record.scenes]
         found = [_called(loaded[place], wanted.name) for place, wanted in zip(places, record.scenes, strict=True)]
+        sources = [one.name if isinstance(one := given[place], Scene) else str(one) for place in places]
         if tells_others:
             known = {wanted.digest for wanted in record.scenes}
             left = [scene for place, scene in enumerate(loaded) if place not in places]
@@ -189,10 +190,11 @@ def run_scenes(
     else:
         paths = _places(record)
         found = [_in_file(wanted.name, paths.get(wanted.path or "", wanted.path)) for wanted in record.scenes]
-    for scene, wanted in zip(found, record.scenes, strict=True):
+        sources = [wanted.path or wanted.name for wanted in record.scenes]
+    for scene, wanted, source in zip(found, record.scenes, sources, strict=True):
         if scene_digest(scene) != wanted.digest:
             raise RunError(
-                f"{wanted.path or wanted.name}: not the scene that the run was trained on (graph or features differ). "
+                f"{source}: not the scene that the run was trained on (graph or features differ). "
                 "Give the right file with --scenes"
             )
     return found
