@@ -20,6 +20,12 @@ def test_a_training_without_a_folder_gets_a_new_one(clearway, trained, small, tm
     assert len(list((tmp_path / "runs").iterdir())) == 2
 
 
+@pytest.mark.parametrize(("value", "told"), [("0.01", 1), ("-0.01", 0), ("0", 0)])
+def test_a_cost_that_steps_earn_is_warned_of(clearway, trained, value: str, told: int) -> None:
+    answer = clearway("train", trained.scene, "--alpha", value, "--set", "nosuch=1")
+    assert answer.code and answer.err.count("--alpha 0.01: steps earn it. A cost is negative") == told
+
+
 def test_what_cannot_be_trained_is_one_line_and_leaves_no_folder(clearway, trained, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert clearway("train", trained.scene, "--targets", "76").refusal("out of range")

@@ -219,7 +219,7 @@ def _own(
         problem = f"agent={agent!r:.80}: expected a run folder, an .onnx file, what train returned, or an agent"
         raise ArgumentError(f"{problem}. Give one of these")
     if scenes is None:
-        raise ArgumentError("scenes: none given, and the agent has no run that names them. Give scenes")
+        raise ArgumentError("scenes: none given, and the agent has no run that names them. Give scenes (--scenes FILE)")
     card = getattr(agent, "card", None)
     if isinstance(card, Card):
         _check_fits(card, scenes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import asdict, field, fields, make_dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,8 @@ import tyro
 
 from clearway.reward import REWARDS, TERMS, Reward, reward_named
 
+COSTS = ("alpha", "beta", "gamma")
+"""Parameters that a step pays, in each reward that has them."""
 RewardChoice = Annotated[
     str,
     tyro.conf.arg(metavar="NAME", help=f"{', '.join(REWARDS)}; or one of your own, package.module:name."),
@@ -41,8 +44,16 @@ def chosen_reward(name: str, parameters: RewardParameters, clip: bool | None = N
 
     Raises:
         RewardError: there is no such reward, or a value is NaN or infinite.
+
+    Warns:
+        UserWarning: a step's cost is given as what it earns.
     """
-    return reward_named(name).with_changes(clip=clip, **given_parameters(parameters))
+    given = given_parameters(parameters)
+    reward = reward_named(name).with_changes(clip=clip, **given)
+    for cost in COSTS:
+        if given.get(cost, 0) > 0:
+            warnings.warn(f"--{cost} {given[cost]:g}: steps earn it. A cost is negative", stacklevel=2)
+    return reward
 
 
 def given_parameters(parameters: RewardParameters) -> dict[str, float]:

@@ -125,7 +125,7 @@ def _openings(
             i, j = np.argwhere(doors[columns, rows])[0]
             cell = (int(i0 + i + first[0]), int(j0 + j + first[1]))
             problem = f"has a door in the cell {cell} that is in no wall"
-            remedy = "Put walls at two opposite sides of it, or make it a free cell"
+            remedy = "Put walls, not furniture, at two opposite sides of it, or make it a free cell"
             raise SceneError(plan.source or plan.name, problem, remedy, plan.dataset)
         along_x, along_z = (
             sum(int(ways[side].sum()) for side in sides) if fits else -1
