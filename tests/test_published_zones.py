@@ -156,6 +156,9 @@ def test_zones_or_a_larger_step_in_four_rooms_is_what_its_record_comes_to(tmp_pa
             assert_shown(cell, own["average"], own["95 %"])
     frames = [row["frames"] for row in settled]
     assert max(frames) / min(frames) < 1.03
+    ends = [abs(end) for claim in section.claims for end in claim.numbers["difference"].interval]
+    least, most = (100 * end / np.mean(frames) for end in (min(ends), max(ends)))
+    assert f"reach from {least:.0f} to {most:.0f} % to a side" in part
     assert check_beside(lines, table.rows, 2, 3) == MAPS | {"shortest path", "random walk"}
     cost = -zones_or_step.mean_cost(gather(folder).setting)
     assert f"every step costs {cost:.6f}" in part and "all settle within 3 %" in RESULTS

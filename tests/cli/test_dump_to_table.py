@@ -162,11 +162,11 @@ def test_training_ends_with_the_number_of_solved_targets(clearway, trained, smal
     run = tmp_path / "run"
     words = ("train", trained.scene, "--out", run, "--resume", *small)
     begun = clearway(*words)
-    assert begun.code == 0 and f"{run}: there is no run to resume, so that one begins\n" in begun.err
+    assert begun.code == 0 and f"{run}: no run to resume is here; a new one is begun\n" in begun.err
     metrics = run / "metrics.jsonl"
     metrics.write_text(metrics.read_text().replace('"solved_targets": 0', f'"solved_targets": {solved}'))
     lines = clearway(*words).err.splitlines()
-    assert not [line for line in lines if "no run to resume" in line]
+    assert not [line for line in lines if "no run to resume is here" in line]
     short = " in its last episodes, of at most 40 steps each" if rows else ""
     told = f"{run}: trained, {solved} of 5 targets solved{short}. Next: clearway evaluate {run}{rows}"
     assert lines[-2 if rows else -1] == told

@@ -20,10 +20,12 @@ def test_a_training_without_a_folder_gets_a_new_one(clearway, trained, small, tm
     assert len(list((tmp_path / "runs").iterdir())) == 2
 
 
+@pytest.mark.parametrize("cost", ["alpha", "beta", "gamma"])
 @pytest.mark.parametrize(("value", "told"), [("0.01", 1), ("-0.01", 0), ("0", 0)])
-def test_a_cost_that_steps_earn_is_warned_of(clearway, trained, value: str, told: int) -> None:
-    answer = clearway("train", trained.scene, "--alpha", value, "--set", "nosuch=1")
-    assert answer.code and answer.err.count("--alpha 0.01: steps earn it. A cost is negative") == told
+def test_a_cost_that_steps_earn_is_warned_of(clearway, trained, cost: str, value: str, told: int) -> None:
+    answer = clearway("train", trained.scene, f"--{cost}", value, "--set", "nosuch=1")
+    assert answer.code and answer.err.count("steps earn it") == told
+    assert answer.err.count(f"--{cost} 0.01: steps earn it. A cost is negative") == told
 
 
 def test_what_cannot_be_trained_is_one_line_and_leaves_no_folder(clearway, trained, tmp_path, monkeypatch):

@@ -107,7 +107,7 @@ class Train:
         reward, learner = chosen_reward(self.reward, self.parameters), self._learner()
         out = self._folder(files, reward, learner)
         if self.resume and self.copy_to is None and not RunFolder(out).exists:
-            say(f"{out}: there is no run to resume, so that one begins")
+            say(f"{out}: no run to resume is here; a new one is begun")
         try:
             result = train(
                 files,

@@ -169,7 +169,7 @@ def _room_files(out: Path, budget: Budget, encoder: str, build: bool, show_progr
     paths = [folder / f"{name}.h5" for name in budget.rooms]
     missing = [path for path in paths if not path.exists()]
     if missing and not build:
-        remedy = "Unpack the record that holds its rooms, too, or build them with clearway reproduce"
+        remedy = "Unpack the record that holds its rooms, too; clearway reproduce builds others, and trains anew"
         raise SceneError(missing[0], "this room of the reproduction is not there", remedy)
     if missing:
         rooms = [cached_room_scene(name, progress=show_progress) for name in budget.rooms]
