@@ -17,7 +17,6 @@ import argparse
 import io
 import lzma
 import re
-import shutil
 import sys
 import tarfile
 import tempfile
@@ -46,15 +45,13 @@ def pack(folder: Path, record: Path, parts: Sequence[str] = (SCENES, RUNS)) -> N
 
 def unpack(records: Sequence[Path], folder: Path) -> None:
     """Make the folder of one or more records, which must not be there yet; whole, or not at all."""
-    part = folder.with_name(f"{folder.name}.part")
-    part.mkdir(parents=True)
-    try:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as beside:
+        part = Path(beside) / folder.name
         for record in records:
             with tarfile.open(record, "r:xz") as archive:
                 archive.extractall(part, filter="data")
         part.rename(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def _kept(folder: Path, parts: Sequence[str]) -> Iterator[Path]:

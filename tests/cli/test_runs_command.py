@@ -31,8 +31,8 @@ def test_runs_are_listed(clearway, runs):
     *rows, caption = answer.out.splitlines()
     head, first, second = (line.split() for line in rows)
     assert caption.startswith("success, steps, collisions: of training's episodes")
-    assert head == ["run", "reward", "algorithm", "frames", "solved", "success", "steps", "collisions"]
-    assert (first[0], second[:5]) == ("runs/a", ["runs/sub/b", "shortest", "ppo", "1,280", "0"])
+    assert head == ["run", "reward", "algorithm", "seed", "frames", "solved", "success", "steps", "collisions"]
+    assert (first[0], second[:6]) == ("runs/a", ["runs/sub/b", "shortest", "ppo", "0", "1,280", "0"])
     told = clearway("runs", "list", "runs", "--json").json
     assert [(run["run"], run["frames"], run["targets"]) for run in told] == [
         ("runs/a", 640, 5),

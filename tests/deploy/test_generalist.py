@@ -181,9 +181,8 @@ def test_any_size_is_taken_and_another_aspect_is_refused(one_file) -> None:
     for size in ((48, 64), (300, 400), (97, 128)):
         navigator.set_target(plain(5, size))
     for size, crop in (((360, 640), "480 x 360"), ((300, 300), "300 x 225")):
-        with pytest.raises(DeployError, match=rf"the eyes were taught on 1\.33 .*Crop them to {crop}"):
+        with pytest.raises(DeployError, match=rf"those of the training 1\.33 .*Crop them to {crop}"):
             navigator.set_target(plain(5, size))
-    clearway.Navigator(Sums()).set_target(plain(5, (3, 9)))  # a network of one scene takes what its camera takes
 
 
 def test_scenes_of_another_aspect_are_walked_with_a_warning(one_file) -> None:

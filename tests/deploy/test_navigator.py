@@ -169,13 +169,23 @@ def test_what_is_no_picture_is_refused(picture, part) -> None:
 
 def test_a_pillow_picture_is_taken() -> None:
     navigator = clearway.Navigator(Sums())
-    navigator.set_target(Image.new("RGB", (5, 6)))
-    assert navigator.act(Image.new("RGB", (5, 6), (9, 9, 9))).value == 36
+    navigator.set_target(Image.new("RGB", (8, 6)))
+    assert navigator.act(Image.new("RGB", (8, 6), (9, 9, 9))).value == 36
+
+
+def test_an_agent_of_one_scene_takes_the_aspect_of_its_training_alone() -> None:
+    navigator = clearway.Navigator(Sums())
+    navigator.set_target(plain(5, (600, 800)))
+    with pytest.raises(DeployError, match=r"those of the training 1\.33 \(4 x 3\), .*Crop them to 4 x 3"):
+        navigator.set_target(plain(5, (3, 9)))
+    unknown = Sums()
+    unknown.card = replace(unknown.card, picture_size=None)
+    clearway.Navigator(unknown).set_target(plain(5, (3, 9)))
 
 
 def test_without_a_target_there_is_nothing_to_do() -> None:
     with pytest.raises(DeployError, match=r"no target yet\. Call set_target first"):
-        clearway.Navigator(Sums()).act(PICTURE)
+        clearway.Navigator(Sums()).act(plain(1))
 
 
 def test_sources_that_cannot_be_used(deployed, tmp_path) -> None:

@@ -266,7 +266,7 @@ def test_a_client_that_resets_its_connection_harms_nobody(hasty) -> None:
 
 def test_a_picture_file_as_it_is(hasty, tmp_path) -> None:
     path: Path = tmp_path / "view.jpg"
-    path.write_bytes(picture_bytes(plain(8, (16, 16)), "JPEG", quality=95))
+    path.write_bytes(picture_bytes(plain(8, (12, 16)), "JPEG", quality=95))
     with hasty.client() as client, client.session(selection="argmax") as session:
         session.set_target(path)
         assert session.act(path.read_bytes()).value == pytest.approx(8032, abs=20)

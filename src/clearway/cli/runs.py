@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from clearway.learn.runs import RunSummary
 
 CURVES_AT_MOST = 8  # runs in one picture
-HEADINGS = ("run", "reward", "algorithm", "frames", "solved", "success", "steps", "collisions")
+HEADINGS = ("run", "reward", "algorithm", "seed", "frames", "solved", "success", "steps", "collisions")
 CAPTION = "success, steps, collisions: of training's episodes, in its latest stretch"
 INDENT = 2  # of a run's figures below its folder
 BROKEN = HEADINGS[1:].index("reward"), HEADINGS[1:].index("frames")
@@ -215,6 +215,7 @@ def _row(summary: RunSummary) -> list[str]:
         str(summary.path),
         summary.record.reward.name,
         summary.record.learner.algorithm,
+        str(summary.record.seed),
         f"{summary.frames:,}{of}",
         f"{summary.solved} of {summary.target_count}",
         *(f"{figures[name]:.3g}" if name in figures else "-" for name in ("success", "steps", "collisions")),

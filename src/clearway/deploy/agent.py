@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 
 from clearway.agents.agent import FEATURES, Agent, Observation, State
-from clearway.choices import GENERALIST
 from clearway.deploy.card import Card
 from clearway.errors import DeployError
 from clearway.scenes.aspect import other_aspect
@@ -86,7 +85,7 @@ def checked_picture(seen: object, card: Card | None = None) -> np.ndarray:
     """The picture, (height, width, 3) uint8, for an agent, or for one that is unknown.
 
     Raises:
-        DeployError: it is something else, too large, or has another aspect than an agent for any room was taught on.
+        DeployError: it is something else, too large, or has another aspect than the pictures of the agent's training.
     """
     picture = _array(seen, "picture")
     if picture.dtype.kind in "US":
@@ -103,8 +102,8 @@ def checked_picture(seen: object, card: Card | None = None) -> np.ndarray:
 
 
 def aspect_problem(picture: np.ndarray, card: Card) -> str | None:
-    """What is to be told of a picture (height, width, 3) whose aspect an agent for any room was not taught on."""
-    if card.kind != GENERALIST or card.picture_size is None:
+    """What is to be told of a picture (height, width, 3) whose aspect is not that of the agent's training."""
+    if card.picture_size is None:
         return None
     return other_aspect(picture.shape[:2], card.picture_size)
 

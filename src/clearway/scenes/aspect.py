@@ -13,7 +13,7 @@ SLACK = 0.02  # share by which aspects may differ
 
 
 class AspectWarning(UserWarning):
-    """Pictures have another aspect than the eyes were taught on."""
+    """Pictures have another aspect than those of the training."""
 
 
 def other_aspect(given_px: tuple[int, int], trained_px: tuple[int, int]) -> str | None:
@@ -27,8 +27,8 @@ def other_aspect(given_px: tuple[int, int], trained_px: tuple[int, int]) -> str 
         return None
     crop = (round(height * trained), height) if aspect > trained else (width, round(width / trained))
     return (
-        f"pictures of {width} x {height} pixels have the aspect {aspect:.2f}, and the eyes were taught on "
-        f"{trained:.2f} ({trained_width} x {trained_height}), so that distances and angles would be told wrong. "
+        f"pictures of {width} x {height} pixels have the aspect {aspect:.2f}, those of the training {trained:.2f} "
+        f"({trained_width} x {trained_height}), so that they would be seen squashed. "
         f"Crop them to {crop[0]} x {crop[1]}"
     )
 
