@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from clearway.experiments import fig6
+from clearway.experiments.groups import WALKED
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from helpers.published import (
@@ -200,7 +201,7 @@ def check_unseen(section: Section) -> None:
             assert_shown(success, row["sc"], row["95 % of sc"], scale=100)
             assert_written(within.rstrip(" %"), 100 * row["sc within 4 x shortest"], cell)
             assert_written(spl.rstrip(" %"), 100 * row["SPL"], cell)
-        others = (mapped, "planner on a learnt map", "110,900 frames"), (walked, None, "random walk")
+        others = (mapped, "planner on a learnt map", "110,900 frames"), (walked, WALKED, "random walk")
         for cell, learner, agent in others:
             row = found[steps, learner, agent]
             for text, name in zip(numbers(cell), ("sc", "sc within 4 x shortest", "SPL"), strict=True):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from clearway.experiments.groups import EXACT, WALKED
 from clearway.experiments.section import Claim, Section
 from helpers.report_tables import by_heading
 
@@ -76,7 +77,7 @@ def ends_of(interval: str) -> list[float]:
 def check_ends(section: Section, page: str) -> None:
     """Figure 3's table of collisions: every kind of agent that it has, as recorded."""
     recorded = {
-        row["agent"] if row["learner"] in ("paper", "default", None) else row["learner"]: row
+        row["agent"] if row["learner"] in ("paper", "default", WALKED, EXACT) else row["learner"]: row
         for row in by_heading(section.tables[0])
         if row["figure"] == "collisions"
     }
@@ -89,7 +90,7 @@ def check_ends(section: Section, page: str) -> None:
             assert_written(best, row["best seed"], name)
             assert_written(worst or best, row["worst seed"], name)
             assert_shown(target, row["worst target"], row["95 %"] or "")
-            assert_written(of_any, row["of any seed"], name)
+            assert_written(of_any, row["worst target of any seed"], name)
             assert frames == (row["agent"] if row["agent"].endswith(" frames") else "")
             told.add(name)
     assert told == set(recorded)
@@ -112,7 +113,7 @@ def check_beside(rows: list[list[str]], recorded: Sequence[Sequence[Any]], steps
     known: dict[str, dict[str, float]] = {}
     agents: dict[str, str] = {}
     for figure, learner, agent, *_, average, _, _ in recorded:
-        own = learner in ("exact", "walked", "paper")
+        own = learner in (EXACT, WALKED, "paper")
         name = agent if own else UNTRAINED.get(learner, learner)
         known.setdefault(name, {})[figure] = average
         agents[name] = agent

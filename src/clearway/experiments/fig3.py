@@ -11,7 +11,7 @@ from clearway.evaluation.episodes import EpisodeTable
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.protocol import SHORTEST_PATH
 from clearway.experiments.convergence import ONE_TARGET
-from clearway.experiments.groups import PAIR, Group, all_jobs, compared, random_walk
+from clearway.experiments.groups import EXACT, PAIR, WALKED, Group, all_jobs, compared, random_walk
 from clearway.experiments.job import episodes_of
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
@@ -73,15 +73,25 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
         fewest = walked.of("shortest_path_steps") if metric == "steps" else np.zeros((1, world.target_count))
         rows += [(metric, learner, agent, len(own), *_ends(own.of(metric), scene)) for learner, agent, own in learnt]
         rows += [
-            (metric, None, agent, None, *_ends(values, scene))
-            for agent, values in ((SHORTEST_PATH, fewest), (RANDOM_WALK, walked.of(metric)))
+            (metric, kind, agent, None, *_ends(values, scene))
+            for kind, agent, values in ((EXACT, SHORTEST_PATH, fewest), (WALKED, RANDOM_WALK, walked.of(metric)))
         ]
     notes = (
         "An episode's mean. The best and the worst seed's are over scenes; the worst target is the one with the most, "
         "in each run by itself.",
         ABOUT_MAPS,
     )
-    headings = ("figure", "learner", "agent", "seeds", "best seed", "worst seed", "worst target", "95 %", "of any seed")
+    headings = (
+        "figure",
+        "learner",
+        "agent",
+        "seeds",
+        "best seed",
+        "worst seed",
+        "worst target",
+        "95 %",
+        "worst target of any seed",
+    )
     return ReportTable("fig3", "Best and worst", headings, tuple(rows), notes)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from clearway.experiments.convergence import settling
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, compared, random_walk
+from clearway.experiments.groups import PAIR, WALKED, Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.job import run_folder
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
@@ -58,7 +58,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
         found.append(((group.learner, group.agent, frames, len(values)), values))
     for mapped in on_maps(setting, trial):
         found.append(((mapped.agent, None, mapped.frames, len(mapped.scores)), mapped.scores))
-    found.append((("walked", RANDOM_WALK, None, None), random_walk(world, trial)))
+    found.append(((WALKED, RANDOM_WALK, None, None), random_walk(world, trial)))
     rows = tuple((*who, own.failed(), *own.estimates(METRICS, scenes)) for who, own in found)
     headings = (
         "learner",

@@ -17,7 +17,7 @@ from clearway.experiments.generalisation import (
     told_of_own_goals,
     tried,
 )
-from clearway.experiments.groups import PAIR, Group, Scores, all_jobs, random_walk
+from clearway.experiments.groups import PAIR, WALKED, Group, Scores, all_jobs, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.paper_numbers import FIGURE_5_AVERAGE_SC, reminder
 from clearway.experiments.plan import RANDOM_WALK, Job, TargetSets
@@ -29,7 +29,7 @@ from clearway.scenes.scene import Scene
 
 DISTANCES = (1, 2, 4, 8)
 AVERAGE = "average"
-Kind = tuple[str | None, str]
+Kind = tuple[str, str]
 """A learner and what tells its agents from others; no learner for the random walk."""
 
 
@@ -51,16 +51,18 @@ def section(setting: Setting) -> Section:
             (group.learner, group.agent): group.scores(setting.out, world.target_count) for group in groups
         }
         found |= {mapped.called: mapped.scores for mapped in on_maps(setting, groups[0].trial)}
-        found[None, RANDOM_WALK] = random_walk(world, groups[0].trial)
+        found[WALKED, RANDOM_WALK] = random_walk(world, groups[0].trial)
         for kind, values in found.items():
             figures = Tried(values, target_scene)
             kinds.setdefault(kind, []).append(figures)
             rows.append(_row(steps, kind, figures))
-            by_target += [(steps, *row) for row in figures.by_target(world, kind[0] or "walked", kind[1])]
+            by_target += [(steps, *row) for row in figures.by_target(world, *kind)]
     averages = {kind: together(parts) for kind, parts in kinds.items()}
     rows += [_row(AVERAGE, kind, figures) for kind, figures in averages.items()]
     points = {
-        ", ".join(filter(None, kind)): [(float(steps), part) for steps, part in zip(DISTANCES, parts, strict=True)]
+        kind[1] if kind[0] == WALKED else ", ".join(kind): [
+            (float(steps), part) for steps, part in zip(DISTANCES, parts, strict=True)
+        ]
         for kind, parts in kinds.items()
     }
     headings = ("steps away", "learner", "agent", "seeds", "targets", *HEADINGS, "the paper's sc")
@@ -102,7 +104,7 @@ def section(setting: Setting) -> Section:
 def _row(steps: Value, kind: Kind, figures: Tried) -> tuple[Value, ...]:
     learner, agent = kind
     of_paper = FIGURE_5_AVERAGE_SC.get(agent) if steps == AVERAGE else None
-    seeds = None if learner is None else len(figures.scores)
+    seeds = None if learner == WALKED else len(figures.scores)
     return (steps, learner, agent, seeds, len(figures.target_scene), *figures.cells(), of_paper)
 
 

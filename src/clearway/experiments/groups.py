@@ -21,6 +21,9 @@ from clearway.world.world import World
 
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
+EXACT = "exact"
+WALKED = "walked"
+"""What tables call the learner of figures that are computed, and of those of an agent that learns nothing."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from clearway.evaluation.across_seeds import mean_estimate
 from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
-from clearway.experiments.groups import Group, Scores, random_walk
+from clearway.experiments.groups import EXACT, WALKED, Group, Scores, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.other_learners import ABOUT_OTHERS
 from clearway.experiments.paper_numbers import THE_PAPER, PaperRow, reminder
@@ -29,7 +29,6 @@ METRICS = ("steps", "collisions")
 TARGET_METRICS = ("steps", "shortest_path_steps", "collisions", "success", "sc", "sc_4x", "spl")
 PAPER_COLUMN = "the paper's average of these scenes"
 NAMED_FAILURES = 8  # of each kind of agent, in the note below the table
-EXACT = "exact"
 Found: TypeAlias = tuple[tuple[str, str], Scores]
 """A learner and what tells its agents from others, and their figures."""
 
@@ -74,7 +73,7 @@ def navigation_tables(
         for reward, row in paper.items():
             scenes = row.by_scene(metric, world.scene_names)
             rows.append(_reference_row(metric, THE_PAPER, reward, scenes, row.average(metric, world.scene_names)))
-        for reference, agent, figures in [*exact, ("walked", RANDOM_WALK, {m: walked.of(m)[0] for m in METRICS})]:
+        for reference, agent, figures in [*exact, (WALKED, RANDOM_WALK, {m: walked.of(m)[0] for m in METRICS})]:
             means = _by_scene(world, figures[metric])
             rows.append(_reference_row(metric, reference, agent, means, float(np.mean(means))))
     left = ("figure", "learner", "agent", "seeds", "failed targets")

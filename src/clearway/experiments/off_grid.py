@@ -10,6 +10,7 @@ import numpy as np
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.errors import ClearwayError
 from clearway.evaluation.across_seeds import mean_estimate
+from clearway.experiments.groups import WALKED
 from clearway.experiments.job import trial_path
 from clearway.experiments.live_trial import FIGURES, read_live
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, LiveWalker, PlannedRun
@@ -108,7 +109,7 @@ def _groups(setting: Setting) -> list[LiveGroup]:
     return [
         *trained,
         LiveGroup(NEAREST, frames, _jobs(setting, beside, NEAREST)),
-        LiveGroup("walked", RANDOM_WALK, _jobs(setting, beside, RANDOM_WALK)),
+        LiveGroup(WALKED, RANDOM_WALK, _jobs(setting, beside, RANDOM_WALK)),
     ]
 
 

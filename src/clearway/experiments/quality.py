@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from clearway.evaluation.criteria import Criteria, Quality, quality
 from clearway.experiments.convergence import settling_table
-from clearway.experiments.groups import Group, Scores, all_jobs, compared, random_walk
+from clearway.experiments.groups import WALKED, Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -76,7 +76,7 @@ def _table(setting: Setting, world: World, found: Mapping[str, Mapping[int, Qual
     for mapped in on_maps(setting, trial):
         rows += [_row((*mapped.called, seed), own) for seed, own in _by_seed(world, mapped.scores).items()]
     (walked,) = _by_seed(world, random_walk(world, trial)).values()
-    rows.append(_row(("walked", RANDOM_WALK, None), walked))
+    rows.append(_row((WALKED, RANDOM_WALK, None), walked))
     notes = (
         "Of all targets; means over scenes of their targets' means. The worst target is the one whose steps exceed its "
         "shortest paths' the most, in its scene's own numbering.",

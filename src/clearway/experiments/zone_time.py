@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from clearway.experiments.groups import Group, Scores, all_jobs, compared, random_walk
+from clearway.experiments.groups import WALKED, Group, Scores, all_jobs, compared, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -59,7 +59,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
     }
     found |= {mapped.called: mapped.scores for mapped in on_maps(setting, trial)}
     rows: list[tuple[Value, ...]] = [(*kind, len(own), *own.estimates(FIGURES, scenes)) for kind, own in found.items()]
-    rows.append(("walked", RANDOM_WALK, None, *random_walk(world, trial).estimates(FIGURES, scenes)))
+    rows.append((WALKED, RANDOM_WALK, None, *random_walk(world, trial).estimates(FIGURES, scenes)))
     headings = (heading for words in FIGURES.values() for heading in (words, f"95 % of {words}"))
     return ReportTable(NAME, "Steps in the zones", ("learner", "agent", "seeds", *headings), tuple(rows), (ABOUT_MAPS,))
 
