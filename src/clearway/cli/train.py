@@ -99,10 +99,11 @@ class Train:
 
     def run(self) -> None:
         """Train."""
+        files = scene_files(self.files)  # what is not there is refused before PyTorch is loaded
+
         from clearway.api.training import train
         from clearway.learn.run_folder import RunFolder
 
-        files = scene_files(self.files)
         targets = given_targets(self.targets, len(files))
         reward, learner = chosen_reward(self.reward, self.parameters), self._learner()
         out = self._folder(files, reward, learner)
