@@ -20,6 +20,7 @@ from helpers.published import (
     check_beside,
     check_ends,
     ends_of,
+    held_out_rows,
     numbers,
     rows_of,
     seconds_of_runs,
@@ -210,18 +211,8 @@ def check_unseen(section: Section) -> None:
 
 def check_held_out(section: Section) -> None:
     """Figure 6: a row for each set of targets trained on, and for what stands beside; and what the results say."""
-    table = section.tables[0]
-    found = {str(row["targets a scene"] or row["learner"]): row for row in by_heading(table)}
     part = PAGE.partition("**Held-out targets**")[2].partition("**Figure 3")[0]
-    shown = rows_of(part)[1:]
-    assert [row[0] for row in shown] == list(found)
-    for name, learnt, *cells in shown:
-        row = found[name]
-        if learnt:
-            assert_written(learnt.rstrip(" %"), 100 * row["sc on trained targets"], name)
-        estimates = ("sc", "95 % of sc"), ("sc within 4 x shortest", "95 % of that"), ("SPL", "95 % of SPL")
-        for cell, (figure, interval) in zip(cells, estimates, strict=True):
-            assert_shown(cell, row[figure], row[interval] or "", scale=100)
+    found = held_out_rows(section, rows_of(part)[1:])
     told = words_of(
         r"held-out SPL is higher \(([\d.]+) %, not ([\d.]+); a random walk ([\d.]+), a planner ([\d.]+)\)", RESULTS
     ).groups()

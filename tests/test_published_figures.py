@@ -129,7 +129,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
         assert all(abs(one - other) < 0.005 for one, other in pairs)
     success, *_, spl, ends = found[PLANNER, "1,500 frames"]
     low, high = map(float, numbers(ends))
-    row = f"| planner, 1,500 frames | {success:.0%} held-out | {spl:.0%} ({100 * low:.0f}-{high:.0%}) | | |"
+    row = f"| planner, 1,500 frames | {success:.0%} held-out | {spl:.0%} ({100 * low:.0f}-{high:.0%}) |"
     assert row.replace("%", " %").replace(" %)", ")") in RESULTS
     for steps in fig5.DISTANCES:
         (trial,) = {group.trial for group in fig5._groups(setting, steps)}

@@ -96,6 +96,20 @@ def check_ends(section: Section, page: str) -> None:
     assert told == set(recorded)
 
 
+def held_out_rows(section: Section, shown: Sequence[Sequence[str]]) -> dict[str, dict[str, Any]]:
+    """Figure 6's rows by what trained, or stands beside; those of a page's table, and no others, are as recorded."""
+    found = {str(row["targets a scene"] or row["learner"]): row for row in by_heading(section.tables[0])}
+    assert [row[0] for row in shown] == list(found)
+    for name, learnt, *cells in shown:
+        row = found[name]
+        if learnt:
+            assert_written(learnt.rstrip(" %"), 100 * row["sc on trained targets"], name)
+        estimates = ("sc", "95 % of sc"), ("sc within 4 x shortest", "95 % of that"), ("SPL", "95 % of SPL")
+        for cell, (figure, interval) in zip(cells, estimates, strict=True):
+            assert_shown(cell, row[figure], row[interval] or "", scale=100)
+    return found
+
+
 UNTRAINED = {"q-learning": "Q-learning", "bc": "behaviour cloning"}
 
 
