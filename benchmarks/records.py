@@ -24,34 +24,32 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from clearway.errors import ClearwayError
 from clearway.experiments.job import RUNS, TRIALS
 from clearway.experiments.reproduce import REQUEST_FILE
 from clearway.experiments.setting import SCENES
+from clearway.files import folder_written_whole, read_json, written_whole
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
+PROOF = {SCENES: "*.h5", RUNS: "run.json"}
+"""Files without which there is nothing of a part."""
 OF_A_RUN = ("run.json", "metrics.jsonl", f"{TRIALS}/*.json")
 
 
 def pack(folder: Path, record: Path, parts: Sequence[str] = (SCENES, RUNS)) -> None:
     """Write the record of parts of a reproduction's folder, the same bytes whenever it is the same."""
-    record.parent.mkdir(parents=True, exist_ok=True)
-    part = record.with_name(f"{record.name}.part")
-    with tarfile.open(part, "w:xz", preset=9) as archive:
+    with written_whole(record) as part, tarfile.open(part, "w:xz", preset=9) as archive:
         for path in sorted(_kept(folder, parts)):
             name = path.relative_to(folder).as_posix()
             _add(archive, name, _without_pictures(path) if path.suffix == ".h5" else _by_its_name(path, folder))
-    part.rename(record)
 
 
 def unpack(records: Sequence[Path], folder: Path) -> None:
     """Make the folder of one or more records, which must not be there yet; whole, or not at all."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as beside:
-        part = Path(beside) / folder.name
+    with folder_written_whole(folder) as part:
         for record in records:
             with tarfile.open(record, "r:xz") as archive:
                 archive.extractall(part, filter="data")
-        part.rename(folder)
 
 
 def _kept(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
@@ -82,6 +80,22 @@ def _without_pictures(path: Path) -> bytes:
         return bare.read_bytes()
 
 
+def _pack(folder: Path, record: Path, parts: Sequence[str]) -> None:
+    """As `pack`, with faults in one line."""
+    if not (folder / REQUEST_FILE).exists():
+        sys.exit(f"error: {folder}: no reproduction here. Name a folder that clearway reproduce made")
+    try:
+        if read_json(folder / REQUEST_FILE)["dumps"]:
+            sys.exit(f"error: {folder}: its scenes (--scenes) lie elsewhere, and no record holds them")
+        if lacking := [part for part in parts if not any((folder / part).rglob(PROOF[part]))]:
+            sys.exit(f"error: {folder}: holds no {' and no '.join(lacking)} to pack. Run its command first")
+        pack(folder, record, parts)
+    except (OSError, ValueError, KeyError, TypeError, ClearwayError) as error:
+        sys.exit(f"error: {error}. Name a folder that clearway reproduce made, and a place for its record")
+    except KeyboardInterrupt:
+        sys.exit("interrupted: nothing was packed")
+
+
 def main() -> None:
     """Pack or unpack."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -93,9 +107,7 @@ def main() -> None:
     if args.what == "pack":
         if len(args.source) != 1:
             sys.exit(f"error: {len(args.source)} folders for one record. Pack them one by one")
-        if not (args.source[0] / REQUEST_FILE).exists():
-            sys.exit(f"error: {args.source[0]}: no reproduction here. Name a folder that clearway reproduce made")
-        pack(args.source[0], args.made, (args.only,) if args.only else (SCENES, RUNS))
+        _pack(args.source[0], args.made, (args.only,) if args.only else (SCENES, RUNS))
     elif args.only:
         sys.exit("error: --only is for packing. Leave it out")
     elif args.made.exists():

@@ -1,7 +1,9 @@
 import json
 import re
 import shutil
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -358,6 +360,27 @@ def test_the_command_that_ends_last_reports_what_others_asked_for_meanwhile(
     monkeypatch.setattr(reproduce, "run_jobs", another_meanwhile)
     found = reproduce.reproduce(request)
     assert [section.name for section in found.sections] == ["fig3", "fig5"]
+
+
+def test_commands_that_begin_together_lose_nothing_of_each_other(
+    dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = ReproduceRequest(
+        names=("fig3",), out=tmp_path / "out", budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1
+    )
+    read = reproduce._with_earlier
+
+    def read_slowly(request: ReproduceRequest) -> ReproduceRequest:
+        found = read(request)
+        time.sleep(0.3)
+        return found
+
+    monkeypatch.setattr(reproduce, "_with_earlier", read_slowly)
+    monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
+    monkeypatch.setattr(reproduce, "_gathered", lambda request, setting: request.names)
+    with ThreadPoolExecutor(2) as both:
+        list(both.map(reproduce.reproduce, [request, replace(request, names=("fig5",))]))
+    assert json.loads((tmp_path / "out" / reproduce.REQUEST_FILE).read_text())["names"] == ["fig3", "fig5"]
 
 
 def test_features_of_rooms_depend_on_what_is_asked_for_not_on_what_is_there(

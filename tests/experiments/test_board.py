@@ -111,6 +111,9 @@ def test_a_line_says_how_many_runs_are_done_and_when_all_will_be() -> None:
     assert pace([STATES[0], STATES[2]]) == "runs: 1 of 2 done, 1 under way"  # evaluation is not told of
     assert pace([STATES[0], STATES[3]]) == "runs: 1 of 2 done, 0 under way"
     assert pace(STATES[3:]) == "runs: 0 of 1 done, 0 under way"
+    killed = RunState("e", "ppo", "waiting", 0, 800, 100.0, 2, 5, 8.0)  # it has figures, but no checkpoint
+    begun = RunState("f", "ppo", "training", 0, 800, None, 0, 5, None)
+    assert pace([killed, begun]) == "runs: 0 of 2 done, 1 under way"
 
 
 def test_each_kind_of_run_goes_on_at_its_own_pace() -> None:

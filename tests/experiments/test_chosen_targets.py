@@ -15,9 +15,9 @@ from clearway.experiments.groups import PAIR, all_jobs, compared
 from clearway.experiments.hard_targets import hard_targets, hardness
 from clearway.experiments.section import Claim
 from clearway.scenes.actions import BLOCKED, Action
-from clearway.scenes.floor_plans import FloorPlan
+from clearway.scenes.floor_plans import GENERATED, FloorPlan
 from clearway.scenes.plan_scenes import floor_plan_scene
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import Provenance, Scene
 from clearway.world.world import make_world
 from clearway.zones import Zone
 from helpers.made import corridor_scene, grid_scene
@@ -67,6 +67,16 @@ def test_hard_targets_lie_where_ways_lead() -> None:
     chosen = hard_targets(scene, 5)
     assert (scene.components[list(chosen.targets)] == 0).all() and (scene.components == 1).any()
     assert max(chosen.rank) <= (scene.components == 0).sum()
+
+
+def test_hard_targets_leave_out_what_is_held_out() -> None:
+    scene = grid_scene(3, width=9, depth=9, obstacle_share=0.1)
+    generated = replace(scene, made_by=Provenance(GENERATED, seed=0))
+    hardest = hard_targets(scene, scene.state_count // 4, apart_cells=0).targets
+    assert generated.held_out[list(hardest)].any()
+    chosen = hard_targets(generated, scene.state_count // 4, apart_cells=0)
+    assert not generated.held_out[list(chosen.targets)].any()
+    assert max(chosen.rank) == len(chosen.targets)  # among those that may be targets
 
 
 def test_hard_targets_are_written_once_and_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

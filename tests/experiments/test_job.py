@@ -7,7 +7,7 @@ import pytest
 
 from clearway.errors import RunError
 from clearway.experiments.groups import PAIR, all_jobs, compared
-from clearway.experiments.job import do, episodes_of, is_done, run_folder, unfinished
+from clearway.experiments.job import do, episodes_of, is_done, run_folder, trial_path, unfinished
 from clearway.experiments.plan import Job
 from clearway.experiments.trajectories import maps
 from clearway.learn import train
@@ -46,6 +46,22 @@ def test_a_job_that_is_done_is_left_alone(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(Trainer, "update", lambda self: pytest.fail("trains again"))
     do(tmp_path, job, threads=1)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json*")} == before
+
+
+def test_a_run_whose_weights_are_gone_begins_anew_with_all_its_trials(tmp_path: Path) -> None:
+    """As of a record, of which more is asked: no report shall mix two agents."""
+    job = made_job(tmp_path)
+    first = replace(job, trials=job.trials[:2])
+    do(tmp_path, first, threads=1)
+    folder = run_folder(tmp_path, job.run)
+    shutil.rmtree(folder.checkpoints)
+    shutil.rmtree(folder.path / "milestones")
+    before = [trial_path(tmp_path, job.run, trial) for trial in first.trials]
+    for path in before:
+        path.write_text("an agent that is no more")
+    assert is_done(tmp_path, first) and not is_done(tmp_path, job)
+    do(tmp_path, job, threads=1)
+    assert is_done(tmp_path, job) and all(path.read_text().startswith("{") for path in before)
 
 
 class OnSight:

@@ -143,13 +143,13 @@ def test_a_killed_command_leaves_no_worker_that_keeps_its_runs_locked(tmp_path: 
 
 
 def test_memory_limits_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(experiment_jobs, "_free_bytes", lambda: 3 * experiment_jobs.JOB_BYTES)
+    monkeypatch.setattr(experiment_jobs, "free_bytes", lambda: 3 * experiment_jobs.JOB_BYTES)
     with pytest.warns(UserWarning, match=r"3 runs side by side instead of 8: one may take 1 GB, 3\.0 are free"):
         assert affordable_workers(8, threads=1) == 3
     assert affordable_workers(2, threads=1) == 2
-    monkeypatch.setattr(experiment_jobs, "_free_bytes", lambda: 0)
+    monkeypatch.setattr(experiment_jobs, "free_bytes", lambda: 0)
     with pytest.warns(UserWarning, match="1 runs side by side instead of 8"):
         assert affordable_workers(8, threads=1) == 1
     assert affordable_workers(None, threads=1) == 1  # nothing to be told of
-    monkeypatch.setattr(experiment_jobs, "_free_bytes", lambda: None)
+    monkeypatch.setattr(experiment_jobs, "free_bytes", lambda: None)
     assert affordable_workers(8, threads=1) == 8

@@ -70,6 +70,18 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
             "its claim 'it is better' has a verdict, and neither p nor that it was counted",
         ),
         (
+            "Experiment(lambda s: [], drawn(claims=(Claim('it is better', 'Holds', 'seen', p=0.01),)))",
+            "its claim 'it is better' has verdict 'Holds' and p 0.01, expected one of holds, ",
+        ),
+        (
+            "Experiment(lambda s: [], drawn(claims=(Claim('it is better', 'holds', 'seen', p='0.01'),)))",
+            "its claim 'it is better' has verdict 'holds' and p '0.01', expected one of holds, .*from 0 to 1 or None",
+        ),
+        (
+            "Experiment(lambda s: [], drawn(claims=(Claim('it is better', 'holds', 'seen', p=float('nan')),)))",
+            "its claim 'it is better' has verdict 'holds' and p nan, expected one of holds, ",
+        ),
+        (
             "Experiment(lambda s: [], drawn(figures=(ReportFigure('a', 'A', 'x', 'y', ()),)))",
             "its figure 'a' has no series",
         ),

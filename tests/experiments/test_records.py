@@ -1,12 +1,13 @@
 """Records of a reproduction come to the report of the reproduction itself."""
 
+import json
 import runpy
 from pathlib import Path
 
 import pytest
 
 from clearway.errors import SceneError
-from clearway.experiments.reproduce import ReproduceRequest, gather, reproduce
+from clearway.experiments.reproduce import REQUEST_FILE, ReproduceRequest, gather, reproduce
 from clearway.scenes.thor_v1 import write_scene
 from helpers.small_setting import small_rooms
 
@@ -80,6 +81,9 @@ def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> N
         (("unpack", "nowhere.tar.xz", "new"), "nowhere.tar.xz'. Name records"),
         (("unpack", "no.tar.xz", "new"), "Name records of docs/records, and a new folder"),
         (("pack", ".", "new.tar.xz"), "no reproduction here"),
+        (("pack", "elsewhere", "new.tar.xz"), r"elsewhere: its scenes \(--scenes\) lie elsewhere"),
+        (("pack", "empty", "new.tar.xz"), "empty: holds no scenes and no runs to pack"),
+        (("pack", "damaged", "new.tar.xz"), "Name a folder that clearway reproduce made"),
         (("unpack", "no.tar.xz", "."), "is there already"),
     ],
 )
@@ -87,9 +91,13 @@ def test_what_is_no_record_is_refused_and_leaves_nothing(
     words: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "no.tar.xz").write_text("no archive")
+    for name, content in (("elsewhere", {"dumps": ["hall.h5"]}), ("empty", {"dumps": []}), ("damaged", {})):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / REQUEST_FILE).write_text(json.dumps(content))
+    before = sorted(tmp_path.rglob("*"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["records.py", *words])
     with pytest.raises(SystemExit, match=said) as refusal:
         RECORDS["main"]()
     assert str(refusal.value).startswith("error: ") and str(refusal.value).count("\n") == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["no.tar.xz"]
+    assert sorted(tmp_path.rglob("*")) == before

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
@@ -47,6 +48,15 @@ def interval_figure(count: int) -> ReportFigure:
     x = list(map(float, range(count)))
     curve = Series("agent", x, x, [value - 1 for value in x], [value + 2 for value in x])
     return ReportFigure("f", "title", "targets", "success score", (curve,), band="95 % intervals")
+
+
+def test_a_mean_that_rounding_puts_beside_its_interval_is_drawn(tmp_path: Path) -> None:
+    share = 894 / 895
+    mean = float(np.mean([share] * 3))
+    assert mean < share
+    figure = ReportFigure("f", "title", "x", "y", (Series("map", [0, 1], [mean, 1.0], [share, 1.0], [share, 1.0]),))
+    draw_report_figure(figure, tmp_path / "f.png")
+    assert (tmp_path / "f.png").stat().st_size > 0
 
 
 def test_intervals_at_few_points_are_bars(tmp_path: Path, drawn: list[Figure]) -> None:

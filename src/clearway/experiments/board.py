@@ -147,7 +147,7 @@ def _slowness(states: Sequence[RunState]) -> dict[str, float]:
     frames: dict[str, int] = defaultdict(int)
     seconds: dict[str, float] = defaultdict(float)
     for state in states:
-        if state.frames_per_s:
+        if state.frames_per_s and state.frames:  # who waits may have figures, but no checkpoint
             frames[state.kind] += state.frames
             seconds[state.kind] += state.frames / state.frames_per_s
     return {kind: seconds[kind] / count for kind, count in frames.items()}

@@ -4,7 +4,7 @@ A state's hardness is the expected number of steps that a random walk needs to r
 share of collision poses among those that the shortest paths to it arrive at (the optimal policy of the shortest-path
 reward, ties taken alike, mean over all starts). Targets are taken from the hardest down, of equal ones the smaller
 state first, each at least 4 cells from those already taken (Chebyshev distance on the grid); where fewer than 5 fit,
-the distance is lowered cell by cell.
+the distance is lowered cell by cell. Of generated scenes poses that are held out are none.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from clearway.evaluation.oracle import expected, make_task, optimal_policy
 from clearway.reward import SHORTEST
 from clearway.scenes.actions import ACTION_COUNT
 from clearway.scenes.scene import Scene
-from clearway.scenes.targets import TARGETS_PER_SCENE
+from clearway.scenes.targets import TARGETS_PER_SCENE, possible_targets
 from clearway.zones import scene_zones
 
 APART_CELLS = 4
@@ -31,7 +31,7 @@ class HardTargets:
     Attributes:
         targets: states, ascending.
         hardness: of each.
-        rank: of each among the states of the largest component, 1 for the hardest.
+        rank: of each among the states that may be targets, 1 for the hardest.
         apart_cells: by which all of them lie apart.
     """
 
@@ -68,7 +68,7 @@ def hard_targets(scene: Scene, count: int = TARGETS_PER_SCENE, apart_cells: int 
     """The hardest states of a scene by the rule above."""
     values = hardness(scene)
     order = np.argsort(-values, kind="stable")
-    order = order[scene.components[order] == 0]  # from elsewhere no way leads there
+    order = order[np.isin(order, possible_targets(scene))]  # from elsewhere no way leads there; others are held out
     cells = np.rint(scene.locations_m / scene.cell_size_m).astype(np.int64)
     taken: list[int] = []
     apart = apart_cells

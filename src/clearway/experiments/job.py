@@ -6,6 +6,7 @@ is, so a job that was interrupted goes on from its last checkpoint.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -55,7 +56,7 @@ def unfinished(out: Path, jobs: Iterable[Job]) -> tuple[str, ...]:
 
 
 def do(out: Path, job: Job, threads: int) -> None:
-    """Train the run, or what is left of it, and walk its missing trials.
+    """Train the run, or what is left of it, and walk its missing trials; of a run that begins anew, all.
 
     Raises:
         ClearwayError: a scene is missing or has changed, or training failed.
@@ -63,7 +64,10 @@ def do(out: Path, job: Job, threads: int) -> None:
     set_threads(threads)
     run = job.run
     request = request_of(run)
-    folder = train(request, run_folder(out, run).path, resume=True, milestones=(run.halfway,))
+    own = run_folder(out, run)
+    if not checkpoints(own.checkpoints):  # of a record, for example: what an agent did that is no more
+        shutil.rmtree(own.path / TRIALS, ignore_errors=True)
+    folder = train(request, own.path, resume=True, milestones=(run.halfway,))
     for trial in job.trials:
         path = trial_path(out, run, trial)
         if path.exists():

@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from clearway.errors import RunError
+from clearway.experiments.free_memory import free_bytes
 from clearway.experiments.job import do, run_folder
 from clearway.experiments.plan import Job
 from clearway.learn.run_folder import METRICS_FILE
@@ -30,21 +31,12 @@ def affordable_workers(wanted: int | None, threads: int) -> int:
         UserWarning: memory holds fewer than were wanted.
     """
     asked = wanted or max(1, core_count() // threads)
-    free = _free_bytes()
+    free = free_bytes()
     found = asked if free is None else max(1, min(asked, free // JOB_BYTES))
     if free is not None and wanted is not None and found < wanted:
         each = f"one may take {JOB_BYTES / 1e9:g} GB, {free / 1e9:.1f} are free"
         warnings.warn(f"{found} runs side by side instead of {wanted}: {each}", stacklevel=2)
     return found
-
-
-def _free_bytes() -> int | None:
-    """Memory that new processes can have; None where the system does not say."""
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-    except OSError:
-        return None
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")), None)
 
 
 def run_jobs(

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import get_args
 
 from clearway.errors import ClearwayError, PluginError, kind_and_reason
 from clearway.experiments.experiment import Experiment
 from clearway.experiments.plan import Job
-from clearway.experiments.section import Claim, ReportFigure, ReportMap, ReportTable, Section
+from clearway.experiments.section import Claim, ReportFigure, ReportMap, ReportTable, Section, Verdict
 from clearway.experiments.setting import Setting
 from clearway.plugins import Plugin, load_plugin
 from clearway.scenes.parts import is_name
@@ -63,6 +64,10 @@ def _fault(section: object, name: str, scenes: Sequence[str]) -> str:
         return f"its section has {others[0]!r:.60} where a text is expected"
     if wrong := [part.name for part in (*section.tables, *section.pictures) if not is_name(part.name)]:
         return f"no file can be called {wrong[0]!r:.60}, as a table or figure is"
+    verdicts = get_args(Verdict)
+    if odd := [claim for claim in section.claims if claim.verdict not in verdicts or not _is_share(claim.p)]:
+        told = f"its claim {odd[0].text!r:.60} has verdict {odd[0].verdict!r:.40} and p {odd[0].p!r:.40}"
+        return f"{told}, expected one of {', '.join(verdicts)}, and from 0 to 1 or None"
     if bare := [claim.text for claim in section.claims if claim.verdict != "undecided" and not claim.judged]:
         return f"its claim {bare[0]!r:.60} has a verdict, and neither p nor that it was counted"
     if empty := [figure.name for figure in section.figures if not figure.series]:
@@ -70,6 +75,11 @@ def _fault(section: object, name: str, scenes: Sequence[str]) -> str:
     if strange := [shown.scene for shown in section.maps if shown.scene not in scenes]:
         return f"it has a map of {strange[0]!r:.60}, expected one of {', '.join(scenes)}"
     return ""
+
+
+def _is_share(p: object) -> bool:
+    """It is None, or a number from 0 to 1."""
+    return p is None or (isinstance(p, float | int) and 0 <= p <= 1)
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting, changed_learners, prepare
-from clearway.files import read_json, written_whole
+from clearway.files import locked, read_json, written_whole
 from clearway.torch_threads import torch_threads
 
 
@@ -106,7 +106,8 @@ def reproduce(
     """
     setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
-    with written_whole(request.out / REQUEST_FILE) as part:
+    kept = request.out / REQUEST_FILE
+    with locked(kept), written_whole(kept) as part:  # none of two that begin together is lost
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
     left = [job for job in jobs if not is_done(request.out, job)]
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)

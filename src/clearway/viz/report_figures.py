@@ -49,8 +49,8 @@ def draw_report_figure(figure: ReportFigure, path: Path) -> None:
             if series.low is None or series.high is None:
                 continue
             if few:
-                ends = [[y - low for y, low in zip(series.y, series.low, strict=True)],
-                        [high - y for y, high in zip(series.y, series.high, strict=True)]]  # fmt: skip
+                ends = [[max(0.0, y - low) for y, low in zip(series.y, series.low, strict=True)],
+                        [max(0.0, high - y) for y, high in zip(series.y, series.high, strict=True)]]  # fmt: skip
                 axes.errorbar(series.x, series.y, yerr=ends, fmt="none", ecolor=style.colour, capsize=3, linewidth=1)
             else:
                 axes.fill_between(series.x, series.low, series.high, color=style.colour, alpha=0.15, linewidth=0)

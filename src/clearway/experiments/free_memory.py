@@ -1,0 +1,52 @@
+"""How much memory new processes can have: the machine's, or what its container or group leaves them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+GROUPS = Path("sys/fs/cgroup")
+CACHED = "inactive_file"  # of what a group uses, given back where it is needed
+
+
+def free_bytes(root: Path = Path("/")) -> int | None:
+    """Memory that new processes can have; None where the system does not say.
+
+    Args:
+        root: of the file system that tells it.
+    """
+    found = [*_of_machine(root), *_of_groups(root)]
+    return max(0, min(found)) if found else None
+
+
+def _of_machine(root: Path) -> Iterator[int]:
+    with suppress(OSError, ValueError):
+        kib = _named(root / "proc/meminfo")["MemAvailable:"]
+        yield kib * 1024
+
+
+def _of_groups(root: Path) -> Iterator[int]:
+    """What is left of the limits of the process's control groups, of version 2 and of version 1."""
+    own = ""
+    with suppress(OSError):
+        for line in (root / "proc/self/cgroup").read_text().splitlines():
+            own = line.removeprefix("0::/") if line.startswith("0::/") else own
+    place = root / GROUPS / own
+    for folder in (place, *place.parents):
+        if not folder.is_relative_to(root / GROUPS):
+            break
+        yield from _left(folder, "memory.max", "memory.current")
+    yield from _left(root / GROUPS / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes")
+
+
+def _left(folder: Path, limit: str, used: str) -> Iterator[int]:
+    """What a group's limit leaves; nothing where it has none ("max")."""
+    with suppress(OSError, ValueError):
+        most, now = (int((folder / name).read_text()) for name in (limit, used))
+        yield most - now + _named(folder / "memory.stat").get(CACHED, 0)
+
+
+def _named(path: Path) -> dict[str, int]:
+    """The numbers of a file of lines such as "name 5" or "name 5 kB". Raises OSError, ValueError."""
+    return {words[0]: int(words[1]) for line in path.read_text().splitlines() if len(words := line.split()) > 1}
