@@ -222,13 +222,19 @@ def check_held_out(section: Section) -> None:
     assert all(min(ends_of(found[str(count)]["95 % of sc"])) < found["random walk"]["sc"] for count in fig6.TRAINED)
     better = section.claims[-1].numbers["probability of improvement"]
     assert f"with a probability of {better.value:.2f} ({'-'.join(f'{end:.2f}' for end in better.interval)})" in part
+    rows = by_heading(section.tables[1])
+    few, many = (
+        [row["spl"] for row in rows if (row["targets a scene"], row["scene"]) == (count, "kitchen")]
+        for count in (5, 45)
+    )
+    assert len(few) == len(many) == 25 and sum(many) < sum(few) and "in the kitchen it falls" in part
     carrying = re.findall(r"(\w+(?: room)?) (\d+): (\d+) to (\d+) %", part)
     assert len(carrying) == 2
     for room, target, *shares in carrying:
         for share, count in zip(shares, (5, 45), strict=True):
             own = [
                 row["spl"]
-                for row in by_heading(section.tables[1])
+                for row in rows
                 if (row["targets a scene"], row["scene"], row["target"]) == (count, room.replace(" ", "_"), int(target))
             ]
             assert len(own) == 5

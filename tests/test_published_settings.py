@@ -265,6 +265,8 @@ def check_bedroom(sections: Mapping[str, Section], setting: Setting, lines: list
     estimate = mean_estimate(frames, ONE_TARGET)
     assert_shown(told, estimate.value, str(estimate.ends))
     assert count == f"{ran} of 5"
+    least, most = (f"{end / 1e6:.2f}" for end in (frames.min(), frames.max()))
+    assert f"four of five, after {least} to {most} M frames; the fifth fails a target" in EVIDENCE and ran == 4
 
 
 def check_time_in_the_bedroom(section: Section, setting: Setting) -> None:
