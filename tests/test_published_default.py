@@ -224,7 +224,7 @@ def check_held_out(section: Section) -> None:
     assert f"with a probability of {better.value:.2f} ({'-'.join(f'{end:.2f}' for end in better.interval)})" in part
     rows = by_heading(section.tables[1])
     few, many = (
-        [row["spl"] for row in rows if (row["targets a scene"], row["scene"]) == (count, "kitchen")]
+        [row["spl"] for row in rows if row["targets a scene"] == count and row["scene"] == "kitchen"]
         for count in (5, 45)
     )
     assert len(few) == len(many) == 25 and sum(many) < sum(few) and "in the kitchen it falls" in part
