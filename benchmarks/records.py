@@ -6,8 +6,8 @@
     python benchmarks/records.py pack reproduction docs/records/runs.tar.xz --only runs
     python benchmarks/records.py unpack docs/records/rooms.tar.xz docs/records/runs.tar.xz again
 
-Kept are settings, metrics and every episode of every run, and the scenes but for their pictures; not the weights, nor
-where the folder lay.
+Kept are settings, metrics and every episode of every run, and the scenes, given ones too, but for their pictures; not
+the weights, nor where the folder lay.
 Of unpacked records a report is made as of the folder itself; nothing is trained.
 """
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
 import lzma
 import re
 import sys
@@ -29,19 +30,32 @@ from clearway.experiments.job import RUNS, TRIALS
 from clearway.experiments.reproduce import REQUEST_FILE
 from clearway.experiments.setting import SCENES
 from clearway.files import folder_written_whole, read_json, written_whole
+from clearway.scenes.scene_files import SCENE_SUFFIXES
 from clearway.scenes.thor_v1 import read_scene, write_scene
 
-PROOF = {SCENES: "*.h5", RUNS: "run.json"}
-"""Files without which there is nothing of a part."""
+GIVEN = f"{SCENES}/given"
+"""Where scenes that were given lie in a record."""
 OF_A_RUN = ("run.json", "metrics.jsonl", f"{TRIALS}/*.json")
 
 
 def pack(folder: Path, record: Path, parts: Sequence[str] = (SCENES, RUNS)) -> None:
-    """Write the record of parts of a reproduction's folder, the same bytes whenever it is the same."""
+    """Write the record of parts of a reproduction's folder, the same bytes whenever it is the same.
+
+    Scenes that were given (`--scenes`), wherever they lie, are kept, too.
+    """
+    given = {f"{GIVEN}/{path.name}": path for path in _given(folder)}
+    files = {path.relative_to(folder).as_posix(): path for path in _kept(folder, parts)}
+    files |= given if SCENES in parts else {}
+    places = [folder, *dict.fromkeys(path.parent for path in given.values())]
     with written_whole(record) as part, tarfile.open(part, "w:xz", preset=9) as archive:
-        for path in sorted(_kept(folder, parts)):
-            name = path.relative_to(folder).as_posix()
-            _add(archive, name, _without_pictures(path) if path.suffix == ".h5" else _by_its_name(path, folder))
+        for name, path in sorted(files.items()):
+            if path.suffix in SCENE_SUFFIXES:
+                content = _without_pictures(path)
+            elif name == REQUEST_FILE and given:
+                content = _by_its_name(json.dumps(read_json(path) | {"dumps": [*given]}, indent=2).encode(), places)
+            else:
+                content = _by_its_name(path.read_bytes(), places)
+            _add(archive, name, content)
 
 
 def unpack(records: Sequence[Path], folder: Path) -> None:
@@ -67,9 +81,15 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
     archive.addfile(entry, io.BytesIO(content))
 
 
-def _by_its_name(path: Path, folder: Path) -> bytes:
-    """What a file holds, without where on this machine the folder and the command lie."""
-    content = path.read_bytes().replace(f"{folder.resolve().parent}/".encode(), b"")
+def _given(folder: Path) -> list[Path]:
+    """The scenes that the reproduction was given."""
+    return [Path(path) for path in read_json(folder / REQUEST_FILE)["dumps"]]
+
+
+def _by_its_name(content: bytes, places: Sequence[Path]) -> bytes:
+    """What a file holds, without where on this machine some folders and the command lie."""
+    for place in places:
+        content = content.replace(f"{place.resolve().parent}/".encode(), b"")
     return re.sub(rb'"/[^"]*/clearway"', b'"clearway"', content)
 
 
@@ -85,9 +105,11 @@ def _pack(folder: Path, record: Path, parts: Sequence[str]) -> None:
     if not (folder / REQUEST_FILE).exists():
         sys.exit(f"error: {folder}: no reproduction here. Name a folder that clearway reproduce made")
     try:
-        if read_json(folder / REQUEST_FILE)["dumps"]:
-            sys.exit(f"error: {folder}: its scenes (--scenes) lie elsewhere, and no record holds them")
-        if lacking := [part for part in parts if not any((folder / part).rglob(PROOF[part]))]:
+        given = _given(folder)
+        if len({path.name for path in given}) < len(given):
+            sys.exit(f"error: {folder}: two of its scenes' files have one name. Rename one, and run its command again")
+        here = {SCENES: [*given, *(folder / SCENES).rglob("*.h5")], RUNS: [*(folder / RUNS).glob("*/run.json")]}
+        if lacking := [part for part in parts if not here[part]]:
             sys.exit(f"error: {folder}: holds no {' and no '.join(lacking)} to pack. Run its command first")
         pack(folder, record, parts)
     except (OSError, ValueError, KeyError, TypeError, ClearwayError) as error:

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from clearway.errors import RunError
 from clearway.experiments import (
     ablations,
+    across_rooms,
     analysis,
     fig3,
     fig4,
@@ -44,6 +45,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "zone-time": Experiment(zone_time.jobs, zone_time.section),
     "zone-levels": Experiment(zone_levels.jobs, zone_levels.section),
     "ablations": Experiment(ablations.jobs, ablations.section),
+    "across-rooms": Experiment(across_rooms.jobs, across_rooms.section),
     "off-grid": Experiment(off_grid.jobs, off_grid.section),
 }
 """Ours. A program may add its own, which it alone knows then; what a package offers, every command knows."""

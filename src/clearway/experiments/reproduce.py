@@ -132,7 +132,7 @@ def _read_request(out: Path) -> ReproduceRequest:
     path = out / REQUEST_FILE
     try:
         content = read_json(path)
-        dumps = [Path(dump) for dump in content.pop("dumps")]
+        dumps = [out / dump for dump in content.pop("dumps")]  # a record's lie in the folder
         return _checked(ReproduceRequest(out=out, dumps=dumps, **content))
     except (FileNotFoundError, NotADirectoryError) as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error

@@ -1,0 +1,124 @@
+"""An agent for each room, and verdicts over rooms."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clearway.evaluation.metrics import METRIC_NAMES
+from clearway.experiments import across_rooms
+from clearway.experiments.across_rooms import InRoom
+from clearway.experiments.correction import corrected
+from clearway.experiments.groups import Scores
+from clearway.experiments.job import episodes_of
+from clearway.experiments.reproduce import planned
+from clearway.experiments.section import Claim
+from clearway.experiments.setting import Setting
+from helpers.report_tables import by_heading
+from helpers.small_setting import FRAMES, do_here, small_setting
+
+
+@pytest.fixture
+def setting(tmp_path: Path) -> Setting:
+    """Two rooms, one learner, two seeds."""
+    setting = small_setting(tmp_path)
+    return replace(setting, learners={"paper": setting.learners["paper"]})
+
+
+def test_every_room_has_agents_of_its_own(setting: Setting) -> None:
+    jobs = planned(setting, [across_rooms.NAME])
+    assert [job.run.scenes for job in jobs] == [(file,) for file in setting.files for _ in range(4)]
+    assert {job.run.reward.name for job in jobs} == {"shortest", "collision-aware"}
+    do_here(setting.out, jobs, threads=1)
+    section = across_rooms.section(setting)
+    rows = by_heading(section.tables[0])
+    assert [(row["room"], row["agent"], row["seeds"]) for row in rows] == [
+        (room, agent, 2) for room in ("bathroom", "kitchen") for agent in ("shortest", "collision-aware")
+    ]
+    for row in rows:
+        own = [job for job in jobs if (job.run.scenes[0].name, job.run.reward.name) == (row["room"], row["agent"])]
+        tables = [episodes_of(setting.out, job.run, job.trials[0]) for job in own]
+        assert row["steps"] == pytest.approx(np.mean([table.steps.mean() for table in tables if table is not None]))
+        assert row["frames until settled"] == FRAMES and row["settled"] == 0
+    assert rows[0]["random walk's steps"] == rows[1]["random walk's steps"] > rows[0]["shortest path"] > 1
+    (figure,) = section.figures
+    assert figure.series[0].y == (1, 1) and len(set(figure.series[0].x)) == 2
+    assert {claim.verdict for claim in section.claims} == {"undecided"}
+    assert all("Fewer than 6 rooms decide nothing" in claim.evidence and claim.p is None for claim in section.claims)
+
+
+def test_before_anything_has_run_there_are_rows_without_figures(setting: Setting) -> None:
+    section = across_rooms.section(setting)
+    assert [row["seeds"] for row in by_heading(section.tables[0])] == [0] * 4 and not section.figures
+    assert {claim.evidence for claim in section.claims} == {"No complete runs."}
+
+
+Rooms = Sequence[tuple[float, float, float, float]]
+"""Of each room: frames, collisions, steps, and the share of episodes that arrive."""
+
+
+@pytest.fixture
+def judged(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[[Rooms, Rooms], list[Claim]]:
+    """The claims, in their order, where rooms come to such figures, of the collision-aware agents first."""
+
+    def in_room(frames: float, collisions: float, steps: float, arrive: float) -> InRoom:
+        values = np.ones((1, 5, len(METRIC_NAMES)))
+        for name, value in (("collisions", collisions), ("steps", steps), ("success", arrive)):
+            values[:, :, METRIC_NAMES.index(name)] = value
+        return InRoom(Scores((0,), values), np.array([[frames]]), 1)
+
+    def claims(ours: Rooms, theirs: Rooms) -> list[Claim]:
+        rooms = [
+            {"shortest": in_room(*other), "collision-aware": in_room(*own)}
+            for own, other in zip(ours, theirs, strict=True)
+        ]
+        left = iter(rooms)
+        several = replace(setting, **{name: getattr(setting, name)[:1] * len(rooms) for name in ("files", "scenes")})
+        several = replace(several, targets=setting.targets[:1] * len(rooms))
+        monkeypatch.setattr(across_rooms, "_in_room", lambda room: {"paper": next(left)})
+        return list(corrected(across_rooms.section(several)).claims)
+
+    return claims
+
+
+BASELINE = [(size, 0.2, size / 100, 1.0) for size in (200.0, 900.0, 4_000.0, 1_500.0, 700.0, 3_000.0, 1_100.0, 500.0)]
+
+
+def test_what_every_room_shows_holds_however_rooms_differ(judged) -> None:
+    ours = [(0.7 * frames, 0.1, steps, arrive) for frames, _, steps, arrive in BASELINE]
+    found = judged(ours, BASELINE)
+    assert [claim.verdict for claim in found] == ["holds"] * 3
+    assert found[0].numbers["ratio"].value == pytest.approx(0.7)
+    one_more = 1 / (5 * 3)  # episodes of a room
+    assert found[1].numbers["ratio"].value == pytest.approx((0.1 + one_more) / (0.2 + one_more))
+    assert "it lies below 1 in 8 of 8 rooms" in found[0].evidence and "below 1.02 in 8 of 8" in found[2].evidence
+    back = judged(BASELINE, ours)
+    assert [claim.verdict for claim in back] == ["does not hold", "does not hold", "holds"]
+
+
+def test_where_rooms_disagree_it_is_undecided(judged) -> None:
+    ours = [
+        (frames * (0.6 if number % 2 else 1.5), 0.2, steps * (0.9 if number % 2 else 1.2), 1.0)
+        for number, (frames, _, steps, _) in enumerate(BASELINE)
+    ]
+    assert [claim.verdict for claim in judged(ours, BASELINE)] == ["undecided"] * 3
+
+
+def test_no_more_steps_allows_two_percent(judged) -> None:
+    for share, verdict in ((1.01, "holds"), (1.05, "does not hold")):
+        ours = [(*room[:2], share * room[2], 1.0) for room in BASELINE]
+        assert judged(ours, BASELINE)[2].verdict == verdict
+
+
+def test_agents_that_arrive_less_often_win_nothing(judged) -> None:
+    ours = [(0.7 * frames, 0.0, steps, 0.97) for frames, _, steps, _ in BASELINE]
+    found = judged(ours, BASELINE)
+    assert [claim.verdict for claim in found] == ["undecided"] * 3
+    assert all("97.00%, 100.00%, so that the figures compare different episodes" in claim.evidence for claim in found)
+
+
+def test_five_rooms_decide_nothing(judged) -> None:
+    ours = [(0.5 * frames, 0.0, steps, 1.0) for frames, _, steps, _ in BASELINE[:5]]
+    assert {claim.verdict for claim in judged(ours, BASELINE[:5])} == {"undecided"}
