@@ -37,6 +37,10 @@ def test_what_counts_as_equal_is_taken_off() -> None:
     assert sign_flip_p(ROOMS, ROOMS, allowed=1.02) == 2 / 2**6
 
 
+def test_up_to_sixteen_rooms_it_is_exact() -> None:
+    assert sign_flip_p(np.ones(16), np.full(16, 2.0)) == 2 / 2**16
+
+
 def test_of_many_rooms_signs_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(3)
     rooms = np.exp(rng.normal(0.2, 0.4, 12))

@@ -46,15 +46,17 @@ def test_every_room_has_agents_of_its_own(setting: Setting) -> None:
     (figure,) = section.figures
     assert figure.series[0].y == (1, 1) and len(set(figure.series[0].x)) == 2
     assert {claim.verdict for claim in section.claims} == {"undecided"}
-    assert all("Fewer than 6 rooms decide nothing" in claim.evidence and claim.p is None for claim in section.claims)
+    assert all("2 of 2 rooms are complete" in claim.evidence and claim.p is None for claim in section.claims)
+    assert [{job.run.seed for job in jobs if job.run.scenes == (file,)} for file in setting.files] == [{0, 1}, {2, 3}]
 
 
 def test_before_anything_has_run_there_are_rows_without_figures(setting: Setting) -> None:
     section = across_rooms.section(setting)
     assert [row["seeds"] for row in by_heading(section.tables[0])] == [0] * 4 and not section.figures
-    assert {claim.evidence for claim in section.claims} == {"No complete runs."}
+    assert all(claim.evidence.startswith("0 of 2 rooms are complete. Nothing is dec") for claim in section.claims)
 
 
+CENSORED = 1e6
 Rooms = Sequence[tuple[float, float, float, float]]
 """Of each room: frames, collisions, steps, and the share of episodes that arrive."""
 
@@ -67,7 +69,7 @@ def judged(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[[Rooms
         values = np.ones((1, 5, len(METRIC_NAMES)))
         for name, value in (("collisions", collisions), ("steps", steps), ("success", arrive)):
             values[:, :, METRIC_NAMES.index(name)] = value
-        return InRoom(Scores((0,), values), np.array([[frames]]), 1)
+        return InRoom(Scores((0,), values), np.array([[frames]]), int(frames < CENSORED), 1)
 
     def claims(ours: Rooms, theirs: Rooms) -> list[Claim]:
         rooms = [
@@ -114,9 +116,35 @@ def test_no_more_steps_allows_two_percent(judged) -> None:
 
 def test_agents_that_arrive_less_often_win_nothing(judged) -> None:
     ours = [(0.7 * frames, 0.0, steps, 0.97) for frames, _, steps, _ in BASELINE]
+    settles, *others = judged(ours, BASELINE)
+    assert settles.verdict == "holds"  # a run that misses a target has not settled: that is counted
+    assert [claim.verdict for claim in others] == ["undecided"] * 2
+    assert all("97.00%, 100.00%, so that the figures compare different episodes" in claim.evidence for claim in others)
+
+
+def test_one_lost_target_of_many_is_told_and_does_not_decide(judged) -> None:
+    ours = [(0.7 * frames, 0.1, steps, 1.0) for frames, _, steps, _ in BASELINE]
+    ours[0] = (*ours[0][:2], 2_000.0, 0.999)
     found = judged(ours, BASELINE)
-    assert [claim.verdict for claim in found] == ["undecided"] * 3
-    assert all("97.00%, 100.00%, so that the figures compare different episodes" in claim.evidence for claim in found)
+    assert [claim.verdict for claim in found] == ["holds", "holds", "undecided"]  # one room with a thousandfold
+    assert "(median 1)" in found[2].evidence and "Failed targets, over all seeds: 5 of 40, 0 of 40" in found[2].evidence
+
+
+def test_rooms_that_neither_settles_say_nothing_and_stay_in(judged) -> None:
+    rooms = [(CENSORED, 0.0, 10.0, 1.0)] * 3 + BASELINE[3:]
+    ours = [*rooms[:3], *((0.5 * frames, 0.0, steps, 1.0) for frames, _, steps, _ in rooms[3:])]
+    found = judged(ours, rooms)
+    assert found[0].numbers["ratio"].value == pytest.approx(0.5 ** (5 / 8))
+    assert "it lies below 1 in 5 of 8 rooms" in found[0].evidence
+    assert found[1].numbers["ratio"].interval is not None  # though nobody collides in three
+
+
+def test_while_a_room_lacks_runs_nothing_is_decided(judged, monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = [(0.5 * frames, 0.0, steps, 1.0) for frames, _, steps, _ in BASELINE]
+    monkeypatch.setattr(across_rooms, "_complete", lambda rooms: list(range(len(rooms) - 1)))
+    found = judged(ours, BASELINE)
+    assert {(claim.verdict, claim.p) for claim in found} == {("undecided", None)}
+    assert all(claim.evidence.startswith("7 of 8 rooms are complete") for claim in found)
 
 
 def test_five_rooms_decide_nothing(judged) -> None:
