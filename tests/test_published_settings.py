@@ -27,6 +27,7 @@ from helpers.published import (
     assert_written,
     check_beside,
     check_ends,
+    held_out_rows,
     numbers,
     rows_of,
     seconds_of_runs,
@@ -379,6 +380,31 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
     early, late = settled["paper, unclipped", "shortest"], settled["paper", "collision-aware"]
     assert early.max() < late.min()
     assert f"settles sooner ({early.mean():,.0f} frames)" in RESULTS
+
+
+@pytest.mark.slow
+def test_figure_6_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> None:
+    unpack("fig6-bathroom", tmp_path / "fig6")
+    (section,) = gather(tmp_path / "fig6").sections
+    assert section.name == "fig6" and not section.missing
+    page = section_of(EVIDENCE, "Figure 6: more training targets").partition("**Seeds 0 to 4**")[0]
+    tables = [rows_of(part) for part in page.split("\n\n") if part.startswith("| ")]
+    shown, judged = (rows[1:] for rows in tables)
+    found = held_out_rows(section, shown)
+    assert len(judged) == len(section.claims) == 2
+    for claim, (text, verdict, own, other, apart, p, corrected) in zip(section.claims, judged, strict=True):
+        assert text == claim.text.removeprefix("paper: ")
+        assert_judged(claim, verdict, p, corrected, own, other, apart)
+    lines = rows_of(section_of(RESULTS, "Unseen targets"))
+    for begin, name in (("5 trained targets", "5"), ("45", "45"), ("random walk", "random walk")):
+        ((_, success, spl),) = [line for line in lines if line[0] == begin]
+        *trained, held_out = success.removesuffix(" held-out").split(", ")
+        assert_shown(held_out, found[name]["sc"], found[name]["95 % of sc"] or "", scale=100)
+        assert_shown(spl, found[name]["SPL"], found[name]["95 % of SPL"] or "", scale=100)
+        for one in trained:
+            assert_written(one.rstrip(" %"), 100 * found[name]["sc on trained targets"], name)
+    seconds = seconds_of_runs(tmp_path / "fig6")
+    assert len(seconds) == 25 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
 
 
 @pytest.mark.slow

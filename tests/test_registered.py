@@ -40,6 +40,7 @@ ASKED_FIRST = {
     ("bedroom-fresh", "bc-"): {59},
     ("bedroom-fresh", "q-learning-"): {59},
     ("four-rooms-default", ""): {64, 65},
+    ("four-rooms-longer", ""): {37},
     ("four-rooms-zones", ""): {66},
     ("hard-bathroom", ""): {58},
     ("shuffles-bathroom", ""): {61, 62},
