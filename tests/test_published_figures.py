@@ -110,7 +110,7 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
     held_out = fig6.held_out_targets(setting)
     (group,) = tried(setting, (COLLISION_AWARE,), held_out)
     scenes = setting.world(held_out).target_scene.numpy()
-    part = section_of(EVIDENCE, "Figure 6: more training targets").splitlines()
+    part = section_of(EVIDENCE, "Figure 6: more training targets").partition("**Seeds 0 to 4**")[2].splitlines()
     shown, found = 0, {}
     for mapped in on_maps(setting, group.trial, (fig6.FEW_A_POSE, MOST_A_POSE)):
         cells = Tried(mapped.scores, scenes).cells()
@@ -127,10 +127,6 @@ def check_targets_that_maps_were_not_given(setting: Setting) -> None:
     for frames in ("1,500 frames", "11,600 frames"):
         pairs = zip(found[PLANNER, frames][::2], found[NEAREST, frames][::2], strict=True)
         assert all(abs(one - other) < 0.005 for one, other in pairs)
-    success, *_, spl, ends = found[PLANNER, "1,500 frames"]
-    low, high = map(float, numbers(ends))
-    row = f"| planner, 1,500 frames | {success:.0%} held-out | {spl:.0%} ({100 * low:.0f}-{high:.0%}) |"
-    assert row.replace("%", " %").replace(" %)", ")") in RESULTS
     for steps in fig5.DISTANCES:
         (trial,) = {group.trial for group in fig5._groups(setting, steps)}
         for mapped in on_maps(setting, trial):
