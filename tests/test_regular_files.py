@@ -130,7 +130,6 @@ BESIDE = {
     ("library.py", "source.read_bytes()"): "the package's own code",
     ("content.py", "file.read_bytes()"): "the package's own page",
     ("server.py", "path.read_bytes()"): "a film, written just before into a folder of our own",
-    ("jobs.py", "Path('/proc/meminfo').read_text()"): "the system's, which is no regular file in size or kind",
     ("provenance.py", "CPU_INFO.read_text(encoding='utf-8', errors='replace')"): "the system's",
     ("checkpoint.py", "os.open(path, os.O_RDONLY)"): "flushes what was just written, and reads nothing",
     ("files.py", "part.open('rb+')"): "flushes what was just written, and reads nothing",

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from clearway.regular_files import MIB, read_text
+
 GROUPS = Path("sys/fs/cgroup")
 CACHED = "inactive_file"  # of what a group uses, given back where it is needed
 
@@ -30,7 +32,7 @@ def _of_groups(root: Path) -> Iterator[int]:
     """What is left of the limits of the process's control groups, of version 2 and of version 1."""
     own = ""
     with suppress(OSError):
-        for line in (root / "proc/self/cgroup").read_text().splitlines():
+        for line in _text(root / "proc/self/cgroup").splitlines():
             own = line.removeprefix("0::/") if line.startswith("0::/") else own
     place = root / GROUPS / own
     for folder in (place, *place.parents):
@@ -43,10 +45,15 @@ def _of_groups(root: Path) -> Iterator[int]:
 def _left(folder: Path, limit: str, used: str) -> Iterator[int]:
     """What a group's limit leaves; nothing where it has none ("max")."""
     with suppress(OSError, ValueError):
-        most, now = (int((folder / name).read_text()) for name in (limit, used))
+        most, now = (int(_text(folder / name)) for name in (limit, used))
         yield most - now + _named(folder / "memory.stat").get(CACHED, 0)
 
 
 def _named(path: Path) -> dict[str, int]:
     """The numbers of a file of lines such as "name 5" or "name 5 kB". Raises OSError, ValueError."""
-    return {words[0]: int(words[1]) for line in path.read_text().splitlines() if len(words := line.split()) > 1}
+    return {words[0]: int(words[1]) for line in _text(path).splitlines() if len(words := line.split()) > 1}
+
+
+def _text(path: Path) -> str:
+    """What the system tells under a name. Raises OSError, ValueError."""
+    return read_text(path, MIB)
