@@ -23,7 +23,7 @@ import tarfile
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from clearway.errors import ClearwayError
 from clearway.experiments.job import RUNS, TRIALS
@@ -63,7 +63,19 @@ def unpack(records: Sequence[Path], folder: Path) -> None:
     with folder_written_whole(folder) as part:
         for record in records:
             with tarfile.open(record, "r:xz") as archive:
-                archive.extractall(part, filter="data")
+                for member in archive:
+                    _extract(archive, member, part)
+
+
+def _extract(archive: tarfile.TarFile, member: tarfile.TarInfo, folder: Path) -> None:
+    """Write a file of a record below a folder. Raises TarError where it is no such file."""
+    name = PurePosixPath(member.name)
+    content = archive.extractfile(member) if member.isfile() else None
+    if content is None or name.is_absolute() or ".." in name.parts:
+        raise tarfile.TarError(f"{member.name!r:.80} is no file of a record")
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content.read())
 
 
 def _kept(folder: Path, parts: Sequence[str]) -> Iterator[Path]:

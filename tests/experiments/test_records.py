@@ -1,8 +1,10 @@
 """Records of a reproduction come to the report of the reproduction itself."""
 
+import io
 import json
 import runpy
 import shutil
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -120,4 +122,18 @@ def test_what_is_no_record_is_refused_and_leaves_nothing(
     with pytest.raises(SystemExit, match=said) as refusal:
         RECORDS["main"]()
     assert str(refusal.value).startswith("error: ") and str(refusal.value).count("\n") == 0
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("name", ["/etc/passed", "../outside", "runs/../../outside", "link"])
+def test_a_record_writes_nothing_outside_its_folder(name: str, tmp_path: Path) -> None:
+    record = tmp_path / "bad.tar.xz"
+    with tarfile.open(record, "w:xz") as archive:
+        member = tarfile.TarInfo(name)
+        if name == "link":
+            member.type, member.linkname = tarfile.SYMTYPE, "/etc/passwd"
+        archive.addfile(member, io.BytesIO())
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(tarfile.TarError, match="is no file of a record"):
+        RECORDS["unpack"]([record], tmp_path / "new")
     assert sorted(tmp_path.rglob("*")) == before

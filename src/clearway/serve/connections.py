@@ -28,7 +28,8 @@ def reset(transport: asyncio.Transport) -> None:
     plug = None if transport.is_closing() else transport.get_extra_info("socket")  # of TLS, closed twice, knows nothing
     if plug is not None:
         plug.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-    transport.abort()
+    if getattr(transport, "_ssl_protocol", transport) is not None:  # closed twice: early 3.11 cannot abort what is gone
+        transport.abort()
 
 
 class Strangers:
