@@ -95,7 +95,7 @@ def _add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
 
 def _given(folder: Path) -> list[Path]:
     """The scenes that the reproduction was given."""
-    return [Path(path) for path in read_json(folder / REQUEST_FILE)["dumps"]]
+    return [folder / path for path in read_json(folder / REQUEST_FILE)["dumps"]]
 
 
 def _by_its_name(content: bytes, places: Sequence[Path]) -> bytes:

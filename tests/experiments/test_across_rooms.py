@@ -1,8 +1,9 @@
 """An agent for each room, and verdicts over rooms."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -71,11 +72,12 @@ def judged(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[[Rooms
             values[:, :, METRIC_NAMES.index(name)] = value
         return InRoom(Scores((0,), values), np.array([[frames]]), int(frames < CENSORED), 1)
 
-    def claims(ours: Rooms, theirs: Rooms) -> list[Claim]:
+    def claims(ours: Rooms, theirs: Rooms, lacks: Mapping[str, object] = MappingProxyType({})) -> list[Claim]:
         rooms = [
             {"shortest": in_room(*other), "collision-aware": in_room(*own)}
             for own, other in zip(ours, theirs, strict=True)
         ]
+        rooms[2]["shortest"] = replace(rooms[2]["shortest"], **lacks)
         left = iter(rooms)
         several = replace(setting, **{name: getattr(setting, name)[:1] * len(rooms) for name in ("files", "scenes")})
         several = replace(several, targets=setting.targets[:1] * len(rooms))
@@ -139,12 +141,12 @@ def test_rooms_that_neither_settles_say_nothing_and_stay_in(judged) -> None:
     assert found[1].numbers["ratio"].interval is not None  # though nobody collides in three
 
 
-def test_while_a_room_lacks_runs_nothing_is_decided(judged, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_while_a_room_lacks_runs_nothing_is_decided(judged) -> None:
     ours = [(0.5 * frames, 0.0, steps, 1.0) for frames, _, steps, _ in BASELINE]
-    monkeypatch.setattr(across_rooms, "_complete", lambda rooms: list(range(len(rooms) - 1)))
-    found = judged(ours, BASELINE)
-    assert {(claim.verdict, claim.p) for claim in found} == {("undecided", None)}
-    assert all(claim.evidence.startswith("7 of 8 rooms are complete") for claim in found)
+    for lacks in ({"planned": 2}, {"frames": np.empty((0, 1))}):
+        found = judged(ours, BASELINE, lacks)
+        assert {(claim.verdict, claim.p) for claim in found} == {("undecided", None)}
+        assert all(claim.evidence.startswith("7 of 8 rooms are complete") for claim in found)
 
 
 def test_five_rooms_decide_nothing(judged) -> None:

@@ -88,6 +88,9 @@ def test_scenes_that_were_given_are_in_the_record(tmp_path: Path) -> None:
     assert sorted(path.name for path in (again / "scenes/given").iterdir()) == ["bathroom.h5", "kitchen.h5"]
     assert gather(again).sections == expected and not expected[0].missing
     assert str(tmp_path) not in (again / REQUEST_FILE).read_text()
+    RECORDS["pack"](again, tmp_path / "second.tar.xz")
+    RECORDS["unpack"]([tmp_path / "second.tar.xz"], tmp_path / "third")
+    assert gather(tmp_path / "third").sections == expected
 
 
 def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:

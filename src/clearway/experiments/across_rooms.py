@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clearway.evaluation.across_rooms import ratio_estimate, sign_flip_p
-from clearway.evaluation.across_seeds import mean_estimate
+from clearway.evaluation.across_seeds import Estimate, mean_estimate
 from clearway.experiments.convergence import ARRIVING, DETOUR, ONE_TARGET, frames_until_settled, mark_steps
 from clearway.experiments.groups import PAIR, Scores, all_jobs, compared, random_walk
 from clearway.experiments.plan import Job
-from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value, Verdict
+from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Series, Value
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import SAME, further, with_failures
+from clearway.experiments.verdicts import SAME, further, side, with_failures
 from clearway.reward import COLLISION_AWARE, SHORTEST
 
 NAME = "across-rooms"
@@ -196,6 +196,6 @@ def _judged(text: str, what: str, ours: np.ndarray, theirs: np.ndarray, allowed:
         f"{np.median(ours / theirs):.3g}); it lies below {allowed:g} in {fewer} of {len(ours)} rooms."
     )
     assert ratio.interval is not None, "there are several rooms"
-    low, high = ratio.interval
-    verdict: Verdict = "holds" if high < allowed else "does not hold" if low > allowed else "undecided"
+    low, high = np.log(ratio.interval)
+    verdict = side(Estimate(float(np.log(ratio.value)), (low, high)), float(np.log(allowed)))
     return Claim(text, verdict, evidence, {**means, "ratio": ratio}, p=sign_flip_p(ours, theirs, allowed))

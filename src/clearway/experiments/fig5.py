@@ -30,7 +30,7 @@ from clearway.scenes.scene import Scene
 DISTANCES = (1, 2, 4, 8)
 AVERAGE = "average"
 Kind = tuple[str, str]
-"""A learner and what tells its agents from others; no learner for the random walk."""
+"""A learner and what tells its agents from others; `WALKED` for the random walk."""
 
 
 def jobs(setting: Setting) -> list[Job]:

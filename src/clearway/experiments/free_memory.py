@@ -9,6 +9,11 @@ from pathlib import Path
 from clearway.regular_files import MIB, read_text
 
 GROUPS = Path("sys/fs/cgroup")
+FILES = {
+    "": ("memory.max", "memory.current"),
+    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes"),
+}
+"""Limit and use of a group of version 2, and of version 1's controller of memory."""
 CACHED = "inactive_file"  # of what a group uses, given back where it is needed
 
 
@@ -30,23 +35,26 @@ def _of_machine(root: Path) -> Iterator[int]:
 
 def _of_groups(root: Path) -> Iterator[int]:
     """What is left of the limits of the process's control groups, of version 2 and of version 1."""
-    own = ""
+    places = {"": "", "memory": ""}  # by controller, of version 2 none
     with suppress(OSError):
         for line in _text(root / "proc/self/cgroup").splitlines():
-            own = line.removeprefix("0::/") if line.startswith("0::/") else own
-    place = root / GROUPS / own
-    for folder in (place, *place.parents):
-        if not folder.is_relative_to(root / GROUPS):
-            break
-        yield from _left(folder, "memory.max", "memory.current")
-    yield from _left(root / GROUPS / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes")
+            _, controllers, place = line.split(":", 2)
+            places |= {name: place.lstrip("/") for name in controllers.split(",") if name in places}
+    for name, files in FILES.items():
+        top = root / GROUPS / name
+        for folder in (top / places[name], *(top / places[name]).parents):
+            if folder.is_relative_to(top):
+                yield from _left(folder, *files)
 
 
 def _left(folder: Path, limit: str, used: str) -> Iterator[int]:
     """What a group's limit leaves; nothing where it has none ("max")."""
     with suppress(OSError, ValueError):
         most, now = (int(_text(folder / name)) for name in (limit, used))
-        yield most - now + _named(folder / "memory.stat").get(CACHED, 0)
+        stat = _named(folder / "memory.stat")
+        yield (
+            most - now + stat.get(f"total_{CACHED}", stat.get(CACHED, 0))
+        )  # of version 1 the first is with what is below
 
 
 def _named(path: Path) -> dict[str, int]:

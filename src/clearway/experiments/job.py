@@ -65,8 +65,8 @@ def do(out: Path, job: Job, threads: int) -> None:
     run = job.run
     request = request_of(run)
     own = run_folder(out, run)
-    if not checkpoints(own.checkpoints):  # of a record, for example: what an agent did that is no more
-        shutil.rmtree(own.path / TRIALS, ignore_errors=True)
+    if not checkpoints(own.checkpoints) and (own.path / TRIALS).exists():  # what an agent did that is no more
+        shutil.rmtree(own.path / TRIALS)
     folder = train(request, own.path, resume=True, milestones=(run.halfway,))
     for trial in job.trials:
         path = trial_path(out, run, trial)

@@ -15,6 +15,7 @@ from clearway.evaluation.across_seeds import mean_estimate
 from clearway.evaluation.episodes import episode_starts
 from clearway.evaluation.metrics import by_scene
 from clearway.evaluation.optimum import OPTIMUM, SOFT_FIXED_POINT, world_yardsticks
+from clearway.evaluation.protocol import SHORTEST_PATH
 from clearway.experiments.groups import EXACT, WALKED, Group, Scores, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.other_learners import ABOUT_OTHERS
@@ -147,7 +148,7 @@ def _references(
         exact = [each.yardstick for each in world_yardsticks(world, reward, starts=starts)]
         if not found:
             shortest = np.array([each.shortest_path_steps for each in exact])
-            found.append((EXACT, "shortest path", {"steps": shortest, "collisions": np.zeros(len(exact))}))
+            found.append((EXACT, SHORTEST_PATH, {"steps": shortest, "collisions": np.zeros(len(exact))}))
         for name, policies in ((OPTIMUM, [e.optimal for e in exact]), (SOFT_FIXED_POINT, [e.soft for e in exact])):
             label = f"{name} ({reward.name}{'' if reward.clip else ', unclipped'})"
             found.append((EXACT, label, {m: np.array([getattr(policy, m) for policy in policies]) for m in METRICS}))

@@ -108,10 +108,11 @@ def _judged(
     if min(len(first), len(second)) < LEAST_RUNS:
         return Claim(text, "undecided", f"{evidence} {TOO_FEW}", numbers)
     p = permutation_p(first, second, target_scene, allowed)
-    return Claim(text, _side(-found if more else found, allowed), evidence, numbers, p=p)
+    return Claim(text, side(-found if more else found, allowed), evidence, numbers, p=p)
 
 
-def _side(found: Estimate, allowed: float) -> Verdict:
+def side(found: Estimate, allowed: float) -> Verdict:
+    """What an estimate of a difference says of the claim that it lies below 0, or is no more than what is allowed."""
     assert found.interval is not None  # there are several runs
     low, high = found.interval
     if allowed == 0:
