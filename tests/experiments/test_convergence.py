@@ -27,7 +27,10 @@ def rows(*steps: float | None, success: float = 1.0) -> list[dict[str, float]]:
     [
         ((30, 9, 30, 10, 9), 40),  # the first time below was no lasting one
         ((10, 10), 10),  # at the mark is settled
-        ((30, None, 9), 30),
+        ((30, None, 9, 9), 30),
+        ((30, 30, 9), None),  # a last row alone may be luck
+        ((9, 30, None, 9, None), None),
+        ((9,), None),
         ((9, 9, 11), None),
         ((30, None), None),
         ((None,), None),
@@ -42,7 +45,7 @@ def test_training_has_settled_after_its_last_row_above_the_mark(
 
 
 def test_training_whose_episodes_are_cut_has_not_settled_however_few_steps_they_take() -> None:
-    cut, arriving = rows(9, 9, success=0.94), rows(9, 9, 9, success=0.95)
+    cut, arriving = rows(9, 9, success=0.94), rows(9, 9, 9, 9, success=0.95)
     assert settled_row(cut, 10) is None
     assert settled_row([*cut, *arriving[2:]], 10) == arriving[2]
 

@@ -43,12 +43,12 @@ def mark_steps(setting: Setting, targets: TargetSets) -> float:
 def settled_row(rows: Sequence[Row], mark: float) -> Row | None:
     """The first row of a training's metrics from which on steps stay at the mark or below, and `ARRIVING` arrive.
 
-    None: there is none.
+    None: there is none, or only the last, which a few lucky episodes may make.
     """
     known = [row for row in rows if row["episodes"]]
     before = [number for number, row in enumerate(known) if row["steps"] > mark or row["success"] < ARRIVING]
     first = before[-1] + 1 if before else 0
-    return known[first] if first < len(known) else None
+    return known[first] if first < len(known) - 1 else None
 
 
 def settling(name: str, setting: Setting, groups: Sequence[Group], where: str = "") -> tuple[ReportTable, list[Claim]]:
