@@ -350,7 +350,7 @@ def test_the_paper_s_further_claims_are_judged(setting: Setting, sections: dict[
 def test_success_on_unseen_targets_stands_beside_the_random_walk_s(sections: dict[str, Section]) -> None:
     for name, places in (("fig5", 5), ("fig6", 1)):
         table, _ = sections[name].tables
-        assert column(table, "agent" if name == "fig5" else "learner").count("random walk") == places
+        assert column(table, "agent").count("random walk") == places
         assert all(0 <= value <= 1 + 1e-12 for value in column(table, "sc"))
         assert all(
             strict <= loose

@@ -98,7 +98,10 @@ def check_ends(section: Section, page: str) -> None:
 
 def held_out_rows(section: Section, shown: Sequence[Sequence[str]]) -> dict[str, dict[str, Any]]:
     """Figure 6's rows by what trained, or stands beside; those of a page's table, and no others, are as recorded."""
-    found = {str(row["targets a scene"] or row["learner"]): row for row in by_heading(section.tables[0])}
+    found = {}
+    for row in by_heading(section.tables[0]):
+        beside = row["agent"] if row["learner"] == WALKED else f"{row['learner']}, {row['agent']}"
+        found[str(row["targets a scene"] or beside)] = row
     assert [row[0] for row in shown] == list(found)
     for name, learnt, *cells in shown:
         row = found[name]

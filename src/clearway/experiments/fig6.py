@@ -17,7 +17,7 @@ from clearway.experiments.generalisation import (
     told_of_own_goals,
     tried,
 )
-from clearway.experiments.groups import Group, all_jobs, random_walk
+from clearway.experiments.groups import WALKED, Group, all_jobs, random_walk
 from clearway.experiments.learnt_maps import ABOUT_MAPS, on_maps
 from clearway.experiments.plan import RANDOM_WALK, Job, TargetSets
 from clearway.experiments.section import Claim, ReportFigure, ReportTable, Section, Value
@@ -57,16 +57,17 @@ def section(setting: Setting) -> Section:
     for count in TRAINED:
         for group, own in zip(_groups(setting, count), _on_trained(setting, count), strict=True):
             figures = Tried(group.scores(setting.out, world.target_count), target_scene)
-            rows.append((count, group.learner, len(figures.scores), _learnt(setting, own), *figures.cells()))
-            by_target += [(count, *row) for row in figures.by_target(world, group.learner, group.agent)]
+            agents = group.learner, group.agent
+            rows.append((count, *agents, len(figures.scores), _learnt(setting, own), *figures.cells()))
+            by_target += [(count, *row) for row in figures.by_target(world, *agents)]
             points.setdefault(group.learner, []).append((count, figures))
     for kind, figures in on_map.items():
-        rows.append((None, ", ".join(kind), len(figures.scores), None, *figures.cells()))
+        rows.append((None, *kind, len(figures.scores), None, *figures.cells()))
         by_target += [(None, *row) for row in figures.by_target(world, *kind)]
         points[", ".join(kind)] = [(count, figures) for count in TRAINED]
     points[RANDOM_WALK] = [(count, walked) for count in TRAINED]
-    rows.append((None, RANDOM_WALK, None, None, *walked.cells()))
-    headings = ("targets a scene", "learner", "seeds", "sc on trained targets", *HEADINGS)
+    rows.append((None, WALKED, RANDOM_WALK, None, None, *walked.cells()))
+    headings = ("targets a scene", "learner", "agent", "seeds", "sc on trained targets", *HEADINGS)
     title = "Success on held-out targets"
     return Section(
         name="fig6",
