@@ -10,10 +10,17 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments import table1, zone_time
-from clearway.experiments.convergence import ONE_TARGET, frames_until_settled, mark_steps, settled_by_seed
+from clearway.experiments import off_grid, table1, zone_time
+from clearway.experiments.convergence import (
+    ONE_TARGET,
+    frames_until_settled,
+    mark_steps,
+    settled_by_seed,
+    settled_row,
+)
 from clearway.experiments.correction import LEVEL, holm
 from clearway.experiments.groups import PAIR, compared
+from clearway.experiments.job import run_folder
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
@@ -33,6 +40,7 @@ from helpers.published import (
     seconds_of_runs,
     section_of,
     unpack,
+    words_of,
 )
 from helpers.report_tables import by_heading
 
@@ -308,7 +316,8 @@ def millions(interval: str) -> str:
 @pytest.mark.slow
 def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
     unpack("off-grid-bathroom", tmp_path / "off-grid")
-    (section,) = gather(tmp_path / "off-grid").sections
+    report = gather(tmp_path / "off-grid")
+    (section,) = report.sections
     assert not section.missing
     (table,) = section.tables
     rows = by_heading(table)
@@ -346,6 +355,32 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
         assert difference.strip() == told
         assert f"p = {p.strip()}, for 6 claims {corrected.strip()} (Holm)" in claim.evidence
         assert verdict.strip() == claim.verdict
+    check_who_had_settled(report.setting, "\n".join(lines))
+
+
+def check_who_had_settled(setting: Setting, page: str) -> None:
+    """What unsettled runs do off the grid: of `shortest` unperturbed, of `bump` over all settings."""
+    mark, told = mark_steps(setting, setting.targets), {}
+    for group in off_grid._groups(setting)[:2]:
+        scores = off_grid._scores(setting, group)
+        has = [settled_row(run_folder(setting.out, job.run).metrics(), mark) is not None for job in group.jobs]
+        told[group.reward] = np.array(has), scores[:, 0, :, 0].mean(1), scores[..., 1].mean((1, 2))
+    assert off_grid.FIGURES[:2] == ("success", "contacts")
+    has, arrive, _ = told["shortest"]
+    assert has.sum() == 3 and set(arrive[~has].round(2)) == {0.3}
+    assert (
+        f"these three arrive in {100 * arrive[has].min():.0f} to {100 * arrive[has].max():.0f} %, the others in 30 %"
+        in page
+    )
+    has, arrive, contacts = told["bump"]
+    assert has.sum() == 3 and "by their training, two had not settled either" in page
+    worst = arrive.argmin()
+    assert not has[worst]
+    others = np.delete(contacts, worst)
+    words = r"them arrives in (\d+) %, and has ([\d.]+) contacts .* the other four have ([\d.]+) to ([\d.]+)\."
+    values = (100 * arrive[worst], contacts[worst], others.min(), others.max())
+    for written, value in zip(words_of(words, page).groups(), values, strict=True):
+        assert_written(written, value, "of bump")
 
 
 def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> None:
@@ -380,6 +415,40 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
     early, late = settled["paper, unclipped", "shortest"], settled["paper", "collision-aware"]
     assert early.max() < late.min()
     assert f"settles sooner ({early.mean():,.0f} frames)" in RESULTS
+
+
+def check_unseen(section: Section, page: str) -> None:
+    """What the page says of unseen targets: means outside the earlier intervals, and what poses alike would give."""
+    rows = {(row["steps away"], row["agent"]): row for row in by_heading(section.tables[0])}
+    outside = {}
+    for line in rows_of(EVIDENCE.partition("Figure 5, poses")[2])[1:5]:
+        steps = 8 if line[0].startswith("7") else int(line[0])
+        for agent, cell in zip(("shortest", "collision-aware"), line[2:4], strict=True):
+            low, high = (float(end) for end in numbers(cell.replace("-", " "))[1:3])
+            success = 100 * rows[steps, agent]["sc"]
+            if not low - 0.5 <= success <= high + 0.5:
+                outside[steps, agent] = success, f"{low:g} to {high:g} %"
+    told = {
+        "its success one step away": (1, "shortest"),
+        "success of `collision-aware` one step away": (1, "collision-aware"),
+        "the same four steps away": (4, "collision-aware"),
+    }
+    assert set(outside) == set(told.values())
+    for begin, kind in told.items():
+        ((_, here, then),) = [line for line in rows_of(page) if line[0] == begin]
+        assert_written(here.removesuffix(" %"), outside[kind][0], begin)
+        assert then == outside[kind][1]
+    of_poses = {
+        (agent, figure): 100 * np.mean([row[figure] for row in by_heading(section.tables[1]) if row["agent"] == agent])
+        for agent in ("collision-aware", "shortest", "random walk")
+        for figure in ("sc", "spl")
+    }
+    words = (
+        r"over poses\nalike it is ([\d.]+) % against ([\d.]+) % \(SPL ([\d.]+) and ([\d.]+) %; a random walk (\d+) %\)"
+    )
+    kinds = [(agent, figure) for figure in ("sc", "spl") for agent in ("collision-aware", "shortest")]
+    for written, kind in zip(words_of(words, page).groups(), [*kinds, ("random walk", "sc")], strict=True):
+        assert_written(written, of_poses[kind], str(kind))
 
 
 @pytest.mark.slow
@@ -422,6 +491,7 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
     assert sum(row[1:2] in (["holds"], ["undecided"], ["does not hold"]) for row in rows) == len(claims) == 15
     check_the_agents_of_fresh_seeds(gather(tmp_path / "paper").setting, rows)
     check_ends(sections[1], page)
+    check_unseen(sections[3], page)
     solved = {
         row[1]
         for row in sections[0].tables[0].rows
