@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from clearway.experiments import fig6
+from clearway.experiments import fig6, quality
 from clearway.experiments.groups import WALKED
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
@@ -54,7 +54,8 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     unpack("four-rooms-default", folder, "four-rooms")
     request = json.loads((folder / REQUEST_FILE).read_text())
     (folder / REQUEST_FILE).write_text(json.dumps({**request, "names": RUN}))
-    sections = {section.name: section for section in gather(folder).sections}
+    report = gather(folder)
+    sections = {section.name: section for section in report.sections}
     assert list(sections) == RUN
     assert [name for name, section in sections.items() if section.missing] == []
     told = rows_of(PAGE)
@@ -77,6 +78,8 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     usual = sorted(s for reward in REWARDS for s in seconds_of_runs(folder, f"ppo-{reward}-20t-3M-*"))
     longer, more = (sorted(seconds_of_runs(folder, f"ppo-*{name}-*")) for name in ("20t-6M", "[0468]0t-3M"))
     assert (len(usual), len(longer), len(more)) == (35, 15, 20)
+    of_quality = [s for job in quality.jobs(report.setting) for s in seconds_of_runs(folder, job.run.name)]
+    assert len(of_quality) == 5 and f"but for time (up to {max(of_quality):.0f} s)" in RESULTS
     for own in (usual[:31], usual[31:], longer, more):
         assert [int(end) for end in ends[:2]] == [round(own[0]), round(own[-1])]
         ends = ends[2:]
@@ -95,7 +98,7 @@ def check_quality(section: Section, told: list[list[str]]) -> None:
         assert where == row["which is the worst"].replace("_", " ")
         for text, name in ((ratio, "x the shortest path"), (written, "worst target"), (collisions, "collisions")):
             assert_written(text, row[name], name)
-    assert "all ten do, as do five of fresh seeds (time not asked, [question 64 (e0525e6)]" in RESULTS
+    assert "all ten do, as do, but for time (up to 338 s), five of fresh seeds ([question 64 (e0525e6)]" in RESULTS
     assert "64: yes, all five." in REGISTERED
 
 
