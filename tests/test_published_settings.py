@@ -129,6 +129,15 @@ def test_four_rooms_otherwise_are_what_their_record_comes_to(tmp_path: Path) -> 
         assert failed == lost
 
 
+def test_the_rule_promises_four_rooms_what_is_said() -> None:
+    (walk,) = [
+        line for line in EVIDENCE.splitlines() if line.startswith("| random walk | 758, 106 |") and "2,626" in line
+    ]
+    steps = float(numbers(walk.replace(",", "").split("|")[6])[0])
+    told = " to ".join(f"{steps * 20 * factor / 1e6:.1f}" for factor in (163, 176))
+    assert f"x targets x 163 to 176) had promised `shortest` {told} M frames" in EVIDENCE
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("record", "encoder", "called"),

@@ -1,4 +1,4 @@
-"""clearway: agents that walk to where a picture was taken and anticipate collisions on the way.
+"""clearway: agents that walk to where a picture was taken, designed to anticipate collisions.
 
 A program of one's own needs no more than this module: `docs/python.md` shows it in use. Importing it loads nothing
 heavy; each name brings what it needs when it is first asked for.

@@ -40,8 +40,8 @@ from clearway.cli.views import TakeViews
 from clearway.errors import ArgumentError, ClearwayError, is_out_of_memory, reason_of
 
 DESCRIPTION = (
-    "Train, evaluate and look at agents that walk to the place where a picture was taken "
-    "and anticipate collisions on the way. Begin with: clearway view --example"
+    "Train, evaluate and look at agents that walk to the place where a picture was taken, "
+    "designed to anticipate collisions. Begin with: clearway view --example"
 )
 
 
