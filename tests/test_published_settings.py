@@ -518,6 +518,6 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
     together = sum(p <= LEVEL for p in holm([claim.p for claim in asked if claim.p is not None]))
     assert together == 1 and all(claim.p is not None for claim in asked)
     assert (
-        f"Of eleven claims asked of fresh seeds {holds} hold, corrected by table (all together: one), {fails} do not, "
+        f"In the bathroom, of eleven claims asked of fresh seeds {holds} hold, corrected by table (all together: one), {fails} do not, "
         f"{open_} are undecided" in RESULTS
     )
