@@ -1,21 +1,34 @@
 """What the evidence says of rooms that were generated for it is what their records come to."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from clearway.experiments.correction import LEVEL, holm
+from clearway.experiments.groups import WALKED
 from clearway.experiments.reproduce import gather
-from clearway.experiments.section import Claim
+from clearway.experiments.section import Claim, Section
 from helpers.published import (
     EVIDENCE,
+    UNTRAINED,
+    assert_judged,
+    assert_shown,
     assert_written,
+    check_beside,
+    check_ends,
+    held_out_rows,
     rows_of,
     seconds_of_runs,
     section_of,
     unpack,
 )
 from helpers.report_tables import by_heading
+
+BESIDE = {"planner on a learnt map", "nearest picture", "shortest path", "random walk"} | set(UNTRAINED.values())
+FIXED = {f"soft fixed point ({name})" for name in ("shortest", "bump", "collision-aware")}
+VERDICTS = ("holds", "does not hold", "undecided")
 
 
 @pytest.mark.slow
@@ -70,3 +83,119 @@ def check_over_rooms(claim: Claim, line: list[str]) -> None:
         f"it lies below {allowed} in {rooms} rooms." in claim.evidence
     )
     assert f"p = {p}, for 3 claims {corrected} (Holm)" in claim.evidence
+
+
+@pytest.mark.slow
+def test_all_tables_in_a_further_room_are_what_their_record_comes_to(tmp_path: Path) -> None:
+    unpack("further-room", tmp_path / "room")
+    sections = {section.name: section for section in gather(tmp_path / "room").sections}
+    assert list(sections) == ["table1", "fig3", "fig4", "table2", "table3", "fig5", "fig6", "zone-time"]
+    assert not any(section.missing for section in sections.values())
+    page = section_of(EVIDENCE, "All tables in a further room")
+    tables = [rows_of(part)[1:] for part in page.split("\n\n") if part.startswith("| ")]
+    agents, judged, _, unseen, held_out, in_zones = tables
+    check_agents(sections, agents)
+    claims = [claim for section in sections.values() for claim in section.claims]
+    assert [line[0] for line in judged] == [shortened(claim) for claim in claims]
+    for claim, (_, verdict, own, other, apart, p, corrected) in zip(claims, judged, strict=True):
+        assert_judged(claim, verdict, p, corrected, own, other, apart)
+    check_ends(sections["fig3"], page)
+    check_unseen(sections["fig5"], unseen)
+    held_out_rows(sections["fig6"], held_out)
+    check_in_zones(sections["zone-time"], in_zones)
+    not_asked = ("paper, unclipped", "paper: no more steps than with a penalty for bumping on hard targets")
+    check_counts([claim for claim in claims if not claim.text.startswith(not_asked)], page)
+    seconds = seconds_of_runs(tmp_path / "room", "a2c-*")
+    assert f"{len(seconds)} runs" in page and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
+
+
+def shortened(claim: Claim) -> str:
+    """How a claim stands in a table of one learner's."""
+    return claim.text.removeprefix("paper: ").removeprefix("paper, ").removeprefix("collision-aware, ")
+
+
+def check_counts(asked: Sequence[Claim], page: str) -> None:
+    """How many of the claims that were asked hold, do not, or are undecided; and what of it would stay together."""
+    assert all(claim.p is not None for claim in asked)
+    count = Counter(claim.verdict for claim in asked)
+    together = sum(
+        p <= LEVEL and claim.verdict == "holds"
+        for claim, p in zip(asked, holm([claim.p for claim in asked if claim.p is not None]), strict=True)
+    )
+    words = ("hold", "do not", "are undecided")
+    told = ", ".join(f"{count[verdict]} {word}" for verdict, word in zip(VERDICTS, words, strict=True))
+    assert f"Of {len(asked)} claims {told}" in page
+    assert f"corrected all together {together} would hold" in page
+
+
+def check_agents(sections: dict[str, Section], lines: list[list[str]]) -> None:
+    """The table of agents: halfway and in the end, on usual and on hard targets, and who stands beside."""
+    told = 0
+    for row in by_heading(sections["fig4"].tables[0]):
+        if row["learner"] == "paper" and row["frames"] == 400_000:
+            (line,) = [line for line in lines if line[:3] == [row["agent"], "usual", "0.4 M"]]
+            assert_shown(line[4], row["steps"], row["95 %"])
+            assert_shown(line[5], row["collisions"], row["95 % of collisions"])
+            assert line[3] == "" and line[6] == row["failed targets"]
+            told += 1
+    for name, kind, frames in (("table1", "usual", "0.8 M"), ("table2", "hard", "0.8 M"), ("table3", "hard", "1.6 M")):
+        rows = by_heading(sections[name].tables[0])
+        late = {row["agent"]: row for row in by_heading(sections["fig4" if name == "table1" else name].tables[-1])}
+        for line in (line for line in lines if line[1:3] == [kind, frames]):
+            agent, learner = line[0].removesuffix(", unclipped"), "paper"
+            if agent != line[0]:
+                learner += ", unclipped"
+            for figure, cell in (("steps", line[4]), ("collisions", line[5])):
+                ((value, interval, lost),) = [
+                    (row["average"], row["95 %"], row["failed targets"])
+                    for row in rows
+                    if (row["figure"], row["learner"], row["agent"]) == (figure, learner, agent)
+                ]
+                assert_shown(cell, value, interval)
+                assert line[6] == lost
+            if line[3]:
+                after, ran = line[3].split("), ")
+                assert_shown(after, late[agent]["frames"], late[agent]["95 %"])
+                assert ran == f"{late[agent]['settled']} of 5" and learner == "paper"
+            told += 1
+        beside = [line for line in lines if line[1] == kind and not line[2]]
+        known = {"shortest", "bump", "collision-aware"}
+        shown = check_beside(beside, sections[name].tables[0].rows, 4, 5) if name != "table3" else BESIDE | FIXED
+        assert shown >= BESIDE and not shown & known
+    assert told == 2 + 5 + 3 + 3
+
+
+def check_unseen(section: Section, lines: list[list[str]]) -> None:
+    """Figure 5's table: every agent at each distance."""
+    rows = by_heading(section.tables[0])
+    known = {(str(row["steps away"]), name_of(row)): row for row in rows}
+    told = set()
+    for steps, names, targets, *cells in lines:
+        for name in names.split("; "):
+            row = known[steps, name.partition(", ")[0]]
+            assert targets == str(row["targets"])
+            estimates = ("sc", "95 % of sc"), ("sc within 4 x shortest", "95 % of that"), ("SPL", "95 % of SPL")
+            for cell, (figure, interval) in zip(cells, estimates, strict=True):
+                assert_shown(cell, row[figure], (row[interval] or "") if "(" in cell else "", scale=100)
+            told.add((steps, name.partition(", ")[0]))
+    assert told == set(known)
+
+
+def check_in_zones(section: Section, lines: list[list[str]]) -> None:
+    """The table of time in the zones."""
+    known = {name_of(row): row for row in by_heading(section.tables[0])}
+    told = set()
+    for names, *cells in lines:
+        for name in (each.partition(", ")[0] for each in names.split("; ")):
+            figures = [heading for heading in section.tables[0].headings[3:] if not heading.startswith("95 %")]
+            for cell, figure in zip(cells, figures, strict=True):
+                interval = known[name][f"95 % of {figure}"] if "(" in cell else ""
+                assert_shown(cell, known[name][figure], interval, scale=100 if figure.startswith("share") else 1)
+            told.add(name)
+    assert told == set(known)
+
+
+def name_of(row: dict) -> str:
+    """Who a row is of, without frames."""
+    own = row["learner"] in ("paper", WALKED)
+    return str(row["agent"] if own else UNTRAINED.get(row["learner"], row["learner"]))

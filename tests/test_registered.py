@@ -44,6 +44,7 @@ ASKED_FIRST = {
     ("four-rooms-default", ""): {64, 65},
     ("four-rooms-longer", ""): {37},
     ("four-rooms-zones", ""): {66},
+    ("further-room", ""): {69},
     ("hard-bathroom", ""): {58},
     ("shuffles-bathroom", ""): {61, 62},
     ("step-size-bathroom", ""): {60},
