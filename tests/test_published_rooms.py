@@ -1,5 +1,6 @@
 """What the evidence says of rooms that were generated for it is what their records come to."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from clearway.experiments.reproduce import gather
 from clearway.experiments.section import Claim, Section
 from helpers.published import (
     EVIDENCE,
+    RESULTS,
     UNTRAINED,
     assert_judged,
     assert_shown,
@@ -126,6 +128,13 @@ def check_counts(asked: Sequence[Claim], page: str) -> None:
     told = ", ".join(f"{count[verdict]} {word}" for verdict, word in zip(VERDICTS, words, strict=True))
     assert f"Of {len(asked)} claims {told}" in page
     assert f"corrected all together {together} would hold" in page
+    assert (count["holds"], len(asked), count["does not hold"], count["undecided"]) == (20, 29, 3, 6)
+    assert "20 of 29 claims hold, three do not, six are undecided** (corrected by table; overall, three that" in RESULTS
+    assert "collisions (0.065 against 0.179) and frames until settled (395,000 against 462,000) are fewer" in RESULTS
+    shown = {claim.text: f"{claim.evidence} " for claim in asked}
+    fewer = shown["paper: fewer collisions than with the shortest-path reward"]
+    settled = shown["paper: learns faster (fewer frames until training has settled)"]
+    assert re.search(r": 0\.0652 \[.* against 0\.179 ", fewer) and re.search(r": 395,200 .* against 461,600 ", settled)
 
 
 def check_agents(sections: dict[str, Section], lines: list[list[str]]) -> None:
