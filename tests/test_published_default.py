@@ -11,8 +11,10 @@ from clearway.experiments.groups import WALKED
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from helpers.published import (
+    BESIDE,
     DOCS,
     EVIDENCE,
+    LEARNERS,
     RESULTS,
     assert_judged,
     assert_shown,
@@ -42,10 +44,6 @@ TIMES = (
     r"AMD EPYC, (\d+) to (\d+) s of training a run \(four of 35: (\d+) to (\d+) s\), "
     r"(\d+) to (\d+) s with 6 M frames, (\d+) to (\d+) s with more targets than 20"
 )
-BESIDE = {
-    *("planner on a learnt map", "nearest picture", "behaviour cloning", "Q-learning"),
-    *("shortest path", "random walk"),
-}
 
 
 @pytest.mark.slow
@@ -146,7 +144,7 @@ def check_rooms(section: Section, told: list[list[str]]) -> None:
             for text, figure in zip(cell.split(", "), ("steps", "collisions"), strict=True):
                 assert_written(text, own[figure][room], f"{figure} of {agent} in {room}")
     beside = [row for row in told if len(row) == 8]
-    assert check_beside(beside, table.rows, 5, 6) == BESIDE
+    assert check_beside(beside, table.rows, 5, 6) == BESIDE | LEARNERS
     ((*_, lost),) = [row for row in beside if row[0].startswith("Q-learning")]
     assert lost == next(row["failed targets"] for row in by_heading(table) if row["learner"] == "q-learning")
     (line,) = [line for line in RESULTS.splitlines() if "[question 65 (e0525e6)]" in line]
@@ -170,7 +168,7 @@ def check_hard(section: Section, trained: str) -> None:
         for cell, figure in ((steps, "steps"), (collisions, "collisions")):
             assert_shown(cell, found[figure, agent]["average"], found[figure, agent]["95 %"])
     beside = [row for row in told[1:] if not row[0].endswith((", 3 M", ", 6 M"))]
-    assert check_beside(beside, table.rows, 2, 3) == BESIDE
+    assert check_beside(beside, table.rows, 2, 3) == BESIDE | LEARNERS
     lost = {row["learner"]: row["failed targets"] for row in by_heading(table)}
     for row in beside:
         if row[0] not in ("shortest path", "random walk"):

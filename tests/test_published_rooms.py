@@ -12,7 +12,9 @@ from clearway.experiments.groups import WALKED
 from clearway.experiments.reproduce import gather
 from clearway.experiments.section import Claim, Section
 from helpers.published import (
+    BESIDE,
     EVIDENCE,
+    LEARNERS,
     RESULTS,
     UNTRAINED,
     assert_judged,
@@ -28,7 +30,6 @@ from helpers.published import (
 )
 from helpers.report_tables import by_heading
 
-BESIDE = {"planner on a learnt map", "nearest picture", "shortest path", "random walk"} | set(UNTRAINED.values())
 FIXED = {f"soft fixed point ({name})" for name in ("shortest", "bump", "collision-aware")}
 VERDICTS = ("holds", "does not hold", "undecided")
 
@@ -168,9 +169,7 @@ def check_agents(sections: dict[str, Section], lines: list[list[str]]) -> None:
                 assert ran == f"{late[agent]['settled']} of 5" and learner == "paper"
             told += 1
         beside = [line for line in lines if line[1] == kind and not line[2]]
-        known = {"shortest", "bump", "collision-aware"}
-        shown = check_beside(beside, sections[name].tables[0].rows, 4, 5) if name != "table3" else BESIDE | FIXED
-        assert shown >= BESIDE and not shown & known
+        assert check_beside(beside, sections[name].tables[0].rows, 4, 5) == BESIDE | LEARNERS | FIXED
     assert told == 2 + 5 + 3 + 3
 
 

@@ -27,7 +27,9 @@ from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import judged_less
 from clearway.reward import BUMP
 from helpers.published import (
+    BESIDE,
     EVIDENCE,
+    LEARNERS,
     RESULTS,
     assert_judged,
     assert_shown,
@@ -43,9 +45,6 @@ from helpers.published import (
     words_of,
 )
 from helpers.report_tables import by_heading
-
-BESIDE = {"planner on a learnt map", "nearest picture", "shortest path", "random walk"}
-LEARNERS = {"Q-learning", "behaviour cloning"}
 
 
 @pytest.mark.slow

@@ -114,6 +114,9 @@ def held_out_rows(section: Section, shown: Sequence[Sequence[str]]) -> dict[str,
 
 
 UNTRAINED = {"q-learning": "Q-learning", "bc": "behaviour cloning"}
+LEARNERS = set(UNTRAINED.values())
+BESIDE = {"planner on a learnt map", "nearest picture", "shortest path", "random walk"}
+"""Who stands beside the agents in a table; some have `LEARNERS` too."""
 
 
 def check_beside(rows: list[list[str]], recorded: Sequence[Sequence[Any]], steps: int, collisions: int) -> set[str]:
