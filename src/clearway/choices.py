@@ -27,6 +27,9 @@ FeatureStore = Literal["memory", "float16", "mapped"]
 Goals = Literal["given", "seen"]
 """See `clearway.learn.own_goals`."""
 
+EpisodeTargets = Literal["drawn", "kept"]
+"""Whether every episode has a target drawn for it, or an environment keeps that of its first."""
+
 TrackerName = Literal["tensorboard", "wandb"]
 """See `clearway.learn.tracking`."""
 

@@ -12,7 +12,7 @@ from clearway.learn.a3c.config import A3C
 from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.model.network import SiameseActorCritic
 from clearway.reward import Reward
-from clearway.world.navigation import Navigation
+from clearway.world.navigation import TARGET_STREAM, Navigation
 from clearway.world.streams import Streams
 from clearway.world.world import World
 
@@ -28,6 +28,7 @@ class PlainWorker:
         self.scene = world.target_scene[self.target]
         seeds = torch.tensor([(seed << 32) + number])
         self.navigation = Navigation(world, reward, seeds, step_limit=learner.step_limit)
+        self.drawn, self.targets = learner.episode_targets == "drawn", Streams(seeds, TARGET_STREAM)
         self.actions = Streams(seeds, ACTION_STREAM)
         self.ended, self.reached = 0, 0  # episodes
         self.navigation.reset(target=self.target)
@@ -56,6 +57,9 @@ class PlainWorker:
         if step.ended:
             self.ended += 1
             self.reached += int(step.reached)
+            if self.drawn:
+                own = torch.nonzero(self.world.target_scene == self.scene)[:, 0]
+                self.target = own[(self.targets.uniform() * len(own)).long()]
             nav.reset(target=self.target)
         loss, outcome = torch.zeros(()), value_after
         for log_pi, action, value, reward in reversed(steps):
@@ -115,6 +119,8 @@ class PlainA3C:
         used = 0
         for scene, steps, gradient in gradients:
             lr = learner.lr_start * max(0.0, 1 - (frames + used) / learner.frames)
+            if learner.lr_warm_up:
+                lr *= min(1.0, (frames + used) / learner.lr_warm_up)
             self.step(scene, gradient, lr)
             used += steps
         return used

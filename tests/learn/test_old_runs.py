@@ -10,11 +10,14 @@ import pytest
 
 from clearway.errors import RunError
 from clearway.learn import train
+from clearway.learn.a2c import A2C
+from clearway.learn.a3c.config import A3C
 from clearway.learn.bc import BC
 from clearway.learn.checkpoint import newest_checkpoint, read_network
 from clearway.learn.learner import Learner
 from clearway.learn.load import load_agent, run_world
-from clearway.learn.old_runs import without_later
+from clearway.learn.old_runs import with_later, without_later
+from clearway.learn.ppo import PPO
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
@@ -42,11 +45,21 @@ def test_a_recorded_run_has_the_algorithm_s_own_settings(
     (tmp_path / "run.json").write_text(json.dumps(content))
     record = RunFolder(tmp_path).read_record()
     assert record.learner == small_learner(preset, frames=2400)
-    then = without_later(asdict(record.learner))
+    then = without_later(record.learner)
     assert {name: content["learner"][name] for name in then} == then
-    assert set(asdict(record.learner)) - set(then) <= {"goals", "sent_gradients"}
+    assert set(asdict(record.learner)) - set(then) <= {"goals", "sent_gradients", "episode_targets", "lr_warm_up"}
     now = record_of(small_request(learner=record.learner, seed=seed))
     assert record.same_experiment(now)
+
+
+def test_settings_that_came_later_do_by_default_what_was_done_before() -> None:
+    """Names of planned runs and records of old ones rest on it: another default is another experiment."""
+    synchronous = {"goals": "given", "sent_gradients": "float32", "episode_targets": "drawn", "lr_warm_up": 0}
+    assert with_later(PPO, {}) == with_later(A2C, {}) == synchronous
+    assert with_later(A3C, {}) == {"episode_targets": "kept", "lr_warm_up": 0}
+    assert with_later(A3C, {"lr_warm_up": 5, "envs": 7}) == {"episode_targets": "kept", "lr_warm_up": 5, "envs": 7}
+    changed = replace(PAPER_A3C, episode_targets="drawn")
+    assert set(without_later(changed)) - set(without_later(PAPER_A3C)) == {"episode_targets"}
 
 
 @pytest.mark.slow

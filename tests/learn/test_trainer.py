@@ -9,6 +9,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from clearway.choices import EpisodeTargets
 from clearway.errors import RunError
 from clearway.learn import trainer as trainer_module
 from clearway.learn.a2c import A2C
@@ -222,6 +223,31 @@ def test_look_ahead_is_computed_as_long_as_it_weighs(monkeypatch: pytest.MonkeyP
     while not trainer.finished:
         trainer.update()
     assert looked == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("rule", ["drawn", "kept"])
+def test_environments_draw_a_target_for_every_episode_or_keep_their_own(rule: EpisodeTargets) -> None:
+    trainer = small_trainer(small_learner(step_limit=4, episode_targets=rule))
+    begun = trainer.navigation.target.clone()
+    seen = [begun]
+    for _ in range(5):
+        trainer.update()
+        seen.append(trainer.navigation.target.clone())
+    assert sorted(begun.unique().tolist()) == [0, 1, 2, 3, 4]
+    assert all(torch.equal(target, begun) for target in seen) == (rule == "kept")
+
+
+@pytest.mark.parametrize(
+    ("other", "said"), [({"balance": 3.0}, "balance is 3.0"), ({"goals": "seen"}, "goals is seen")]
+)
+def test_kept_targets_are_refused_where_another_setting_would_have_them_drawn(other: dict, said: str) -> None:
+    with pytest.raises(RunError, match=f"episode_targets is kept and {said}, which is of targets drawn"):
+        small_learner(episode_targets="kept", **other)
+
+
+def test_the_learning_rate_may_rise_before_it_falls() -> None:
+    learner = small_learner(lr_start=1e-2, lr_end=0.0, lr_warm_up=200)  # of 800 frames
+    assert [learner.lr_at(n) for n in (0, 100, 200, 400, 800)] == pytest.approx([0, 0.00875 / 2, 0.0075, 0.005, 0])
 
 
 def test_an_update_ends_with_weighing_the_targets_anew() -> None:

@@ -76,7 +76,7 @@ class PlannedRun:
     def name(self) -> str:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
-        settings = {"algorithm": self.learner.algorithm, **without_later(asdict(self.learner))}
+        settings = {"algorithm": self.learner.algorithm, **without_later(self.learner)}
         kinds = [type(term).__module__ for term in self.reward.terms]
         ours = all(kind.startswith("clearway.") for kind in kinds)  # their values tell them apart
         paid = asdict(self.reward) if ours else self.reward.to_json()

@@ -41,6 +41,7 @@ AT_LEAST_ZERO = {
     "balance",
     "log_barrier",
     "lookahead",
+    "lr_warm_up",
     "ratio_clip",
     "value_weight",
     "feature_basis",
@@ -189,6 +190,11 @@ def next_steps(frames: int, all_frames: int, envs: int, rollout_steps: int, leas
 def linear(start: float, end: float, frames: int, all_frames: int) -> float:
     """A setting that goes linearly from start to end over all frames, after some of them."""
     return start + (end - start) * min(frames / all_frames, 1.0)
+
+
+def rising(frames: int, warm_up: int) -> float:
+    """A factor that rises linearly from 0 to 1 over the first `warm_up` frames, after some of them."""
+    return min(frames / warm_up, 1.0) if warm_up else 1.0
 
 
 def geometric(start: float, end: float, frames: int, all_frames: int) -> float:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import torch
 
-from clearway.choices import Goals, MatmulPrecision
+from clearway.choices import EpisodeTargets, Goals, MatmulPrecision
 from clearway.errors import RunError
-from clearway.learn.learner import Learner, OnFeatures, geometric, linear
+from clearway.learn.learner import Learner, OnFeatures, geometric, linear, rising
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -36,6 +36,8 @@ class OnPolicy(OnFeatures, Learner):
     """Steps of every environment between updates."""
     step_limit: int = 40
     """Steps after which a training episode is cut."""
+    episode_targets: EpisodeTargets = "drawn"
+    """Whether a target is drawn for every episode, or an environment keeps the one that it began with, as in A3C."""
     scenes_at_once: int = 0
     """Scenes that are walked at the same time, in turn with the others, see `rotation`; 0: all. With few, training on
     hundreds of scenes is as fast as on few, and needs no environment for every scene."""
@@ -86,6 +88,8 @@ class OnPolicy(OnFeatures, Learner):
     lr_start: float = 5e-4
     lr_end: float = 5e-5
     """The learning rate falls linearly from start to end."""
+    lr_warm_up: int = 0
+    """Frames over which it rises from 0 to that."""
     clip_norm: float = 0.5
     """Largest norm of the gradient."""
     clip_each_tensor: bool = False
@@ -101,6 +105,17 @@ class OnPolicy(OnFeatures, Learner):
     heads: Literal["scene", "shared"] = "scene"
     """Whether every scene has a last hidden layer and outputs of its own, as published, or all share one. Of 1,000
     scenes they would be 265 million parameters, stepped with every minibatch."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that cannot work, or not together.
+
+        Raises:
+            RunError: as `Learner`; or targets are kept that other settings would have drawn.
+        """
+        super().__post_init__()
+        if self.episode_targets == "kept" and (self.balance or self.goals == "seen"):
+            other = f"balance is {self.balance}" if self.balance else f"goals is {self.goals}"
+            raise RunError(f"episode_targets is kept and {other}, which is of targets drawn. Set one of the two alone")
 
     @property
     def epochs(self) -> int:
@@ -129,7 +144,7 @@ class OnPolicy(OnFeatures, Learner):
 
     def lr_at(self, frames: int) -> float:
         """Learning rate after that many frames."""
-        return linear(self.lr_start, self.lr_end, frames, self.frames)
+        return linear(self.lr_start, self.lr_end, frames, self.frames) * rising(frames, self.lr_warm_up)
 
     def entropy_weight_at(self, frames: int) -> float:
         """Weight of the entropy bonus after that many frames."""

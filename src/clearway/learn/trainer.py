@@ -84,6 +84,7 @@ class Trainer:
             reward,
             seeds,
             choice=choice,
+            keep_targets=learner.episode_targets == "kept",
             step_limit=learner.step_limit,
             history_length=learner.history_length,
             reward_dtype=torch.get_default_dtype(),

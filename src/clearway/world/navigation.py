@@ -106,6 +106,7 @@ class Navigation:
         reward: what is earned.
         seeds: (N,) int64, one random stream an environment: environment i draws the same numbers in any batch.
         choice: how targets are drawn; by default uniformly from all.
+        keep_targets: an environment keeps the target that its first `reset` gave it, and draws none.
         step_limit: steps after which an episode is truncated; None for no limit.
         history_length: K.
         reward_dtype: precision of the rewards.
@@ -120,6 +121,7 @@ class Navigation:
         seeds: Tensor,
         *,
         choice: TargetChoice | None = None,
+        keep_targets: bool = False,
         step_limit: int | None = None,
         history_length: int = HISTORY_LENGTH,
         reward_dtype: torch.dtype = torch.float32,
@@ -127,7 +129,7 @@ class Navigation:
     ) -> None:
         count = len(seeds)
         self.world, self.reward, self.step_limit = world, reward, step_limit
-        self.choice = choice or TargetChoice.uniform(world, count)
+        self.choice, self.keep_targets = choice or TargetChoice.uniform(world, count), keep_targets
         moves, self.stop = world.moves(), stop
         table = torch.from_numpy(reward.table(moves))
         self._next_state, self._blocked = world.next_state, world.blocked
@@ -162,13 +164,14 @@ class Navigation:
 
         Args:
             index: (B,) int64, the environments that begin anew; None for all.
-            target: (B,) int64, their targets; None to draw them.
+            target: (B,) int64, their targets; None to draw them, or to keep them.
             start: (B,) int64, their first states; None to draw them.
         """
         if index is None:
             index = torch.arange(len(self.target), device=self.world.device)
         if target is None:
-            target = self.choice.draw(self.target_stream.at(index), index)
+            keep = self.keep_targets
+            target = self.target[index] if keep else self.choice.draw(self.target_stream.at(index), index)
         if start is None:
             start = self._draw_start(self.start_stream.at(index), target)
         self.target[index] = target
@@ -194,7 +197,7 @@ class Navigation:
 
         Tensors are replaced, not written to.
         """
-        target = self.choice.draw(self.target_stream.uniform(ended))
+        target = self.target if self.keep_targets else self.choice.draw(self.target_stream.uniform(ended))
         start = self._draw_start(self.start_stream.uniform(ended), target)
         self.target = torch.where(ended, target, self.target)
         self.history = torch.where(ended[:, None], self._seen(start)[:, None], self.history)

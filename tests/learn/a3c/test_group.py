@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from clearway.choices import EpisodeTargets
 from clearway.learn.a3c import rmsprop
 from clearway.learn.a3c.config import A3C
 from clearway.learn.a3c.gradients import clip_scales, squared_norms
@@ -60,6 +61,8 @@ def test_sequential_updates_of_one_worker_equal_the_plain_ones(worker: int) -> N
         pytest.param(replace(SMALL, rollout_steps=1), id="segments of one step"),
         pytest.param(replace(SMALL, value_weight=1.0, entropy_start=0.1, entropy_end=0.1, discount=0.9), id="weights"),
         pytest.param(replace(SMALL, entropy_start=0.5, entropy_end=0.005), id="entropy falls"),
+        pytest.param(replace(SMALL, lr_warm_up=90), id="warm-up"),
+        pytest.param(replace(SMALL, step_limit=4, episode_targets="drawn"), id="targets drawn"),
     ],
 )
 def test_rounds_of_several_workers_equal_the_plain_ones(learner: A3C) -> None:
@@ -103,6 +106,13 @@ def test_a_worker_leaves_heads_of_other_scenes_alone() -> None:
         assert torch.equal(group.parameters[name][1], before[name][1])
         assert (group.squares[name][1] == 1 + EPSILON).all()
         assert not torch.equal(group.parameters[name][0], before[name][0])
+
+
+@pytest.mark.parametrize(("rule", "reached"), [("kept", [0]), ("drawn", [0, 1, 2])])
+def test_a_worker_keeps_its_target_or_draws_those_of_its_scene(rule: EpisodeTargets, reached: list[int]) -> None:
+    group = group_of([0], replace(SMALL, step_limit=8, episode_targets=rule))
+    totals = sum(group.round(0).totals for _ in range(60))
+    assert torch.nonzero(totals[:, 0])[:, 0].tolist() == reached
 
 
 def test_ended_episodes_are_counted_with_all_their_steps() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from clearway.learn.learner import Learner, OnFeatures, geometric, linear
+from clearway.choices import EpisodeTargets
+from clearway.learn.learner import Learner, OnFeatures, geometric, linear, rising
 
 if TYPE_CHECKING:
     from clearway.learn.a3c.parent import AsyncTrainer
@@ -22,11 +23,13 @@ class A3C(OnFeatures, Learner):
     frames: int = 10_000_000
     """Training frames over all workers; schedules end here."""
     envs: int = 20
-    """Workers, worker i for target i modulo the number of targets; more targets need more of them."""
+    """Workers, of which worker i begins with target i modulo the number of targets; more targets need more of them."""
     rollout_steps: int = 5
     """The most steps of a segment, after which a worker learns."""
     step_limit: int = 5000
     """Steps after which a training episode is cut."""
+    episode_targets: EpisodeTargets = "kept"
+    """Whether a worker keeps its target, as Zhu's threads do, or draws one of its scene for every episode."""
     bootstrap_cut: bool = False
     """Add the value of the pose where an episode was cut; False treats the cut as an end, as Zhu's code does."""
     clip_rewards: bool = True
@@ -48,6 +51,8 @@ class A3C(OnFeatures, Learner):
     lr_start: float = 7.0e-4
     lr_end: float = 0.0
     """The learning rate falls linearly from start to end."""
+    lr_warm_up: int = 0
+    """Frames over which it rises from 0 to that."""
     clip_norm: float = 40.0
     """Largest norm of a worker's gradient."""
     clip_each_tensor: bool = True
@@ -55,7 +60,7 @@ class A3C(OnFeatures, Learner):
 
     def lr_at(self, frames: int) -> float:
         """Learning rate after that many frames."""
-        return linear(self.lr_start, self.lr_end, frames, self.frames)
+        return linear(self.lr_start, self.lr_end, frames, self.frames) * rising(frames, self.lr_warm_up)
 
     def entropy_weight_at(self, frames: int) -> float:
         """Weight of the entropy bonus after that many frames."""

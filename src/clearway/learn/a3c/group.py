@@ -28,7 +28,7 @@ from clearway.learn.rollout import ACTION_STREAM, sample_actions
 from clearway.learn.statistics import COLLISIONS, EPISODES, REACHED, STEPS
 from clearway.model.network import NetworkShape
 from clearway.reward import Reward
-from clearway.world.navigation import Navigation, Transition
+from clearway.world.navigation import Navigation, TargetChoice, Transition
 from clearway.world.streams import Streams
 from clearway.world.world import World
 
@@ -80,7 +80,7 @@ class WorkerGroup:
     Args:
         world: tables with *prepared* features.
         learner, reward, seed: see there.
-        workers: (R,) int64 numbers of the workers, their targets ascending. Worker i is for target i modulo M.
+        workers: (R,) int64 numbers of the workers, their targets ascending. Worker i begins with target i modulo M.
         parameters: shared, by name.
         squares: shared mean squares plus epsilon of the parameters, by name.
     """
@@ -98,25 +98,26 @@ class WorkerGroup:
         assert world.features is not None
         self.world, self.learner = world, learner
         self.parameters, self.squares = parameters, squares
-        self.target = workers % world.target_count
-        scene = world.target_scene[self.target]
+        target = workers % world.target_count
+        scene = world.target_scene[target]
         assert bool((scene.diff() >= 0).all()), "workers must be ordered by scene"
         self.rows_per_scene = torch.bincount(scene, minlength=world.scene_count).tolist()
         shape = NetworkShape(world.scene_count, world.features.shape[1], learner.width, learner.history_length)
-        goal = world.target_state[self.target]
-        self.local = LocalNetwork(shape, world.features, goal, self.rows_per_scene, learner.rollout_steps)
+        self.local = LocalNetwork(shape, world.features, self.rows_per_scene, learner.rollout_steps)
         self.optimiser = SharedRMSPropUpdate()
         seeds = workers + (seed << 32)
         self.navigation = Navigation(
             world,
             reward,
             seeds,
+            choice=TargetChoice.by_scene(world, scene),
+            keep_targets=learner.episode_targets == "kept",
             step_limit=learner.step_limit,
             history_length=learner.history_length,
         )
         self.action_stream = Streams(seeds, ACTION_STREAM)
         self.open_collisions = torch.zeros(len(workers), dtype=torch.float64)
-        self.navigation.reset(target=self.target)
+        self.navigation.reset(target=target)
 
     @torch.no_grad()
     def round(self, frames: int) -> Round:
@@ -147,12 +148,12 @@ class WorkerGroup:
     def _walk(self, totals: Tensor) -> WorkerSegments:
         """Walk until T steps are taken or the episode ends; new episodes begin at once, to be walked in next round."""
         nav, steps = self.navigation, self.learner.rollout_steps
-        shape = steps, len(self.target)
+        shape = steps, len(nav.target)
         reward, action = torch.zeros(shape), torch.zeros(shape, dtype=torch.int64)
         walked, ended = torch.zeros(shape, dtype=torch.bool), torch.zeros(shape, dtype=torch.bool)
         cut = torch.zeros(shape[1], dtype=torch.bool)
         walking = torch.ones(shape[1], dtype=torch.bool)
-        self.local.begin(nav.history)
+        self.local.begin(nav.history, self.world.target_state[nav.target])
         for t in range(steps):
             scores = self.local.output_at(t)[:, : self.world.next_state.shape[1]]
             action[t] = sample_actions(scores, self.action_stream.uniform(used=walking))
@@ -163,7 +164,7 @@ class WorkerGroup:
             self.local.arrive(t + 1, step.state)
             walking = walking & ~step.ended
         self.local.output_at(steps)
-        nav.reset(torch.nonzero(~walking)[:, 0], target=self.target[~walking])
+        nav.reset(torch.nonzero(~walking)[:, 0])
         return WorkerSegments(reward, action, walked, ended, cut)
 
     def _step(self, action: Tensor, walking: Tensor) -> Transition:
@@ -185,7 +186,7 @@ class WorkerGroup:
             rows[:, REACHED] = step.reached[ended].double()
             rows[:, STEPS] = self.navigation.elapsed[ended].double()
             rows[:, COLLISIONS] = self.open_collisions[ended]
-            totals.index_add_(0, self.target[ended], rows)
+            totals.index_add_(0, self.navigation.target[ended], rows)
             self.open_collisions[ended] = 0
 
     def _loss(self, segments: WorkerSegments, settings: LossSettings) -> tuple[LossTerms, Tensor, float]:
@@ -204,7 +205,7 @@ class WorkerGroup:
         action, scores = segments.action[taken], output[:-1][taken]
         batch = Batch(
             history=self.navigation.history[:0],
-            target=self.target[:0],
+            target=self.navigation.target[:0],
             action=action,
             log_prob=torch.log_softmax(scores[:, :-1], 1).gather(1, action[:, None])[:, 0],
             advantage=advantage[taken],

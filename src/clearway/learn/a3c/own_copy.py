@@ -48,22 +48,18 @@ class LocalNetwork:
     Args:
         shape: of the network.
         features: (S, F), prepared features of all states, in any store.
-        target_state: (R,) int64, every worker's target.
         rows_per_scene: number of workers in each scene, in order.
         steps: T.
     """
 
-    def __init__(
-        self, shape: NetworkShape, features: Tensor, target_state: Tensor, rows_per_scene: list[int], steps: int
-    ) -> None:
-        self.features, self.target_state, self.steps = features, target_state, steps
+    def __init__(self, shape: NetworkShape, features: Tensor, rows_per_scene: list[int], steps: int) -> None:
+        self.features, self.steps = features, steps
         self.history_length, self.width = shape.history_length, shape.width
         self.siamese = torch.empty(shape.history_length, shape.width, shape.feature_count)  # newest slot first
         self.copied: dict[str, Tensor] = {}
         self.heads = _head_rows(rows_per_scene)
-        workers = len(target_state)
+        workers = sum(rows_per_scene)
         self.trail_features = torch.zeros(workers, self.history_length + steps + 1, shape.feature_count)
-        self.trail_features[:, -1] = features[target_state]
         self.seen, self.fused, self.special = torch.zeros(3, workers, steps + 1, self.width).unbind(0)
         self.output = torch.empty(workers, steps + 1, OUTPUTS)
 
@@ -77,10 +73,11 @@ class LocalNetwork:
             for scene, _ in self.heads:
                 self.copied[f"{name}.{scene}"] = parameters[name][scene].clone()
 
-    def begin(self, history: Tensor) -> None:
-        """Start segments from histories (R, K) int64; then `output_at(0)` may be asked for."""
+    def begin(self, history: Tensor, target_state: Tensor) -> None:
+        """Start segments from histories (R, K) int64 to poses (R,) int64; then `output_at(0)` may be asked for."""
         slots, most = self.history_length, self.steps + 1
         self.trail_features[:, :slots] = self.features[history]
+        self.trail_features[:, -1] = self.features[target_state]
         self.seen.copy_(self.copied["siamese_bias"].expand_as(self.seen))
         wanted = self.copied["siamese_bias"].repeat(len(history), 1)
         for slot in range(slots):

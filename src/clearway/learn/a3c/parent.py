@@ -41,7 +41,7 @@ class AsyncTrainer:
 
     Args:
         world: tables of the scenes and targets; must hold features, on the processor.
-        learner: the settings; `envs` workers, worker i for target i modulo the number of targets.
+        learner: the settings; `envs` workers, of which worker i begins with target i modulo the number of targets.
         reward: what is earned.
         seed: of parameters, environments and actions. With one process a seed repeats bit for bit; with more, the
             order in which they meet in shared memory is not repeatable.
