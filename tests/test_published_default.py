@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from clearway.experiments import fig6, quality
+from clearway.experiments.convergence import mark_steps, settled_row
 from clearway.experiments.groups import WALKED
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
+from clearway.learn.run_folder import RunFolder
 from helpers.published import (
     BESIDE,
     DOCS,
@@ -76,8 +78,19 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     usual = sorted(s for reward in REWARDS for s in seconds_of_runs(folder, f"ppo-{reward}-20t-3M-*"))
     longer, more = (sorted(seconds_of_runs(folder, f"ppo-*{name}-*")) for name in ("20t-6M", "[0468]0t-3M"))
     assert (len(usual), len(longer), len(more)) == (35, 15, 20)
-    of_quality = [s for job in quality.jobs(report.setting) for s in seconds_of_runs(folder, job.run.name)]
-    assert len(of_quality) == 5 and f"but for time (up to {max(of_quality):.0f} s;" in RESULTS
+    of_quality = [RunFolder(folder / "runs" / job.run.name).metrics() for job in quality.jobs(report.setting)]
+    mark = mark_steps(report.setting, report.setting.targets)
+    settled = sorted(settled_row(rows, mark)["seconds"] for rows in of_quality)
+    ended = sorted(rows[-1]["seconds"] for rows in of_quality)
+    assert len(ended) == 5 and f"but for time (up to {ended[-1]:.0f} s;" in RESULTS
+    words = (
+        f"settled after {settled[0]:.0f} to {settled[-1]:.0f} s, and\nended after {ended[0]:.0f} to {ended[-1]:.0f} s."
+    )
+    assert words in PAGE
+    learnt = f"settled after {settled[0]:.0f} to {settled[-1]:.0f}"
+    performance = (DOCS / "performance.md").read_text(encoding="utf-8")
+    assert f"| {learnt} |" in RESULTS and f"| {learnt} s, five seeds |" in performance
+    assert f"the end of training, {ended[0]:.0f} to {ended[-1]:.0f} s;" in performance
     for own in (usual[:31], usual[31:], longer, more):
         assert [int(end) for end in ends[:2]] == [round(own[0]), round(own[-1])]
         ends = ends[2:]
@@ -96,6 +109,10 @@ def check_quality(section: Section, told: list[list[str]]) -> None:
         assert where == row["which is the worst"].replace("_", " ")
         for text, name in ((ratio, "x the shortest path"), (written, "worst target"), (collisions, "collisions")):
             assert_written(text, row[name], name)
+    ((_, *ranges, _),) = [row for row in rows_of(RESULTS) if row[0] == "four rooms, seeds 20 to 24"]
+    for text, name in zip(ranges, ("x the shortest path", "worst target", "collisions"), strict=True):
+        for end, value in zip(numbers(text), sorted(row[name] for row in own)[::4], strict=True):
+            assert_written(end, value, name)
     told = (
         "Five trainings of fresh seeds meet them in the rooms it was tuned on, but for time (up to 338 s; [question 64"
     )
