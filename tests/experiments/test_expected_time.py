@@ -5,15 +5,19 @@ from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
+from clearway.evaluation.episodes import episode_starts
 from clearway.experiments import expected_time
-from clearway.experiments.expected_time import frames_per_second, told_time
-from clearway.experiments.job import run_folder
+from clearway.experiments.expected_time import Walk, _duration, frames_per_second, told_time, walk_of
+from clearway.experiments.job import run_folder, trial_path
+from clearway.experiments.plan import LiveTrial
 from clearway.experiments.reproduce import planned
 from clearway.learn.checkpoint import Progress, write_checkpoint
 from clearway.learn.presets import PAPER_A3C
+from clearway.live.conditions import Condition, Perturbations
 from helpers.small_setting import small_setting
 
 
@@ -21,12 +25,15 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
     jobs = planned(small_setting(tmp_path), ["fig4"])
     frames = sum(job.run.learner.frames for job in jobs)
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
+    monkeypatch.setattr(expected_time, "walk_of", lambda run, trial, threads: Walk(per_step=0.125, straight=8.0))
+    episodes = 2 * len(jobs) * 5 * 3  # at the end and halfway, three to each of five targets; of 8 to 40 steps
+    walked = f"evaluation {_duration(episodes / 2)} if all go straight, {_duration(episodes * 5 / 2)} if all get lost"
     assert (
         told_time(tmp_path, jobs, jobs, 2, 1)
-        == f"{len(jobs)} runs, {len(jobs)} to be trained, 2 at a time: 1 h 00 min of training here at least"
+        == f"{len(jobs)} runs, {len(jobs)} to be trained, 2 at a time: 1 h 00 min of training here at least; {walked}"
     )
     on_cluster = told_time(tmp_path, jobs, jobs, None, 1)
-    assert on_cluster.endswith("to be trained, one after the other: 2 h 00 min of training here")
+    assert "to be trained, one after the other: 2 h 00 min of training here; evaluation " in on_cluster
     assert told_time(tmp_path, jobs, [], 2, 1) == f"{len(jobs)} runs, 0 to be trained: all is there"
 
 
@@ -34,14 +41,23 @@ def test_what_has_been_trained_takes_no_time(tmp_path: Path, monkeypatch: pytest
     jobs = planned(small_setting(tmp_path), ["fig4"])
     (first, second), frames = jobs[:2], jobs[0].run.learner.frames
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
+    monkeypatch.setattr(expected_time, "walk_of", lambda run, trial, threads: Walk(per_step=0.125, straight=8.0))
     for run, reached in ((first.run, frames + 3), (second.run, frames // 2)):  # the last update may go beyond
         write_checkpoint(
             run_folder(tmp_path, run).checkpoints, {"weight": torch.zeros(1)}, {}, Progress(reached, 1, 1.0)
         )
     assert told_time(tmp_path, jobs, [first, second], 1, 1) == (
         f"{len(jobs)} runs, 1 to be trained, 1 only to be evaluated, 1 at a time: 1 h 00 min of training here at least"
+        "; evaluation 60 s if all go straight, 5 min if all get lost"
     )
-    assert told_time(tmp_path, jobs, [first], 1, 1) == f"{len(jobs)} runs, 0 to be trained, 1 only to be evaluated"
+    for trial in first.trials[1:]:
+        path = trial_path(tmp_path, first.run, trial)
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    assert told_time(tmp_path, jobs, [first], 1, 1) == (
+        f"{len(jobs)} runs, 0 to be trained, 1 only to be evaluated; "
+        "evaluation 15 s if all go straight, 75 s if all get lost"
+    )
 
 
 def test_each_kind_of_learner_is_tried_once_and_nothing_is_kept(
@@ -67,6 +83,30 @@ def test_a_speed_is_frames_by_seconds(tmp_path: Path, monkeypatch: pytest.Monkey
     began = time.perf_counter()
     speed = frames_per_second(job.run, threads=1)
     assert 0 < speed < job.run.learner.frames / 1e-4 and time.perf_counter() - began < 60
+
+
+def test_a_walk_is_tried_by_an_agent_that_has_learnt_nothing(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    (job, *_) = planned(setting, ["fig4"])
+    walk = walk_of(job.run, job.trials[0], threads=1)
+    world = setting.world()
+    starts = episode_starts(world, job.trials[0].episodes_per_target, 0)
+    offsets = world.scene_offset[world.target_scene].tolist()
+    scenes = [setting.scenes[index] for index in world.target_scene.tolist()]
+    ways = [
+        scene.distances_to(np.array([world.scene_state(target)]))[0][own - offset]
+        for target, (scene, own, offset) in enumerate(zip(scenes, starts, offsets, strict=True))
+    ]
+    assert 0 < walk.per_step < 1 and walk.straight == pytest.approx(np.mean(ways))
+    assert not (tmp_path / "runs").exists()
+
+
+def test_episodes_off_the_grid_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (job, *_) = planned(small_setting(tmp_path), ["fig4"])
+    monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: 1e6)
+    settings = Condition("none", Perturbations()), Condition("turn", Perturbations(angle_noise=5))
+    live = replace(job, trials=(LiveTrial(settings, 4, 40),))
+    assert told_time(tmp_path, [live], [live], 1, 1).endswith("of training here at least; 40 episodes off the grid")
 
 
 def test_asynchronous_workers_are_tried_too_and_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,22 +1,47 @@
-"""How long the trainings of a plan will take on this machine: each kind of learner is tried for some seconds."""
+"""How long a plan will take on this machine: each kind of learner is tried for some seconds, and so is its walk.
+
+How far an agent will have learnt to walk by then nobody knows, so evaluation is told from where all go straight to
+where all get lost.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 
-from clearway.experiments.job import frames_left, request_of
-from clearway.experiments.plan import Job, PlannedRun
+from clearway.evaluation.episodes import run_episodes
+from clearway.experiments.job import frames_left, request_of, trial_path
+from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial
+from clearway.learn.foreign_agent import made_agent
+from clearway.learn.run_record import record_of
+from clearway.learn.running import acting_tensors
 from clearway.torch_threads import torch_threads
+from clearway.world.world import make_world
 
 TRIED_S = 2.0
 """A kind of learner is tried for so long, after its first update."""
+TRIED_STEPS = 20
+"""All episodes of a kind's first trial are tried for so many steps."""
+
+
+@dataclass(frozen=True)
+class Walk:
+    """How fast the episodes of a trial are walked.
+
+    Attributes:
+        per_step: seconds a step of an episode, of all side by side.
+        straight: mean steps of an episode where all go straight.
+    """
+
+    per_step: float
+    straight: float
 
 
 def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int | None, threads: int) -> str:
-    """How many runs are to be trained, or only evaluated, and for how long training takes at least, in a line.
+    """How many runs are to be trained, or only evaluated, and how long that takes at least, in a line.
 
     Runs side by side are held for as fast as one alone; so many share memory and caches, and take longer.
     Where nobody knows how many there will be (`workers` None, on a Ray cluster), it is the time of all of them, one
@@ -34,8 +59,10 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
     counted = f"{len(jobs)} runs, {len(to_train)} to be trained"
     if trained := len(left) - len(to_train):
         counted += f", {trained} only to be evaluated"
+    beside = min(workers or 1, len(left))
+    walking = _told_walking(out, left, beside, threads)
     if not to_train:
-        return counted if left else f"{counted}: all is there"
+        return f"{counted}{walking}" if left else f"{counted}: all is there"
     speeds: dict[str, float] = {}
     seconds, longest = 0.0, 0.0
     for run, count in to_train:
@@ -43,9 +70,34 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
             speeds[run.kind] = frames_per_second(run, threads)
         seconds += count / speeds[run.kind]
         longest = max(longest, count / speeds[run.kind])
-    beside = min(workers or 1, len(to_train))
+    beside = min(beside, len(to_train))
     how, least = (f"{beside} at a time", " at least") if workers else ("one after the other", "")
-    return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}"
+    return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}{walking}"
+
+
+def _told_walking(out: Path, left: Sequence[Job], beside: int, threads: int) -> str:
+    """How long the missing trials take, behind what is said of training."""
+    walks: dict[str, Walk] = {}
+    straight = lost = 0.0
+    live = 0
+    for job in left:
+        for trial in (trial for trial in job.trials if not trial_path(out, job.run, trial).exists()):
+            if isinstance(trial, LiveTrial):
+                targets = sum(map(len, job.run.targets))
+                live += len(trial.settings) * targets * trial.episodes_per_target
+                continue
+            if not type(job.run.learner).__module__.startswith("clearway."):
+                continue  # what another package's agent does that has learnt nothing is not ours to try
+            if job.run.kind not in walks:
+                walks[job.run.kind] = walk_of(job.run, trial, threads)
+            walk, episodes = walks[job.run.kind], sum(map(len, trial.targets)) * trial.episodes_per_target
+            straight += episodes * walk.per_step * min(walk.straight, trial.step_limit)
+            lost += episodes * walk.per_step * trial.step_limit
+    told = ""
+    if walks:
+        least, most = (_duration(seconds / beside) for seconds in (straight, lost))
+        told = f"; evaluation {least} if all go straight, {most} if all get lost"
+    return told + (f"; {live:,} episodes off the grid" if live else "")
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:
@@ -57,6 +109,25 @@ def frames_per_second(run: PlannedRun, threads: int) -> float:
             trainer.update()
         taken = time.perf_counter() - began
     return max(trainer.frames - frames, 1) / taken
+
+
+def walk_of(run: PlannedRun, trial: Trial, threads: int) -> Walk:
+    """How fast a run's agent walks a trial, tried for `TRIED_STEPS` steps by one that has learnt nothing."""
+    request = request_of(run)
+    with torch_threads(threads), closing(request.trainer()) as trainer:
+        agent = made_agent(record_of(request), acting_tensors(trainer, trainer.tensors()), 1)
+        targets = {scene.name: list(own) for scene, own in zip(request.scenes, trial.targets, strict=True)}
+        world = make_world(request.scenes, targets)
+        began = time.perf_counter()
+        table = run_episodes(
+            world,
+            agent.on_poses(world),
+            scenes=request.scenes,
+            episodes_per_target=trial.episodes_per_target,
+            step_limit=min(TRIED_STEPS, trial.step_limit),
+        )
+        taken = time.perf_counter() - began
+    return Walk(taken / int(table.steps.sum()), float(table.shortest_path_steps.mean()))
 
 
 def _duration(seconds: float) -> str:
