@@ -31,7 +31,7 @@ def test_a_line_for_each_learner_says_what_holds_and_what_does_not() -> None:
 def test_where_runs_are_too_few_one_line_says_so() -> None:
     few = section(*(claim(f"paper: {number}", "undecided", p=None) for number in range(30)))
     (line,) = in_short(few)
-    assert line.startswith("No claim is judged (30 are asked): fewer than 4 complete runs")
+    assert line.startswith("No claim is judged (30 asked): fewer than 4 complete runs")
     assert not is_judged(few) and in_short(section()) == ()
     counted = section(Claim("paper: all are good", "undecided", "4 of 4. Still to come: 1.", counted=True))  # without p
     assert is_judged(counted) and in_short(counted)[0].endswith("Undecided (1): all are good.")

@@ -25,7 +25,7 @@ def in_short(sections: Sequence[Section]) -> tuple[str, ...]:
         return ()
     if not is_judged(sections):
         return (
-            f"No claim is judged ({len(claims)} are asked): fewer than {LEAST_RUNS} complete runs of a kind decide "
+            f"No claim is judged ({len(claims)} asked): fewer than {LEAST_RUNS} complete runs of a kind decide "
             "nothing. The tables hold what was measured.",
         )
     lines = []
