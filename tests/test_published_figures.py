@@ -217,6 +217,27 @@ def test_other_encoders_and_rooms_meet_the_criteria_as_their_record_says() -> No
             assert run["collisions"] == pytest.approx(sum(row["collisions"] for row in rows) / len(rows))
 
 
+def test_the_default_of_seeds_5_to_9_is_as_good_as_its_record_says() -> None:
+    _, record = json.loads((DOCS / "figures" / "history.json").read_text(encoding="utf-8"))
+    runs = record["seeds"]
+    assert [run["seed"] for run in runs] == [5, 6, 7, 8, 9] and record["learner"]["history_length"] == 4
+    ((_, *cells, seconds),) = [row for row in rows_of(RESULTS) if row[0] == "four rooms, seeds 5 to 9"]
+    for cell, name in zip(cells, ("path_ratio", "worst_path_ratio", "collisions"), strict=True):
+        for end, value in zip(numbers(cell), (f(run[name] for run in runs) for f in (min, max)), strict=True):
+            assert_written(end, value, name)
+    solved, met = (
+        sorted(run["first_met"][name]["seconds"] for run in runs if run["first_met"][name])
+        for name in ("solved_targets", "all")
+    )
+    assert seconds == (
+        f"all solved after {solved[0]:.0f} to {solved[-1]:.0f}, all criteria after {met[0]:.0f} to {met[-1]:.0f}"
+    )
+    assert len(met) == 4 and sum(second <= 300 for second in met) == 3
+    assert f"three do, a fourth after {met[-1]:.0f} s:" in RESULTS
+    performance = (DOCS / "performance.md").read_text(encoding="utf-8")
+    assert f"| {solved[0]:.0f} to {solved[-1]:.0f} s, five seeds |" in performance
+
+
 def test_one_pose_beside_four_is_what_its_record_comes_to() -> None:
     arms = benchmark("quality_arms")
     records = arms["records_in"]([DOCS / "figures" / "history.json"])
