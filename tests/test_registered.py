@@ -34,6 +34,7 @@ def split(page: str) -> list[str]:
 SECTIONS = {part.partition("\n")[0].strip("# "): part for part in split(PAGE.read_text())}
 RECORDS = ROOT / "docs" / "records"
 ASKED_FIRST = {
+    ("a3c-longer", ""): {63},
     ("across-rooms", ""): {68},
     ("bedroom-fresh", "a2c-collision-aware-"): {38},
     ("bedroom-fresh", "a2c-shortest-"): {38},
