@@ -35,6 +35,8 @@ SECTIONS = {part.partition("\n")[0].strip("# "): part for part in split(PAGE.rea
 RECORDS = ROOT / "docs" / "records"
 ASKED_FIRST = {
     ("a3c-longer", ""): {63},
+    ("a3c-targets", "a2c-"): {70},
+    ("a3c-targets", "a3c-"): {71},
     ("across-rooms", ""): {68},
     ("bedroom-fresh", "a2c-collision-aware-"): {38},
     ("bedroom-fresh", "a2c-shortest-"): {38},
