@@ -1,7 +1,7 @@
 """How long a plan will take is told before it begins."""
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from multiprocessing import active_children
 from pathlib import Path
 
@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from clearway.evaluation.episodes import episode_starts
 from clearway.experiments import expected_time
-from clearway.experiments.expected_time import Walk, _duration, frames_per_second, told_time, walk_of
+from clearway.experiments.expected_time import _duration, frames_per_second, shortest_steps, told_time, walking_time
 from clearway.experiments.job import run_folder, trial_path
 from clearway.experiments.plan import LiveTrial
 from clearway.experiments.reproduce import planned
+from clearway.learn.a2c import A2C
 from clearway.learn.checkpoint import Progress, write_checkpoint
 from clearway.learn.presets import PAPER_A3C
 from clearway.live.conditions import Condition, Perturbations
@@ -25,7 +25,8 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
     jobs = planned(small_setting(tmp_path), ["fig4"])
     frames = sum(job.run.learner.frames for job in jobs)
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
-    monkeypatch.setattr(expected_time, "walk_of", lambda run, trial, threads: Walk(per_step=0.125, straight=8.0))
+    monkeypatch.setattr(expected_time, "walking_time", lambda run, trial, threads: 0.125)
+    monkeypatch.setattr(expected_time, "shortest_steps", lambda scenes, targets: [8.0] * sum(map(len, targets)))
     episodes = 2 * len(jobs) * 5 * 3  # at the end and halfway, three to each of five targets; of 8 to 40 steps
     walked = f"evaluation {_duration(episodes / 2)} if all go straight, {_duration(episodes * 5 / 2)} if all get lost"
     assert (
@@ -41,7 +42,8 @@ def test_what_has_been_trained_takes_no_time(tmp_path: Path, monkeypatch: pytest
     jobs = planned(small_setting(tmp_path), ["fig4"])
     (first, second), frames = jobs[:2], jobs[0].run.learner.frames
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
-    monkeypatch.setattr(expected_time, "walk_of", lambda run, trial, threads: Walk(per_step=0.125, straight=8.0))
+    monkeypatch.setattr(expected_time, "walking_time", lambda run, trial, threads: 0.125)
+    monkeypatch.setattr(expected_time, "shortest_steps", lambda scenes, targets: [8.0] * sum(map(len, targets)))
     for run, reached in ((first.run, frames + 3), (second.run, frames // 2)):  # the last update may go beyond
         write_checkpoint(
             run_folder(tmp_path, run).checkpoints, {"weight": torch.zeros(1)}, {}, Progress(reached, 1, 1.0)
@@ -85,20 +87,47 @@ def test_a_speed_is_frames_by_seconds(tmp_path: Path, monkeypatch: pytest.Monkey
     assert 0 < speed < job.run.learner.frames / 1e-4 and time.perf_counter() - began < 60
 
 
-def test_a_walk_is_tried_by_an_agent_that_has_learnt_nothing(tmp_path: Path) -> None:
-    setting = small_setting(tmp_path)
-    (job, *_) = planned(setting, ["fig4"])
-    walk = walk_of(job.run, job.trials[0], threads=1)
-    world = setting.world()
-    starts = episode_starts(world, job.trials[0].episodes_per_target, 0)
-    offsets = world.scene_offset[world.target_scene].tolist()
-    scenes = [setting.scenes[index] for index in world.target_scene.tolist()]
-    ways = [
-        scene.distances_to(np.array([world.scene_state(target)]))[0][own - offset]
-        for target, (scene, own, offset) in enumerate(zip(scenes, starts, offsets, strict=True))
-    ]
-    assert 0 < walk.per_step < 1 and walk.straight == pytest.approx(np.mean(ways))
+def test_a_walk_is_tried_by_an_agent_that_has_learnt_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (job, *_) = planned(small_setting(tmp_path), ["fig4"])
+    walked, steps = expected_time.run_episodes, []
+
+    def counted(*arguments, **settings):
+        table = walked(*arguments, **settings)
+        steps.append(table.steps.sum())
+        return table
+
+    monkeypatch.setattr(expected_time, "run_episodes", counted)
+    began = time.perf_counter()
+    found = walking_time(job.run, job.trials[0], threads=1)
+    assert 0 < found * steps[0] < time.perf_counter() - began
+    assert 15 < steps[0] <= 15 * expected_time.TRIED_STEPS  # three episodes to each of five targets
     assert not (tmp_path / "runs").exists()
+
+
+def test_shortest_steps_are_means_over_all_starts_target_by_target(tmp_path: Path) -> None:
+    setting = small_setting(tmp_path)
+    ways = [
+        scene.distances_to(np.array([target]))[0]
+        for scene, own in zip(setting.scenes, setting.targets, strict=True)
+        for target in own
+    ]
+    expected = [sum(steps for steps in way.tolist() if steps > 0) / (way > 0).sum() for way in ways]
+    assert shortest_steps(setting.files, setting.targets) == pytest.approx(expected)
+
+
+@dataclass(frozen=True)
+class Foreign(A2C):
+    """Another package's algorithm."""
+
+
+def test_episodes_of_other_packages_agents_are_counted_not_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (job, *_) = planned(small_setting(tmp_path), ["fig4"])
+    monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: 1e6)
+    foreign = replace(job, run=replace(job.run, learner=Foreign(frames=100)))
+    told = told_time(tmp_path, [foreign], [foreign], 1, 1)
+    assert told.endswith("of training here at least; 30 episodes of other packages' agents")
 
 
 def test_episodes_off_the_grid_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

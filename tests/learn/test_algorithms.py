@@ -37,8 +37,11 @@ def test_a_setting_that_an_algorithm_lacks_it_has_nowhere() -> None:
 
 def test_settings_of_the_same_name_are_carried_over() -> None:
     assert carried_over(DEFAULT, A2C) == A2C()
-    assert carried_over(PAPER_A2C, A3C) == replace(PAPER_A3C, envs=100, episode_targets="drawn")
-    assert carried_over(PAPER_A3C, A2C).envs == 20
+    assert carried_over(PAPER_A2C, A3C) == replace(PAPER_A3C, envs=100)
+    assert (carried_over(PAPER_A3C, A2C).envs, carried_over(PAPER_A3C, A2C).episode_targets) == (20, "drawn")
+    assert carried_over(replace(PAPER_A3C, episode_targets="drawn"), A2C).episode_targets == "drawn"
+    assert carried_over(replace(PAPER_A2C, episode_targets="kept"), A3C).episode_targets == "kept"
+    assert carried_over(replace(PAPER_A2C, episode_targets="kept"), PPO).episode_targets == "kept"
     assert carried_over(replace(DEFAULT, frames=77, width=33), BC) == replace(
         carried_over(DEFAULT, BC), frames=77, width=33
     )

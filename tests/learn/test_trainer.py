@@ -238,11 +238,22 @@ def test_environments_draw_a_target_for_every_episode_or_keep_their_own(rule: Ep
 
 
 @pytest.mark.parametrize(
-    ("other", "said"), [({"balance": 3.0}, "balance is 3.0"), ({"goals": "seen"}, "goals is seen")]
+    ("other", "said"),
+    [
+        ({"balance": 3.0}, "balance is 3.0"),
+        ({"goals": "seen"}, "goals is seen"),
+        ({"scenes_at_once": 1}, "scenes_at_once is 1"),
+    ],
 )
 def test_kept_targets_are_refused_where_another_setting_would_have_them_drawn(other: dict, said: str) -> None:
     with pytest.raises(RunError, match=f"episode_targets is kept and {said}, which is of targets drawn"):
         small_learner(episode_targets="kept", **other)
+
+
+def test_fewer_environments_than_kept_targets_are_refused() -> None:
+    few = small_learner(envs=4, envs_by="scenes", episode_targets="kept")  # two for the corridor's three targets
+    with pytest.raises(RunError, match=r"scene 'corridor': 2 environments for 3 targets that they keep"):
+        small_trainer(few)
 
 
 def test_the_learning_rate_may_rise_before_it_falls() -> None:

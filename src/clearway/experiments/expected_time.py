@@ -9,15 +9,18 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+
+import numpy as np
 
 from clearway.evaluation.episodes import run_episodes
 from clearway.experiments.job import frames_left, request_of, trial_path
-from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial
+from clearway.experiments.plan import Job, LiveTrial, PlannedRun, SceneFile, TargetSets, Trial
 from clearway.learn.foreign_agent import made_agent
 from clearway.learn.run_record import record_of
 from clearway.learn.running import acting_tensors
+from clearway.scenes.thor_v1 import read_scene
 from clearway.torch_threads import torch_threads
 from clearway.world.world import make_world
 
@@ -27,21 +30,8 @@ TRIED_STEPS = 20
 """All episodes of a kind's first trial are tried for so many steps."""
 
 
-@dataclass(frozen=True)
-class Walk:
-    """How fast the episodes of a trial are walked.
-
-    Attributes:
-        per_step: seconds a step of an episode, of all side by side.
-        straight: mean steps of an episode where all go straight.
-    """
-
-    per_step: float
-    straight: float
-
-
 def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int | None, threads: int) -> str:
-    """How many runs are to be trained, or only evaluated, and how long that takes at least, in a line.
+    """How many runs are to be trained, or only evaluated, how long training takes at least, and evaluation, in a line.
 
     Runs side by side are held for as fast as one alone; so many share memory and caches, and take longer.
     Where nobody knows how many there will be (`workers` None, on a Ray cluster), it is the time of all of them, one
@@ -77,27 +67,29 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
 
 def _told_walking(out: Path, left: Sequence[Job], beside: int, threads: int) -> str:
     """How long the missing trials take, behind what is said of training."""
-    walks: dict[str, Walk] = {}
+    missing = [(job.run, trial) for job in left for trial in job.trials if not trial_path(out, job.run, trial).exists()]
+    seconds_a_step: dict[object, float] = {}
     straight = lost = 0.0
-    live = 0
-    for job in left:
-        for trial in (trial for trial in job.trials if not trial_path(out, job.run, trial).exists()):
-            if isinstance(trial, LiveTrial):
-                targets = sum(map(len, job.run.targets))
-                live += len(trial.settings) * targets * trial.episodes_per_target
-                continue
-            if not type(job.run.learner).__module__.startswith("clearway."):
-                continue  # what another package's agent does that has learnt nothing is not ours to try
-            if job.run.kind not in walks:
-                walks[job.run.kind] = walk_of(job.run, trial, threads)
-            walk, episodes = walks[job.run.kind], sum(map(len, trial.targets)) * trial.episodes_per_target
-            straight += episodes * walk.per_step * min(walk.straight, trial.step_limit)
-            lost += episodes * walk.per_step * trial.step_limit
+    live = others = 0
+    for run, trial in missing:
+        episodes = trial.episodes_per_target
+        if isinstance(trial, LiveTrial):
+            live += len(trial.settings) * sum(map(len, run.targets)) * episodes
+        elif not type(run.learner).__module__.startswith("clearway."):
+            others += sum(map(len, trial.targets)) * episodes  # what such an agent does untrained is not ours to try
+        else:
+            alike = run.kind, run.scenes
+            if alike not in seconds_a_step:
+                seconds_a_step[alike] = walking_time(run, trial, threads)
+            steps = sum(shortest_steps(run.scenes, trial.targets))
+            straight += seconds_a_step[alike] * episodes * steps
+            lost += seconds_a_step[alike] * episodes * sum(map(len, trial.targets)) * trial.step_limit
     told = ""
-    if walks:
+    if seconds_a_step:
         least, most = (_duration(seconds / beside) for seconds in (straight, lost))
         told = f"; evaluation {least} if all go straight, {most} if all get lost"
-    return told + (f"; {live:,} episodes off the grid" if live else "")
+    further = ((live, "off the grid"), (others, "of other packages' agents"))
+    return told + "".join(f"; {count:,} episodes {whose}" for count, whose in further if count)
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:
@@ -111,8 +103,8 @@ def frames_per_second(run: PlannedRun, threads: int) -> float:
     return max(trainer.frames - frames, 1) / taken
 
 
-def walk_of(run: PlannedRun, trial: Trial, threads: int) -> Walk:
-    """How fast a run's agent walks a trial, tried for `TRIED_STEPS` steps by one that has learnt nothing."""
+def walking_time(run: PlannedRun, trial: Trial, threads: int) -> float:
+    """Seconds a step of an episode, all side by side, tried for `TRIED_STEPS` by an agent that has learnt nothing."""
     request = request_of(run)
     with torch_threads(threads), closing(request.trainer()) as trainer:
         agent = made_agent(record_of(request), acting_tensors(trainer, trainer.tensors()), 1)
@@ -126,8 +118,18 @@ def walk_of(run: PlannedRun, trial: Trial, threads: int) -> Walk:
             episodes_per_target=trial.episodes_per_target,
             step_limit=min(TRIED_STEPS, trial.step_limit),
         )
-        taken = time.perf_counter() - began
-    return Walk(taken / int(table.steps.sum()), float(table.shortest_path_steps.mean()))
+        return (time.perf_counter() - began) / int(table.steps.sum())
+
+
+@cache
+def shortest_steps(scenes: tuple[SceneFile, ...], targets: TargetSets) -> list[float]:
+    """Mean steps of the shortest paths to each target from where episodes may begin."""
+    found = []
+    for file, own in zip(scenes, targets, strict=True):
+        scene = read_scene(file.path, name=file.name)
+        ways = scene.distances_to(np.array(own, dtype=np.int64))
+        found += [float(way[way > 0].mean()) for way in ways]
+    return found
 
 
 def _duration(seconds: float) -> str:

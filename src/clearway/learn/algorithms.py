@@ -24,6 +24,10 @@ ALGORITHMS: dict[str, type[Learner]] = {kind.algorithm: kind for kind in OURS}
 Kind = TypeVar("Kind", bound=Learner)
 
 
+OWN_WAY = {"episode_targets"}
+"""Settings in which algorithms differ by nature."""
+
+
 def algorithm(name: str) -> type[Learner]:
     """The config class of that name, ours or another package's.
 
@@ -42,8 +46,11 @@ def algorithm(name: str) -> type[Learner]:
 def carried_over(learner: Learner, kind: type[Kind]) -> Kind:
     """The settings of another algorithm: this learner's where both have a setting of that name, else its own defaults.
 
+    Of `OWN_WAY` only what was set otherwise than by default is carried.
+
     Raises:
         RunError: they cannot work together.
     """
     shared = set(setting_names(type(learner))) & set(setting_names(kind))
-    return kind(**{name: getattr(learner, name) for name in shared})
+    own_way = {name for name in OWN_WAY & shared if getattr(learner, name) == getattr(type(learner), name)}
+    return kind(**{name: getattr(learner, name) for name in shared - own_way})

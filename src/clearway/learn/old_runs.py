@@ -2,27 +2,31 @@
 
 In the first format of run.json every algorithm had the settings of all three. Later on, the reward and the algorithm's
 settings could each clip, and run.json held the reward as it was given rather than as it was paid. Settings that came
-later than a run, `LATER`, have their default, which changes nothing; names of planned runs leave them out where they
-have it.
+later than a run have the value that changes nothing, `LATER`; names of planned runs leave them out where they have it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
+from types import MappingProxyType
 from typing import Any
 
+from clearway.learn.a3c.config import A3C
 from clearway.learn.learner import Learner, setting_names
 from clearway.learn.ppo import PPO
 from clearway.reward import Reward
 
-LATER = frozenset({"goals", "sent_gradients", "episode_targets", "lr_warm_up"})
-"""Settings that earlier versions did not have. What was done then is every algorithm's default, for good."""
+LATER: Mapping[str, object] = MappingProxyType(
+    {"goals": "given", "sent_gradients": "float32", "episode_targets": "drawn", "lr_warm_up": 0}
+)
+"""Settings that earlier versions did not have, and what was done then; A3C kept its targets."""
 
 
 def with_later(kind: type[Learner], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings of a run, with those that came later where the algorithm has them."""
-    return {field.name: field.default for field in fields(kind) if field.name in LATER} | dict(settings)
+    then = {**LATER, "episode_targets": "kept"} if issubclass(kind, A3C) else LATER
+    return {name: value for name, value in then.items() if name in setting_names(kind)} | dict(settings)
 
 
 def without_later(learner: Learner) -> dict[str, Any]:

@@ -113,8 +113,10 @@ class OnPolicy(OnFeatures, Learner):
             RunError: as `Learner`; or targets are kept that other settings would have drawn.
         """
         super().__post_init__()
-        if self.episode_targets == "kept" and (self.balance or self.goals == "seen"):
-            other = f"balance is {self.balance}" if self.balance else f"goals is {self.goals}"
+        drawn = {"balance": 0.0, "goals": "given", "scenes_at_once": 0}  # what leaves targets alone
+        changed = [name for name, value in drawn.items() if getattr(self, name) != value]
+        if self.episode_targets == "kept" and changed:
+            other = f"{changed[0]} is {getattr(self, changed[0])}"
             raise RunError(f"episode_targets is kept and {other}, which is of targets drawn. Set one of the two alone")
 
     @property

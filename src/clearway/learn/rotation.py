@@ -13,6 +13,7 @@ from torch import Tensor
 
 from clearway.errors import RunError
 from clearway.learn.on_policy import OnPolicy
+from clearway.world.world import World
 
 ROTATION_SALT = 1_000_033
 
@@ -87,6 +88,17 @@ def check_division(states: Tensor, learner: OnPolicy, rotation: Rotation) -> Non
     _check_envs(learner, most)
     least = float(_shares(states, learner, torch.cat([order[: most - 1], order[-1:]]))[order[-1]])
     _check_rows(learner, max(1, int(least * learner.envs)))  # rounded up it is more
+
+
+def check_kept(world: World, envs_per_scene: Sequence[int]) -> None:
+    """Raise RunError where a scene has fewer environments than targets, some of which nobody would ever walk to."""
+    targets = torch.bincount(world.target_scene, minlength=world.scene_count).tolist()
+    for name, envs, count in zip(world.scene_names, envs_per_scene, targets, strict=True):
+        if envs < count:
+            raise RunError(
+                f"scene {name!r:.60}: {envs} environments for {count} targets that they keep (episode_targets). "
+                "Give more environments (envs), or draw targets"
+            )
 
 
 def _shares(all_states: Tensor, learner: OnPolicy, scenes: Tensor) -> Tensor:

@@ -23,7 +23,7 @@ from clearway.learn.optimiser import clip_gradients, optimisers
 from clearway.learn.own_goals import OwnGoals, goal_world
 from clearway.learn.returns import generalised_advantages
 from clearway.learn.rollout import ACTION_STREAM, Collector, Rollout, as_rows, by_step
-from clearway.learn.rotation import Rotation, check_division, divided_envs, scene_of_envs
+from clearway.learn.rotation import Rotation, check_division, check_kept, divided_envs, scene_of_envs
 from clearway.learn.share import Share
 from clearway.learn.statistics import EpisodeStatistics
 from clearway.learn.step_figures import StepFigures, loss_figures, row_figures
@@ -72,6 +72,8 @@ class Trainer:
         self.feature_map, features = share.network_input(world, learner)
         first_env = sum(self.env_counts[: share.first])
         seeds = torch.arange(first_env, first_env + len(env_scene), dtype=torch.int64, device=device) + (seed << 32)
+        if learner.episode_targets == "kept":
+            check_kept(world, envs_per_scene)
         choice = TargetChoice.by_scene(world, env_scene)
         told = None
         if self.own_goals:
