@@ -46,7 +46,7 @@ def test_everything_is_shown_and_nothing_is_taken_for_markup(written, page_parts
 def test_where_nothing_is_judged_no_verdict_is_listed(tmp_path, page_parts):
     undecided = replace(SECTION, claims=(replace(CLAIM, verdict="undecided", p=None),))
     page = write_report(tmp_path, "T", [undecided], {}, "", []).read_text(encoding="utf-8")
-    assert CLAIM.text not in page_parts(page).texts and "No claim is judged (1 are asked)" in page
+    assert CLAIM.text not in page_parts(page).texts and "No claim is judged (1 asked)" in page
     assert CLAIM.text not in (tmp_path / "report.md").read_text(encoding="utf-8")
 
 
