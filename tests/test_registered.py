@@ -36,7 +36,7 @@ RECORDS = ROOT / "docs" / "records"
 ASKED_FIRST = {
     ("a3c-longer", ""): {63},
     ("a3c-targets", "a2c-"): {70},
-    ("a3c-targets", "a3c-"): {71},
+    ("a3c-targets", "a3c-"): {71, 72},
     ("across-rooms", ""): {68},
     ("bedroom-fresh", "a2c-collision-aware-"): {38},
     ("bedroom-fresh", "a2c-shortest-"): {38},
