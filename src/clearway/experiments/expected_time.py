@@ -49,8 +49,7 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
     counted = f"{len(jobs)} runs, {len(to_train)} to be trained"
     if trained := len(left) - len(to_train):
         counted += f", {trained} only to be evaluated"
-    beside = min(workers or 1, len(left))
-    walking = _told_walking(out, left, beside, threads)
+    walking = _told_walking(out, left, workers or 1, threads)
     if not to_train:
         return f"{counted}{walking}" if left else f"{counted}: all is there"
     speeds: dict[str, float] = {}
@@ -60,30 +59,32 @@ def told_time(out: Path, jobs: Sequence[Job], left: Sequence[Job], workers: int 
             speeds[run.kind] = frames_per_second(run, threads)
         seconds += count / speeds[run.kind]
         longest = max(longest, count / speeds[run.kind])
-    beside = min(beside, len(to_train))
+    beside = min(workers or 1, len(to_train))
     how, least = (f"{beside} at a time", " at least") if workers else ("one after the other", "")
     return f"{counted}, {how}: {_duration(max(longest, seconds / beside))} of training here{least}{walking}"
 
 
-def _told_walking(out: Path, left: Sequence[Job], beside: int, threads: int) -> str:
+def _told_walking(out: Path, left: Sequence[Job], workers: int, threads: int) -> str:
     """How long the missing trials take, behind what is said of training."""
+    beside = min(workers, len(left))
     missing = [(job.run, trial) for job in left for trial in job.trials if not trial_path(out, job.run, trial).exists()]
     seconds_a_step: dict[object, float] = {}
     straight = lost = 0.0
     live = others = 0
     for run, trial in missing:
-        episodes = trial.episodes_per_target
         if isinstance(trial, LiveTrial):
-            live += len(trial.settings) * sum(map(len, run.targets)) * episodes
-        elif not type(run.learner).__module__.startswith("clearway."):
-            others += sum(map(len, trial.targets)) * episodes  # what such an agent does untrained is not ours to try
-        else:
-            alike = run.kind, run.scenes
-            if alike not in seconds_a_step:
-                seconds_a_step[alike] = walking_time(run, trial, threads)
-            steps = sum(shortest_steps(run.scenes, trial.targets))
-            straight += seconds_a_step[alike] * episodes * steps
-            lost += seconds_a_step[alike] * episodes * sum(map(len, trial.targets)) * trial.step_limit
+            live += len(trial.settings) * sum(map(len, run.targets)) * trial.episodes_per_target
+            continue
+        ways = shortest_steps(run.scenes, trial.targets)
+        episodes = len(ways) * trial.episodes_per_target
+        if not type(run.learner).__module__.startswith("clearway."):
+            others += episodes  # what such an agent does untrained is not ours to try
+            continue
+        alike = run.kind, run.scenes
+        if alike not in seconds_a_step:
+            seconds_a_step[alike] = walking_time(run, trial, threads)
+        straight += seconds_a_step[alike] * sum(ways) * trial.episodes_per_target
+        lost += seconds_a_step[alike] * trial.step_limit * episodes
     told = ""
     if seconds_a_step:
         least, most = (_duration(seconds / beside) for seconds in (straight, lost))
@@ -107,13 +108,14 @@ def walking_time(run: PlannedRun, trial: Trial, threads: int) -> float:
     """Seconds a step of an episode, all side by side, tried for `TRIED_STEPS` by an agent that has learnt nothing."""
     request = request_of(run)
     with torch_threads(threads), closing(request.trainer()) as trainer:
-        agent = made_agent(record_of(request), acting_tensors(trainer, trainer.tensors()), 1)
+        trained = made_agent(record_of(request), acting_tensors(trainer, trainer.tensors()), 1)
         targets = {scene.name: list(own) for scene, own in zip(request.scenes, trial.targets, strict=True)}
         world = make_world(request.scenes, targets)
+        agent = trained.on_poses(world)
         began = time.perf_counter()
         table = run_episodes(
             world,
-            agent.on_poses(world),
+            agent,
             scenes=request.scenes,
             episodes_per_target=trial.episodes_per_target,
             step_limit=min(TRIED_STEPS, trial.step_limit),
