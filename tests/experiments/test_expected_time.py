@@ -11,7 +11,7 @@ import torch
 
 from clearway.experiments import expected_time
 from clearway.experiments.expected_time import _duration, frames_per_second, shortest_steps, told_time, walking_time
-from clearway.experiments.job import run_folder, trial_path
+from clearway.experiments.job import request_of, run_folder, trial_path
 from clearway.experiments.plan import LiveTrial
 from clearway.experiments.reproduce import planned
 from clearway.learn.a2c import A2C
@@ -97,11 +97,15 @@ def test_a_walk_is_tried_by_an_agent_that_has_learnt_nothing(tmp_path: Path, mon
         return table
 
     monkeypatch.setattr(expected_time, "run_episodes", counted)
+    made, acting = expected_time.made_agent, {}
+    monkeypatch.setattr(expected_time, "made_agent", lambda *given: acting.update(given[1]) or made(*given))
     began = time.perf_counter()
     found = walking_time(job.run, job.trials[0], threads=1)
     assert 0 < found * steps[0] < time.perf_counter() - began
     assert 15 < steps[0] <= 15 * expected_time.TRIED_STEPS  # three episodes to each of five targets
-    assert not (tmp_path / "runs").exists()
+    begun = request_of(job.run).trainer().tensors()
+    own = {name: tensor for name, tensor in acting.items() if name.startswith("network.")}
+    assert own and all(torch.equal(tensor, begun[name]) for name, tensor in own.items())
 
 
 def test_shortest_steps_are_means_over_all_starts_target_by_target(tmp_path: Path) -> None:

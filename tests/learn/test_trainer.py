@@ -246,7 +246,7 @@ def test_environments_draw_a_target_for_every_episode_or_keep_their_own(rule: Ep
     ],
 )
 def test_kept_targets_are_refused_where_another_setting_would_have_them_drawn(other: dict, said: str) -> None:
-    with pytest.raises(RunError, match=f"episode_targets is kept and {said}, which is of targets drawn"):
+    with pytest.raises(RunError, match=f"episode_targets is kept and {said}, which needs targets drawn"):
         small_learner(episode_targets="kept", **other)
 
 

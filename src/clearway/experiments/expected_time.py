@@ -1,7 +1,7 @@
 """How long a plan will take on this machine: each kind of learner is tried for some seconds, and so is its walk.
 
-How far an agent will have learnt to walk by then nobody knows, so evaluation is told from where all go straight to
-where all get lost.
+How far an agent will have learnt to walk by then nobody knows, so evaluation has two bounds: if all go straight, and if
+all get lost.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from clearway.evaluation.episodes import run_episodes
 from clearway.experiments.job import frames_left, request_of, trial_path
 from clearway.experiments.plan import Job, LiveTrial, PlannedRun, SceneFile, TargetSets, Trial
-from clearway.learn.foreign_agent import made_agent
+from clearway.learn.foreign_agent import is_ours, made_agent
 from clearway.learn.run_record import record_of
 from clearway.learn.running import acting_tensors
 from clearway.scenes.thor_v1 import read_scene
@@ -77,7 +77,7 @@ def _told_walking(out: Path, left: Sequence[Job], workers: int, threads: int) ->
             continue
         ways = shortest_steps(run.scenes, trial.targets)
         episodes = len(ways) * trial.episodes_per_target
-        if not type(run.learner).__module__.startswith("clearway."):
+        if not is_ours(run.learner):
             others += episodes  # what such an agent does untrained is not ours to try
             continue
         alike = run.kind, run.scenes

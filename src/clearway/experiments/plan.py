@@ -12,6 +12,7 @@ from typing import Final, Literal, TypeAlias
 
 from clearway.choices import ZoneLevel
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, STEP_LIMIT
+from clearway.learn.foreign_agent import is_ours
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import without_later
 from clearway.learn.plugged import paid_by
@@ -77,8 +78,7 @@ class PlannedRun:
         """Name of the run's folder: some of it for people, then the digest of all that determines the agent."""
         scenes = [(scene.name, scene.digest) for scene in self.scenes]
         settings = {"algorithm": self.learner.algorithm, **without_later(self.learner)}
-        kinds = [type(term).__module__ for term in self.reward.terms]
-        ours = all(kind.startswith("clearway.") for kind in kinds)  # their values tell them apart
+        ours = all(map(is_ours, self.reward.terms))  # their values tell them apart
         paid = asdict(self.reward) if ours else self.reward.to_json()
         content: list[object] = [scenes, self.targets, paid, settings, self.seed]
         if self.zone_level != "pose":  # runs planned before keep their names

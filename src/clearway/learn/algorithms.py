@@ -52,5 +52,5 @@ def carried_over(learner: Learner, kind: type[Kind]) -> Kind:
         RunError: they cannot work together.
     """
     shared = set(setting_names(type(learner))) & set(setting_names(kind))
-    own_way = {name for name in OWN_WAY & shared if getattr(learner, name) == getattr(type(learner), name)}
-    return kind(**{name: getattr(learner, name) for name in shared - own_way})
+    left = {name for name in OWN_WAY & shared if getattr(learner, name) == getattr(type(learner), name)}
+    return kind(**{name: getattr(learner, name) for name in shared - left})

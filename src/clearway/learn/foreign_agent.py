@@ -46,9 +46,9 @@ def made_agent(record: RunRecord, tensors: Mapping[str, Tensor], frames: int) ->
     return ForeignRecurrent(agent, plugin) if isinstance(agent, TrainedRecurrent) else ForeignTrained(agent, plugin)
 
 
-def is_ours(agent: TrainedAgent) -> bool:
+def is_ours(thing: object) -> bool:
     """It is of a class of clearway's, which needs no guard."""
-    return type(agent).__module__.startswith("clearway.")
+    return type(thing).__module__.startswith("clearway.")
 
 
 def plugin_of(agent: TrainedAgent) -> Plugin | None:

@@ -89,7 +89,7 @@ class OnPolicy(OnFeatures, Learner):
     lr_end: float = 5e-5
     """The learning rate falls linearly from start to end."""
     lr_warm_up: int = 0
-    """Frames over which it rises from 0 to that."""
+    """Frames over which a factor on it rises linearly from 0 to 1; 0: none."""
     clip_norm: float = 0.5
     """Largest norm of the gradient."""
     clip_each_tensor: bool = False
@@ -117,7 +117,7 @@ class OnPolicy(OnFeatures, Learner):
         changed = [name for name, value in drawn.items() if getattr(self, name) != value]
         if self.episode_targets == "kept" and changed:
             other = f"{changed[0]} is {getattr(self, changed[0])}"
-            raise RunError(f"episode_targets is kept and {other}, which is of targets drawn. Set one of the two alone")
+            raise RunError(f"episode_targets is kept and {other}, which needs targets drawn. Leave one of the two out")
 
     @property
     def epochs(self) -> int:

@@ -72,7 +72,8 @@ class Trainer:
         self.feature_map, features = share.network_input(world, learner)
         first_env = sum(self.env_counts[: share.first])
         seeds = torch.arange(first_env, first_env + len(env_scene), dtype=torch.int64, device=device) + (seed << 32)
-        if learner.episode_targets == "kept":
+        keep_targets = learner.episode_targets == "kept"
+        if keep_targets:
             check_kept(world, envs_per_scene)
         choice = TargetChoice.by_scene(world, env_scene)
         told = None
@@ -86,7 +87,7 @@ class Trainer:
             reward,
             seeds,
             choice=choice,
-            keep_targets=learner.episode_targets == "kept",
+            keep_targets=keep_targets,
             step_limit=learner.step_limit,
             history_length=learner.history_length,
             reward_dtype=torch.get_default_dtype(),

@@ -106,7 +106,7 @@ class Navigation:
         reward: what is earned.
         seeds: (N,) int64, one random stream an environment: environment i draws the same numbers in any batch.
         choice: how targets are drawn; by default uniformly from all.
-        keep_targets: an environment keeps the target that its first `reset` gave it, and draws none.
+        keep_targets: an environment keeps the target that it was last given and draws none; the first `reset` gives it.
         step_limit: steps after which an episode is truncated; None for no limit.
         history_length: K.
         reward_dtype: precision of the rewards.

@@ -52,7 +52,7 @@ class A3C(OnFeatures, Learner):
     lr_end: float = 0.0
     """The learning rate falls linearly from start to end."""
     lr_warm_up: int = 0
-    """Frames over which it rises from 0 to that."""
+    """Frames over which a factor on it rises linearly from 0 to 1; 0: none."""
     clip_norm: float = 40.0
     """Largest norm of a worker's gradient."""
     clip_each_tensor: bool = True

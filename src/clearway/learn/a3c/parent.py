@@ -239,7 +239,7 @@ class AsyncTrainer:
 
 
 def _by_target(workers: int, targets: int) -> Tensor:
-    """Numbers of all workers, (N,) int64, ordered by target and hence by scene; worker i is for target i modulo M."""
+    """Numbers of all workers, (N,) int64, ordered by target and hence by scene; worker i begins with i modulo M."""
     return torch.argsort(torch.arange(workers) % targets, stable=True)
 
 
