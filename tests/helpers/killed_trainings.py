@@ -1,8 +1,9 @@
 """Trainings of every algorithm, tiny, that are killed at random moments after their first checkpoint and go on.
 
 Each attempt is a fork of this process. It writes a checkpoint after every update; once it has written a new one, it
-gets SIGKILL up to `LONGEST_DELAY_S` later. `python -m helpers.killed_trainings FOLDER NAME KILLS SEED` prints the kills
-that fell, and whether all bits are those of a training that nobody has killed.
+gets SIGKILL up to `LONGEST_DELAY_S` later. A training that came to its end before all kills fell is compared, and begun
+anew for those left. `python -m helpers.killed_trainings FOLDER NAME KILLS SEED` prints the kills that fell, and whether
+all bits are those of a training that nobody has killed.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ from helpers.small_runs import small_learner, small_request
 UPDATES_A_KILL = 9  # of the whole training, more than an attempt gets through before it is killed
 LONGEST_DELAY_S = 0.06
 PATIENCE_S = 120.0
+MOST_TRAININGS = 10  # killed ones; a training that ends before any kill, ten times over, is too short
 TIMES = ("seconds", "pictures_per_second", "frames_per_second")
 PPO_BY_EYES = {"envs": 16, "rollout_steps": 8, "step_limit": 20, "width": 16, "minibatches": 2}
 ADAPT = {"tour_steps": 40, "walks": 2, "walk_steps": 10, "lessons": 1, "mind_walks": 80}
@@ -132,8 +134,30 @@ def figures_of(name: str, out: Path) -> list[dict[str, float]]:
     return [{key: value for key, value in row.items() if key not in TIMES} for row in rows]
 
 
+def kill_to_the_end(training: Callable[[Path], object], out: Path, kills: int, chance: random.Random) -> int:
+    """Kill a training up to so many times and let it come to its end; the number of kills that fell before it did."""
+    fell = 0
+    while fell < kills and killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S)):
+        fell += 1
+    assert os.waitpid(begun(training, out), 0)[1] == 0
+    return fell
+
+
+def compare(name: str, whole: Path, out: Path) -> None:
+    """The training that was killed ended as the whole one did.
+
+    Raises:
+        AssertionError: a bit or a figure differs.
+    """
+    bits, others = bits_of(whole), bits_of(out)
+    assert bits.keys() == others.keys(), f"{name}: other tensors"
+    different = [key for key in bits if not torch.equal(bits[key], others[key])]
+    assert not different, f"{name}: {different} differ"
+    assert figures_of(name, whole) == figures_of(name, out), f"{name}: other figures"
+
+
 def tried(name: str, folder: Path, kills: int, seed: int) -> int:
-    """Kill a training so many times, let it come to its end, and compare; the number of kills that fell.
+    """Kill trainings until so many kills fell, let each come to its end, and compare; the number of kills that fell.
 
     Raises:
         AssertionError: a bit differs, or a training failed.
@@ -141,17 +165,14 @@ def tried(name: str, folder: Path, kills: int, seed: int) -> int:
     torch.set_num_threads(1)
     folder.mkdir(parents=True)
     training, chance = trainer_of(name, folder, UPDATES_A_KILL * (kills + 1)), random.Random(seed)
-    whole, out = folder / "whole", folder / "killed"
+    whole = folder / "whole"
     assert os.waitpid(begun(training, whole), 0)[1] == 0
     fell = 0
-    while fell < kills and killed(begun(training, out), out, chance.uniform(0, LONGEST_DELAY_S)):
-        fell += 1
-    assert os.waitpid(begun(training, out), 0)[1] == 0
-    bits, others = bits_of(whole), bits_of(out)
-    assert bits.keys() == others.keys(), f"{name}: other tensors"
-    different = [key for key in bits if not torch.equal(bits[key], others[key])]
-    assert not different, f"{name}: {different} differ"
-    assert figures_of(name, whole) == figures_of(name, out), f"{name}: other figures"
+    for attempt in range(MOST_TRAININGS):
+        if fell < kills:
+            out = folder / f"killed-{attempt}"
+            fell += kill_to_the_end(training, out, kills - fell, chance)
+            compare(name, whole, out)
     return fell
 
 
