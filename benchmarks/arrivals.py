@@ -26,7 +26,6 @@ from clearway.agents.agent import FEATURES, POSE, Agent, Decisions, Observation,
 from clearway.agents.arrival import QUANTILE, Arrival, fitted_arrival
 from clearway.agents.by_pose import RandomWalk, shortest_paths
 from clearway.api.scenes import load_scenes
-from clearway.api.takes import TAKES, takes_seen
 from clearway.deploy.from_run import compared_numbers
 from clearway.evaluation.episodes import run_episodes
 from clearway.evaluation.goals import drawn_goals
@@ -35,6 +34,7 @@ from clearway.learn.provenance import hardware, package_versions
 from clearway.live.conditions import REFERENCE
 from clearway.perception.encode import encode_scenes
 from clearway.scenes.scene import Scene
+from clearway.views.seen import TAKES, takes_seen
 from clearway.world.world import World, make_world
 
 STEP_LIMIT = 100

@@ -25,11 +25,12 @@ from clearway.agents.agent import POSE, Agent, Decisions, Observation, State
 from clearway.agents.generalist import Generalist
 from clearway.agents.mapping import MappingAgent
 from clearway.agents.tour_map import map_of
-from clearway.api.takes import perturbations_asked, takes_seen
+from clearway.api.takes import perturbations_asked
 from clearway.evaluation.goals import GoalEvaluation, evaluate_goals
 from clearway.evaluation.tours import Touring
 from clearway.learn.provenance import hardware, package_versions
 from clearway.torch_threads import torch_threads
+from clearway.views.seen import takes_seen
 
 if TYPE_CHECKING:
     from clearway.scenes.scene import Scene

@@ -25,7 +25,6 @@ import clearway
 from clearway.agents.agent import FEATURES
 from clearway.agents.by_features import FeatureAgent
 from clearway.api.scenes import load_scenes
-from clearway.api.takes import TAKES, takes_seen
 from clearway.evaluation import metrics
 from clearway.evaluation.across_seeds import difference, permutation_p
 from clearway.evaluation.episodes import EPISODES_PER_TARGET, run_episodes
@@ -35,6 +34,7 @@ from clearway.learn.load import TrainedNetwork
 from clearway.learn.provenance import hardware, package_versions
 from clearway.live.words import perturbations_named
 from clearway.scenes.scene import Scene
+from clearway.views.seen import TAKES, takes_seen
 from clearway.world.world import make_world
 
 STEP_LIMIT = 500

@@ -114,7 +114,7 @@ def taken(monkeypatch):
     """Takes are the scenes' own pictures, but darker by the light asked for; each scene passes for a room."""
     asked = []
 
-    def grid_takes(scenes, perturbations, *, takes, seed, done):
+    def grid_takes(scenes, perturbations, *, takes, seed, workers, done):
         asked.append((perturbations, takes, seed))
         for number, scene in enumerate(scenes, 1):
             pictures = np.repeat(scene.observations[:][:, None], takes, axis=1)

@@ -7,7 +7,7 @@ import torch
 
 import clearway
 from clearway.api import training
-from clearway.api.takes import perturbations_asked, takes_made
+from clearway.api.takes import perturbations_asked
 from clearway.api.training import chosen_learner
 from clearway.errors import ArgumentError, ClearwayError
 from clearway.learn.presets import DEFAULT, PAPER_A3C
@@ -17,6 +17,7 @@ from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
 from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Moves, Reward, RewardError, Term, Time
 from clearway.scenes.thor_v1 import write_scene
+from clearway.views.seen import made_in_training
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
 
@@ -197,9 +198,9 @@ class Taken(Exception):
 
 def test_another_experiment_is_told_of_before_pictures_are_taken(corridor, tmp_path, monkeypatch, s3) -> None:
     out, asked = tmp_path / "run", {"perturb": "all", "resume": True, "targets": [8], **SMALL}
-    made = takes_made(perturbations_asked("all"), 4)
+    made = made_in_training(perturbations_asked("all"), 4, 0)
     request = RunRequest([corridor], {"corridor": [8]}, chosen_learner("ppo", settings=SMALL), COLLISION_AWARE)
-    record = record_of(replace(request, takes_made={**made, "seed": 0}))
+    record = record_of(replace(request, takes_made=made))
     with RunFolder(out).held():
         RunFolder(out).write_record(record)
     monkeypatch.setattr(training, "takes_seen", lambda *_, **__: (_ for _ in ()).throw(Taken))

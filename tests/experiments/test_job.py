@@ -79,7 +79,7 @@ def test_agents_that_see_pictures_are_shown_them_in_trials_and_for_maps(tmp_path
     setting = small_setting(tmp_path, seeds=1)
     setting = replace(setting, learners={"default": setting.learners["default"]})
     groups, made = compared(setting, PAIR), OnSight()
-    monkeypatch.setattr("clearway.experiments.job.load_agent", lambda *_: made)
+    monkeypatch.setattr("clearway.experiments.grid_trial.load_agent", lambda *_: made)
     monkeypatch.setattr("clearway.experiments.trajectories.load_agent", lambda *_: made)
     for each in all_jobs(groups):
         do(tmp_path, each, threads=1)

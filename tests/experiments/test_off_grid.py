@@ -194,6 +194,15 @@ def walked(setting: Setting, kept: Callable[[str, int], dict[str, float]]) -> di
     return {claim.text: claim for claim in section.claims}
 
 
+def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> None:
+    """As of a record, on a machine that lacks the encoder."""
+    walked(setting, lambda reward, seed: {"contacts": 1.0 + seed})
+    gone = replace(setting, scenes=tuple(replace(scene, encoder=None) for scene in setting.scenes))
+    there, elsewhere = (off_grid.section(own) for own in (setting, gone))
+    assert not off_grid.jobs(gone)
+    assert elsewhere.tables == there.tables and elsewhere.claims == there.claims and elsewhere.tables
+
+
 def test_fewer_contacts_of_five_seeds_are_told(setting: Setting) -> None:
     def kept(reward: str, seed: int) -> dict[str, float]:
         aware = reward == "collision-aware"

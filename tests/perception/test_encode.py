@@ -16,6 +16,7 @@ from clearway.perception.preprocess import Preprocessing
 from clearway.perception.random_resnet import ResNetShape
 from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.torch_threads import torch_threads
 from helpers.made import corridor_scene, grid_scene
 from helpers.spread_parts import workers_of
 
@@ -113,6 +114,30 @@ def test_what_is_cached_needs_no_network(monkeypatch: pytest.MonkeyPatch, folder
     for encoder, scenes in zip(asked, first, strict=True):
         for a, b in zip(scenes, encode_scenes(rooms(), encoder), strict=True):
             assert np.array_equal(a.features, b.features)
+
+
+def test_kept_features_are_those_of_their_pictures_encoder_and_threads(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes = encode_scenes(rooms(), "random-resnet50", threads=1)
+    encoders = [
+        encoder_from_record(encode_scenes(rooms(), "random-resnet50", seed=s, threads=1)[0].encoder) for s in (0, 1)
+    ]
+    pictures = [scene.observations for scene in scenes[:2]]
+    kept = own_cache / "features"
+    before = len(list(kept.glob("*.safetensors")))
+    for threads, more in ((1, 0), (2, 4)):  # of one thread they are those of the scenes
+        with torch_threads(threads):
+            found = [encode.kept_features(seen, encoder) for encoder in encoders for seen in pictures]
+            made = [encode.features_of(seen, encoder) for encoder in encoders for seen in pictures]
+        assert all(np.array_equal(one, other) for one, other in zip(found, made, strict=True))
+        assert not np.array_equal(found[0], found[2])
+        assert len(list(kept.glob("*.safetensors"))) == before + more
+    np.testing.assert_array_equal(encode.kept_features(pictures[0], encoders[0]).shape, scenes[0].features.shape)
+    monkeypatch.setattr(encode, "features_of", lambda *_: pytest.fail("encoded again"))
+    with torch_threads(2):
+        again = [encode.kept_features(seen, encoder) for encoder in encoders for seen in pictures]
+    assert all(np.array_equal(one, other) for one, other in zip(found, again, strict=True))
 
 
 def test_a_damaged_cache_is_made_again(own_cache: Path) -> None:

@@ -108,6 +108,19 @@ def nearest(features: np.ndarray, poses: np.ndarray, pictures: np.ndarray) -> np
     return poses[distance.argmin(axis=1)]
 
 
+def nearest_picture(world: World, seed: int, encoder: Encoder | None = None) -> NearestPicture:
+    """Who knows the pictures of a world with features, and which follows which, as random walkers have seen them.
+
+    Args:
+        world: where `WALKERS` walk, `MOST_A_POSE` frames for every pose.
+        seed: of the walkers.
+        encoder: see `NearestPicture`.
+    """
+    assert world.features is not None
+    seen = seen_by_walkers(world, frames_of(world, MOST_A_POSE), seed)
+    return NearestPicture(seen, world.features.float().cpu().numpy(), encoder)
+
+
 def frames_of(world: World, frames_a_pose: int) -> int:
     """Frames of all walkers together, as many each, in which they take so many for every pose of the world, or more."""
     return -(-frames_a_pose * world.state_count // WALKERS) * WALKERS

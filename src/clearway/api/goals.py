@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, TypeGuard
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.scenes import Scenes, load_scenes
-from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_seen
+from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.choices import GENERALIST, GOAL_STEPS, GOALS, is_generalist
 from clearway.errors import ArgumentError
 from clearway.live.conditions import Perturbations
 from clearway.scenes.sensors import RGB
+from clearway.views.seen import TAKES, takes_seen
 
 if TYPE_CHECKING:
     from clearway.agents.agent import Agent

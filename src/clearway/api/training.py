@@ -19,7 +19,7 @@ from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word, as_workers
 from clearway.api.run_settings import leave_settings, reward_options
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
-from clearway.api.takes import TAKES, Perturbed, perturbations_asked, takes_made, takes_seen
+from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
 from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import ArgumentError
@@ -30,7 +30,6 @@ from clearway.learn.plugged import faults_of
 from clearway.learn.presets import PRESETS
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import RunRecord
-from clearway.learn.seeds import SEED_LIMIT
 from clearway.learn.solved import unsolved_targets
 from clearway.learn.tracking import check_tracker
 from clearway.learn.train import RunRequest, check_can_begin
@@ -43,6 +42,7 @@ from clearway.reward import Reward, reward_named
 from clearway.scenes.scene import Scene
 from clearway.scenes.validate import SceneWarning
 from clearway.torch_threads import torch_threads
+from clearway.views.seen import TAKES, made_in_training, seed_in_training, takes_seen
 
 FIGURES = ("frames", "seconds", "solved_targets", "success", "steps", "collisions")  # of the table of a training
 
@@ -196,7 +196,7 @@ def train(
     )
     perturbations = perturbations_asked(perturb)
     if (count := _takes_asked(perturbations, takes)) is not None:  # none yet, to be refused before they are taken
-        request = replace(request, takes=(), takes_made={**takes_made(perturbations, count), "seed": number})
+        request = replace(request, takes=(), takes_made=made_in_training(perturbations, count, number))
     _check(request, kept, workers=processes, resume=resume, track=track, copy_to=copied)
     if count is not None:
         request = replace(request, takes=_takes(request, perturbations, count, show_progress))
@@ -302,7 +302,7 @@ def _takes_asked(perturbations: Perturbations, takes: int | None) -> int | None:
 
 def _takes(request: RunRequest, perturbations: Perturbations, count: int, show_progress: bool) -> Sequence[np.ndarray]:
     """Features of so many perturbed takes of the scenes' poses, see `RunRequest.takes`."""
-    own = SEED_LIMIT - 1 - request.seed  # no pictures that an evaluation with the same seed sees
+    own = seed_in_training(request.seed)
     sees = (FEATURES,)
     taken = takes_seen(request.scenes, perturbations, sees, None, takes=count, seed=own, show_progress=show_progress)
     return taken.seen[FEATURES]

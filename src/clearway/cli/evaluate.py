@@ -123,8 +123,9 @@ class Evaluate:
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
         from clearway.api.goals import goal_agent
-        from clearway.api.takes import TAKES, perturbations_asked
+        from clearway.api.takes import perturbations_asked
         from clearway.cli.goals import check_knows_any_room, evaluate_at_goals
+        from clearway.views.seen import TAKES
 
         self._check_goals_alone(self.room.given())
         if self.takes is not None and not self.perturb:

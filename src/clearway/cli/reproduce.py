@@ -31,7 +31,7 @@ class Reproduce:
 
     names: Annotated[tuple[str, ...], tyro.conf.Positional]
     """Some of table1, fig3, fig4, table2, table3, fig5, fig6, analysis, memory, quality, zones-or-step, shuffles,
-    step-size, zone-time, zone-levels, ablations, across-rooms, off-grid; all: each of these; or experiments of
+    step-size, zone-time, zone-levels, ablations, across-rooms, perturbed, off-grid; all: each of these; or those of
     installed packages (clearway plugins)."""
     out: Path = Path("reproduction")
     """Folder of scenes, runs and the report."""

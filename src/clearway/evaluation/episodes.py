@@ -121,7 +121,7 @@ def run_episodes(
         for chosen in torch.arange(len(target), device=world.device).split(episodes_at_once):
             walk = _Walk(world, agent, sight, seeds[chosen], target[chosen], step_limit, record)
             parts.append(walk.to_the_end())
-    return _joined(parts)
+    return joined(parts)
 
 
 def episode_seeds(world: World, episodes_per_target: int, seed: int) -> Tensor:
@@ -255,7 +255,9 @@ def _trajectories(start: Tensor, steps: Tensor, diary: list[tuple[Tensor, Tensor
     return tuple(Trajectory(np.concatenate([[first], states]), actions) for first, states, actions in walks)
 
 
-def _joined(parts: list[EpisodeTable]) -> EpisodeTable:
+def joined(parts: Sequence[EpisodeTable]) -> EpisodeTable:
+    """Tables of one world as one, in their order."""
+
     def column(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])
 

@@ -16,6 +16,7 @@ from clearway.experiments import (
     hard_tables,
     memory,
     off_grid,
+    perturbed,
     quality,
     shuffles,
     step_size,
@@ -46,6 +47,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     "zone-levels": Experiment(zone_levels.jobs, zone_levels.section),
     "ablations": Experiment(ablations.jobs, ablations.section),
     "across-rooms": Experiment(across_rooms.jobs, across_rooms.section),
+    "perturbed": Experiment(perturbed.jobs, perturbed.section),
     "off-grid": Experiment(off_grid.jobs, off_grid.section),
 }
 """Ours. A program may add its own, which it alone knows then; what a package offers, every command knows."""

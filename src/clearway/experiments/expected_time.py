@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from clearway.experiments.plan import Job, LiveTrial, PlannedRun, SceneFile, Tar
 from clearway.learn.foreign_agent import is_ours, made_agent
 from clearway.learn.run_record import record_of
 from clearway.learn.running import acting_tensors
+from clearway.learn.train import RunRequest
 from clearway.scenes.thor_v1 import read_scene
 from clearway.torch_threads import torch_threads
 from clearway.world.world import make_world
@@ -70,13 +72,16 @@ def _told_walking(out: Path, left: Sequence[Job], workers: int, threads: int) ->
     missing = [(job.run, trial) for job in left for trial in job.trials if not trial_path(out, job.run, trial).exists()]
     seconds_a_step: dict[object, float] = {}
     straight = lost = 0.0
-    live = others = 0
+    live = perturbed = others = 0
     for run, trial in missing:
         if isinstance(trial, LiveTrial):
             live += len(trial.settings) * sum(map(len, run.targets)) * trial.episodes_per_target
             continue
         ways = shortest_steps(run.scenes, trial.targets)
         episodes = len(ways) * trial.episodes_per_target
+        if trial.perturbed is not None:  # pictures would have to be taken
+            perturbed += episodes
+            continue
         if not is_ours(run.learner):
             others += episodes  # what such an agent does untrained is not ours to try
             continue
@@ -89,13 +94,17 @@ def _told_walking(out: Path, left: Sequence[Job], workers: int, threads: int) ->
     if seconds_a_step:
         least, most = (_duration(seconds / beside) for seconds in (straight, lost))
         told = f"; evaluation {least} if all go straight, {most} if all get lost"
-    further = ((live, "off the grid"), (others, "of other packages' agents"))
+    further = (
+        (live, "off the grid"),
+        (perturbed, "on perturbed pictures"),
+        (others, "of other packages' agents"),
+    )
     return told + "".join(f"; {count:,} episodes {whose}" for count, whose in further if count)
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:
     """Of a run's training, tried for `TRIED_S` seconds; nothing is kept of it."""
-    with torch_threads(threads), closing(request_of(run).trainer()) as trainer:
+    with torch_threads(threads), closing(_request_without_pictures(run).trainer()) as trainer:
         trainer.update()
         frames, began = trainer.frames, time.perf_counter()
         while time.perf_counter() - began < TRIED_S and not trainer.finished:
@@ -104,9 +113,18 @@ def frames_per_second(run: PlannedRun, threads: int) -> float:
     return max(trainer.frames - frames, 1) / taken
 
 
+def _request_without_pictures(run: PlannedRun) -> RunRequest:
+    """What to train; for perturbed pictures, which are yet to be taken, stand as many of the scenes' own."""
+    request = request_of(replace(run, perturbed=None))
+    if run.perturbed is None:
+        return request
+    own = [np.asarray(scene.features) for scene in request.scenes]
+    return replace(request, takes=[np.repeat(features[:, None], run.perturbed.takes, axis=1) for features in own])
+
+
 def walking_time(run: PlannedRun, trial: Trial, threads: int) -> float:
     """Seconds a step of an episode, all side by side, tried for `TRIED_STEPS` by an agent that has learnt nothing."""
-    request = request_of(run)
+    request = request_of(replace(run, perturbed=None))
     with torch_threads(threads), closing(request.trainer()) as trainer:
         trained = made_agent(record_of(request), acting_tensors(trainer, trainer.tensors()), 1)
         targets = {scene.name: list(own) for scene, own in zip(request.scenes, trial.targets, strict=True)}

@@ -7,22 +7,24 @@ is, so a job that was interrupted goes on from its last checkpoint.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
+from clearway.agents.agent import FEATURES
 from clearway.errors import RunError
-from clearway.evaluation.episode_files import read_episodes, write_episodes
-from clearway.evaluation.episodes import EpisodeTable, run_episodes
+from clearway.evaluation.episode_files import read_episodes
+from clearway.evaluation.episodes import EpisodeTable
+from clearway.experiments.grid_trial import walk_on_grid
 from clearway.experiments.live_trial import walk_live
 from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial
-from clearway.learn.checkpoint import checkpoints, frames_in, newest_checkpoint
-from clearway.learn.load import load_agent
+from clearway.learn.checkpoint import checkpoints, frames_in
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, set_threads, train
 from clearway.scenes.digest import scene_digest
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import read_scene
-from clearway.world.world import make_world
+from clearway.views.seen import made_in_training, seed_in_training, takes_seen
 
 RUNS, TRIALS = "runs", "trials"
 
@@ -50,6 +52,11 @@ def is_done(out: Path, job: Job) -> bool:
     return all(trial_path(out, job.run, trial).exists() for trial in job.trials)
 
 
+def any_walked(out: Path, jobs: Iterable[Job]) -> bool:
+    """Some trial of the jobs has been walked."""
+    return any(trial_path(out, job.run, trial).exists() for job in jobs for trial in job.trials)
+
+
 def unfinished(out: Path, jobs: Iterable[Job]) -> tuple[str, ...]:
     """Names of the runs whose jobs are not done."""
     return tuple(dict.fromkeys(job.run.name for job in jobs if not is_done(out, job)))
@@ -75,16 +82,16 @@ def do(out: Path, job: Job, threads: int) -> None:
         if isinstance(trial, LiveTrial):
             walk_live(path, folder.path, request.scenes, run, trial)
         else:
-            _walk_on_grid(path, folder, request.scenes, run, trial)
+            walk_on_grid(path, folder, request.scenes, run, trial)
 
 
 def request_of(run: PlannedRun) -> RunRequest:
-    """What to train, with the scenes as they lie in their files.
+    """What to train, with the scenes as they lie in their files; perturbed pictures are taken where they are not kept.
 
     Raises:
-        ClearwayError: a scene is missing or has changed.
+        ClearwayError: a scene is missing or has changed, or perturbed pictures cannot be taken.
     """
-    return RunRequest(
+    request = RunRequest(
         scenes=_scenes(run),
         targets={scene.name: targets for scene, targets in zip(run.scenes, run.targets, strict=True)},
         learner=run.learner,
@@ -93,6 +100,12 @@ def request_of(run: PlannedRun) -> RunRequest:
         zone_level=run.zone_level,
         paths={scene.name: scene.path for scene in run.scenes},
     )
+    if (asked := run.perturbed) is None:
+        return request
+    own = seed_in_training(run.seed)
+    taken = takes_seen(request.scenes, asked.perturbations, (FEATURES,), None, takes=asked.takes, seed=own, workers=1)
+    made = made_in_training(asked.perturbations, asked.takes, run.seed)
+    return replace(request, takes=taken.seen[FEATURES], takes_made=made)
 
 
 def episodes_of(out: Path, run: PlannedRun, trial: Trial) -> EpisodeTable | None:
@@ -109,26 +122,3 @@ def _scenes(run: PlannedRun) -> list[Scene]:
             raise RunError(f"{wanted.path}: has changed since the plan was made. Start again with another --out")
         scenes.append(scene)
     return scenes
-
-
-def _walk_on_grid(path: Path, folder: RunFolder, scenes: Sequence[Scene], run: PlannedRun, trial: Trial) -> None:
-    kept = newest_checkpoint(folder.milestone(run.halfway)) if trial.halfway else None
-    agent = load_agent(folder.path, kept)
-    targets = {scene.name: list(own) for scene, own in zip(scenes, trial.targets, strict=True)}
-    world = make_world(scenes, targets)
-    table = run_episodes(
-        world,
-        agent.on_poses(world),
-        scenes=scenes,
-        episodes_per_target=trial.episodes_per_target,
-        step_limit=trial.step_limit,
-        seed=trial.seed,
-    )
-    about = {
-        "run": run.name,
-        "targets": targets,
-        "halfway": trial.halfway,
-        "seed": trial.seed,
-        "step_limit": trial.step_limit,
-    }
-    write_episodes(path, table, about)

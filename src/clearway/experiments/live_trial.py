@@ -14,7 +14,7 @@ import numpy as np
 
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk
-from clearway.agents.on_learnt_map import MOST_A_POSE, NearestPicture, frames_of, seen_by_walkers
+from clearway.agents.on_learnt_map import nearest_picture
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, LiveTrial, PlannedRun
 from clearway.files import read_kept, written_whole
 from clearway.learn.load import load_network
@@ -70,17 +70,9 @@ def _walkers(places: Sequence[LiveScene], folder: Path, trial: LiveTrial) -> lis
     if trial.walker == RANDOM_WALK:
         return [RandomWalk() for _ in places]
     if trial.walker == NEAREST:
-        return [_by_nearest_picture(place, trial.seed) for place in places]
+        return [nearest_picture(place.world, trial.seed, place.encoder) for place in places]
     network = load_network(folder)
     return [NetworkAgent(network, index, place.encoder) for index, place in enumerate(places)]
-
-
-def _by_nearest_picture(place: LiveScene, seed: int) -> NearestPicture:
-    """Who knows the scene's own pictures, and which follows which, as random walkers on the grid have seen them."""
-    world = place.world
-    assert world.features is not None, "scenes of an experiment have features"
-    seen = seen_by_walkers(world, frames_of(world, MOST_A_POSE), seed)
-    return NearestPicture(seen, world.features.float().cpu().numpy(), place.encoder)
 
 
 def read_live(path: Path, settings: Iterable[Condition], episodes_per_target: int) -> np.ndarray:

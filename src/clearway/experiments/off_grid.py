@@ -8,18 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
-from clearway.errors import ClearwayError
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.groups import WALKED
-from clearway.experiments.job import trial_path
+from clearway.experiments.hindrance import hindrance
+from clearway.experiments.job import any_walked, trial_path
 from clearway.experiments.live_trial import FIGURES, read_live
-from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, LiveWalker, PlannedRun
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, PlannedRun, Walker
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
 from clearway.live.conditions import Condition, sweep_settings
-from clearway.live.live_room import check_is_room
-from clearway.live.walks import encoder_of
 from clearway.reward import BUMP, CLEARANCE, COLLISION_AWARE, SHORTEST, Reward
 
 NAME = "off-grid"
@@ -62,12 +60,14 @@ def settings(setting: Setting) -> list[Condition]:
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done; nothing where scenes cannot be walked in."""
-    return [job for group in _groups(setting) for job in group.jobs]
+    return [] if hindrance(setting.scenes) else _jobs(_groups(setting))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
     groups = _groups(setting)
+    if not any_walked(setting.out, _jobs(groups)) and (why := hindrance(setting.scenes)):
+        return Section(name=NAME, title="Off the grid", text=f"Nothing was walked. {why}")
     found = {(group.learner, group.reward): _scores(setting, group) for group in groups}
     return Section(
         name=NAME,
@@ -77,30 +77,19 @@ def section(setting: Setting) -> Section:
             f"episodes a target, {STEP_LIMIT} steps at most, under each setting of a sweep at full strength. Agents of "
             "one seed have the same starts and chances. Claims are of means over the settings. Who goes by the nearest "
             "picture knows those of the grid as it was built, and where the actions of random walkers led there."
-            if groups
-            else f"Nothing was walked. {_hindrance(setting)}"
         ),
-        tables=(_table(setting, found),) if groups else (),
-        claims=further(_claims(setting, found)) if groups else (),
+        tables=(_table(setting, found),),
+        claims=further(_claims(setting, found)),
     )
 
 
-def _hindrance(setting: Setting) -> str | None:
-    """Why the scenes cannot be walked in; None where they can."""
-    try:
-        for scene in setting.scenes:
-            check_is_room(scene)
-            encoder_of(scene)
-    except ClearwayError as error:
-        return str(error)
-    return None
+def _jobs(groups: Sequence[LiveGroup]) -> list[Job]:
+    return [job for group in groups for job in group.jobs]
 
 
 def _groups(setting: Setting) -> list[LiveGroup]:
-    if _hindrance(setting):
-        return []
     trained = [
-        LiveGroup(name, reward.name, _jobs(setting, setting.runs(learner, reward), "agent"))
+        LiveGroup(name, reward.name, _tried(setting, setting.runs(learner, reward), "agent"))
         for name, learner in setting.learners.items()
         for reward in REWARDS
     ]
@@ -108,12 +97,12 @@ def _groups(setting: Setting) -> list[LiveGroup]:
     frames = f"{frames_of(setting.world(), MOST_A_POSE):,} frames"
     return [
         *trained,
-        LiveGroup(NEAREST, frames, _jobs(setting, beside, NEAREST)),
-        LiveGroup(WALKED, RANDOM_WALK, _jobs(setting, beside, RANDOM_WALK)),
+        LiveGroup(NEAREST, frames, _tried(setting, beside, NEAREST)),
+        LiveGroup(WALKED, RANDOM_WALK, _tried(setting, beside, RANDOM_WALK)),
     ]
 
 
-def _jobs(setting: Setting, runs: Sequence[PlannedRun], walker: LiveWalker) -> tuple[Job, ...]:
+def _tried(setting: Setting, runs: Sequence[PlannedRun], walker: Walker) -> tuple[Job, ...]:
     episodes, asked = min(EPISODES_PER_TARGET, setting.budget.episodes_per_target), tuple(settings(setting))
     return tuple(Job(run, (LiveTrial(asked, episodes, STEP_LIMIT, run.seed, walker),)) for run in runs)
 

@@ -16,13 +16,14 @@ from clearway.learn.foreign_agent import is_ours
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import without_later
 from clearway.learn.plugged import paid_by
-from clearway.live.conditions import Condition
+from clearway.live.conditions import Condition, Perturbations
 from clearway.reward import Reward
+from clearway.views.seen import TAKES
 
 TargetSets = tuple[tuple[int, ...], ...]
 """Targets of each scene, in the scenes' order; states in the scene's own numbering."""
 
-LiveWalker: TypeAlias = Literal["agent", "nearest picture", "random walk"]
+Walker: TypeAlias = Literal["agent", "nearest picture", "random walk"]
 NEAREST: Final = "nearest picture"
 RANDOM_WALK: Final = "random walk"
 
@@ -39,6 +40,19 @@ class SceneFile:
 
 
 @dataclass(frozen=True)
+class PerturbedPictures:
+    """Perturbed pictures of every pose, see `views.seen`.
+
+    Attributes:
+        perturbations: how strong they are.
+        takes: of each pose.
+    """
+
+    perturbations: Perturbations
+    takes: int = TAKES
+
+
+@dataclass(frozen=True)
 class PlannedRun:
     """An agent to be trained.
 
@@ -46,6 +60,7 @@ class PlannedRun:
         scenes: all of them train one agent.
         targets: of each scene.
         reward, learner, seed, zone_level: see there.
+        perturbed: pictures that are seen beside the scenes' own; None: there are none.
     """
 
     scenes: tuple[SceneFile, ...]
@@ -54,6 +69,7 @@ class PlannedRun:
     learner: Learner
     seed: int
     zone_level: ZoneLevel = "pose"
+    perturbed: PerturbedPictures | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "targets", _plain(self.targets))
@@ -71,7 +87,8 @@ class PlannedRun:
     @cached_property
     def kind(self) -> str:
         """What the speed of its training depends on: the learner's settings, but not for how many frames."""
-        return _as_json([self.learner.algorithm, asdict(replace(self.learner, frames=1))])
+        takes = self.perturbed and self.perturbed.takes  # tables are as long as there are pictures
+        return _as_json([self.learner.algorithm, asdict(replace(self.learner, frames=1)), takes])
 
     @cached_property
     def name(self) -> str:
@@ -83,6 +100,8 @@ class PlannedRun:
         content: list[object] = [scenes, self.targets, paid, settings, self.seed]
         if self.zone_level != "pose":  # runs planned before keep their names
             content.append(self.zone_level)
+        if self.perturbed is not None:
+            content.append(asdict(self.perturbed))
         targets = sum(len(own) for own in self.targets)
         frames = f"{self.learner.frames / 1e6:g}M"
         return f"{self.learner.algorithm}-{self.reward.name}-{targets}t-{frames}-s{self.seed}-{_digest(content)}"
@@ -90,13 +109,15 @@ class PlannedRun:
 
 @dataclass(frozen=True)
 class Trial:
-    """Episodes to be walked by a trained agent: the paper's protocol on some targets.
+    """Episodes to be walked on the grid: the paper's protocol on some targets.
 
     Attributes:
         targets: of each scene.
         halfway: try the agent as it was halfway through its training, not the trained one.
         episodes_per_target, step_limit: of the protocol.
-        seed: of starts and sampled actions.
+        seed: of starts, sampled actions and perturbed pictures.
+        perturbed: pictures that are seen on the way; None: the scenes' own.
+        walker: the run's agent; or, by perturbed pictures, who goes by the nearest picture.
     """
 
     targets: TargetSets
@@ -104,14 +125,22 @@ class Trial:
     episodes_per_target: int = EPISODES_PER_TARGET
     step_limit: int = STEP_LIMIT
     seed: int = 0
+    perturbed: PerturbedPictures | None = None
+    walker: Walker = "agent"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "targets", _plain(self.targets))
+        assert self.walker == "agent" or (self.walker == NEAREST and self.perturbed is not None), self.walker
 
     @cached_property
     def name(self) -> str:
         """Name of its file in the run's folder."""
-        return f"{'halfway' if self.halfway else 'end'}-{sum(map(len, self.targets))}t-{_digest(asdict(self))}"
+        content = asdict(self)
+        if self.perturbed is None:  # trials planned before keep their names
+            del content["perturbed"]
+        if self.walker == "agent":
+            del content["walker"]
+        return f"{'halfway' if self.halfway else 'end'}-{sum(map(len, self.targets))}t-{_digest(content)}"
 
 
 @dataclass(frozen=True)
@@ -129,7 +158,7 @@ class LiveTrial:
     episodes_per_target: int
     step_limit: int
     seed: int = 0
-    walker: LiveWalker = "agent"
+    walker: Walker = "agent"
 
     @cached_property
     def name(self) -> str:

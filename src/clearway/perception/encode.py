@@ -178,6 +178,13 @@ def features_of(pictures: Observations, encoder: Encoder) -> np.ndarray:
     return np.concatenate([_encode(encoder, batch) for batch in _batches(pictures, BATCH_PICTURES)])
 
 
+def kept_features(pictures: Observations, encoder: Encoder) -> np.ndarray:
+    """`features_of`, kept in the user's cache folder as those of scenes are; the encoder's record says what it is."""
+    shaped_by = {"threads": threads_in_use(), "batch": BATCH_PICTURES}
+    key = joint_key(content_key(pictures), encoder.record.identity, shaped_by)
+    return cached("features", key, lambda: Entry({"features": features_of(pictures, encoder)})).arrays["features"]
+
+
 def _open(load: Callable[[EncoderRecord], Encoder], record: EncoderRecord, threads: int | None) -> Encoder:
     """What a worker encodes with: the network, with so many threads; None leaves them as they are."""
     if threads is not None:

@@ -1,0 +1,32 @@
+"""Whether scenes are rooms that can be built again and changed, and other pictures of them encoded as their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from clearway.errors import ClearwayError
+from clearway.live.conditions import REFERENCE
+from clearway.live.live_room import MODEL_SOURCE, check_is_room, check_movable
+from clearway.live.walks import encoder_of
+from clearway.scenes.scene import Scene
+from clearway.views.grid import grid_settings
+from clearway.views.seen import TAKES
+
+
+def hindrance(scenes: Iterable[Scene], *, pictured: bool = False) -> str | None:
+    """Why other pictures of the scenes cannot be taken, and encoded as their own were; None where they can.
+
+    Args:
+        scenes: to be looked at.
+        pictured: other pictures have to be as large as their own, so that these must be there.
+    """
+    try:
+        for scene in scenes:
+            check_is_room(scene)
+            check_movable(scene.name, REFERENCE, fixed=scene.made_by.source == MODEL_SOURCE)
+            if pictured:
+                grid_settings(scene, REFERENCE, TAKES, seed=0).check()
+            encoder_of(scene)
+    except ClearwayError as error:
+        return str(error)
+    return None

@@ -1,0 +1,188 @@
+"""What perturbed pictures do to agents on the grid, and what it brings to be trained on some; of four rewards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
+from clearway.experiments.groups import EXACT, WALKED, Scores, random_walk, scores
+from clearway.experiments.hindrance import hindrance
+from clearway.experiments.job import any_walked, episodes_of
+from clearway.experiments.off_grid import PAIRS, REWARDS
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, Trial, Walker
+from clearway.experiments.section import Claim, ReportTable, Section, Value
+from clearway.experiments.setting import Setting
+from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
+from clearway.live.conditions import REFERENCE
+from clearway.live.words import GEOMETRY
+from clearway.reward import COLLISION_AWARE
+
+NAME = "perturbed"
+STEP_LIMIT = 500
+EVERYTHING = PerturbedPictures(REFERENCE)
+"""What agents are trained on beside the scenes' own pictures."""
+OWN, ALL = "own pictures", "everything perturbed"
+SEEN: Mapping[str, PerturbedPictures | None] = {
+    OWN: None,
+    "camera and furniture perturbed": PerturbedPictures(GEOMETRY),
+    ALL: EVERYTHING,
+}
+"""What is seen on the way."""
+TOO, ALONE = "perturbed pictures too", "own pictures alone"
+"""What agents are trained on."""
+METRICS = ("success", "sc_4x", "spl", "collisions")
+HEADINGS = ("success", "within 4 x shortest", "SPL", "collisions")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Agents that differ in their seed alone.
+
+    Attributes:
+        learner, agent, trained_on: names; of those that are not trained what stands for these in a table.
+        jobs: by what is seen, one a seed.
+    """
+
+    learner: str
+    agent: str
+    trained_on: str | None
+    jobs: Mapping[str, tuple[Job, ...]]
+
+
+Found = Mapping[tuple[str, str, str | None], Mapping[str, Scores]]
+"""By learner, agent and what it was trained on, then by what is seen."""
+
+
+def jobs(setting: Setting) -> list[Job]:
+    """What must be done; nothing where no other pictures of the scenes can be taken."""
+    return [] if hindrance(setting.scenes, pictured=True) else _jobs(_kinds(setting))
+
+
+def section(setting: Setting) -> Section:
+    """What came of it."""
+    kinds = _kinds(setting)
+    if not any_walked(setting.out, _jobs(kinds)) and (why := _why_nothing(setting)):
+        return Section(name=NAME, title="Perturbed pictures", text=f"Nothing was walked. {why}")
+    found = {
+        (kind.learner, kind.agent, kind.trained_on): {seen: _scores(setting, own) for seen, own in kind.jobs.items()}
+        for kind in kinds
+    }
+    left_out = [name for name in setting.learners if name not in {kind.learner for kind in kinds}]
+    return Section(
+        name=NAME,
+        title="Perturbed pictures",
+        text=(
+            f"Agents of which all but one were trained on {EVERYTHING.takes} perturbed pictures of every pose beside "
+            f"its own, on the grid: episodes of at most {STEP_LIMIT} steps, in which they see the poses' own pictures, "
+            f"or {EVERYTHING.takes} others of each, one a step and none twice to the bit, that no training has seen. "
+            "Targets are seen in their own. Moves stay those of the grid, wherever a picture shows the furniture. "
+            "Agents of one seed have the same starts, chances and pictures."
+            + (f" {', '.join(left_out)}: learns from no perturbed pictures, and is left out." if left_out else "")
+        ),
+        tables=(_table(setting, found),),
+        claims=further(_claims(setting, found)),
+    )
+
+
+def _why_nothing(setting: Setting) -> str | None:
+    if not any(learner.sees_takes for learner in setting.learners.values()):
+        return f"No learner of {', '.join(setting.learners)} learns from perturbed pictures."
+    return hindrance(setting.scenes, pictured=True)
+
+
+def _jobs(kinds: list[Kind]) -> list[Job]:
+    return [job for kind in kinds for own in kind.jobs.values() for job in own]
+
+
+def _seen(setting: Setting) -> Mapping[str, PerturbedPictures | None]:
+    """What is seen; in a smoke run, which compares the first pair of rewards alone, the ends."""
+    return SEEN if setting.budget.whole_grid else {seen: SEEN[seen] for seen in (OWN, ALL)}
+
+
+def _kinds(setting: Setting) -> list[Kind]:
+    """Those that are trained, then who goes by the nearest picture, beside the first of them."""
+    found, seen = list[Kind](), _seen(setting)
+    for name, learner in setting.learners.items():
+        if not learner.sees_takes:
+            continue
+        for reward in REWARDS if setting.budget.whole_grid else PAIRS[0]:
+            runs = setting.runs(learner, reward)
+            taught = tuple(replace(run, perturbed=EVERYTHING) for run in runs)
+            found.append(Kind(name, reward.name, TOO, _tried(setting, taught, seen)))
+            if reward == COLLISION_AWARE:
+                found.append(Kind(name, reward.name, ALONE, _tried(setting, runs, seen)))
+    if not found:
+        return []
+    frames = f"{frames_of(setting.world(), MOST_A_POSE):,} frames"
+    beside = tuple(job.run for job in found[0].jobs[OWN])
+    others = {name: pictures for name, pictures in seen.items() if pictures is not None}
+    return [*found, Kind(NEAREST, frames, None, _tried(setting, beside, others, NEAREST))]
+
+
+def _tried(
+    setting: Setting,
+    runs: tuple[PlannedRun, ...],
+    seen: Mapping[str, PerturbedPictures | None],
+    walker: Walker = "agent",
+) -> dict[str, tuple[Job, ...]]:
+    """Jobs by what is seen, by each run's seed."""
+    trial = setting.trial(step_limit=STEP_LIMIT)
+
+    def job(run: PlannedRun, pictures: PerturbedPictures | None) -> Job:
+        return Job(run, (replace(trial, seed=run.seed, perturbed=pictures, walker=walker),))
+
+    return {name: tuple(job(run, pictures) for run in runs) for name, pictures in seen.items()}
+
+
+def _scores(setting: Setting, jobs: tuple[Job, ...]) -> Scores:
+    """The figures of the jobs that are done."""
+    found = {}
+    for job in jobs:
+        (trial,) = job.trials
+        assert isinstance(trial, Trial)
+        if (table := episodes_of(setting.out, job.run, trial)) is not None:
+            found[job.run.seed] = table
+    return scores(found, setting.world().target_count)
+
+
+def _table(setting: Setting, found: Found) -> ReportTable:
+    """A row for what is seen and each kind of agent."""
+    world = setting.world()
+    scenes = world.target_scene.numpy()
+    rows: list[tuple[Value, ...]] = []
+    for seen in _seen(setting):
+        for kind, own in found.items():
+            if seen in own:
+                rows.append((seen, *kind, len(own[seen]), *own[seen].estimates(METRICS, scenes)))
+    walked = random_walk(world, setting.trial(step_limit=STEP_LIMIT))
+    means = (float(np.mean(walked.in_scenes(metric, scenes))) for metric in METRICS)
+    for how, agent, figures in ((WALKED, RANDOM_WALK, means), (EXACT, "shortest path", (1.0, 1.0, 1.0, 0.0))):
+        rows.append((None, how, agent, None, None, *(value for figure in figures for value in (figure, None))))
+    headings = (heading for name in HEADINGS for heading in (name, f"95 % of {name}"))
+    notes = ("Who goes by the nearest picture knows the poses' own, and where the actions of random walkers led.",)
+    left = ("seen on the way", "learner", "agent", "trained on", "seeds")
+    return ReportTable(NAME, "Perturbed pictures", (*left, *headings), tuple(rows), notes)
+
+
+def _claims(setting: Setting, found: Found) -> Iterator[Claim]:
+    """Of rewards where everything is perturbed, and of what agents are trained on; six for each learner."""
+    for learner in dict.fromkeys(name for name, _, trained_on in found if trained_on):
+        for first, second in PAIRS if setting.budget.whole_grid else PAIRS[:1]:
+            text = f"{learner}: {ALL}, {first.name}, fewer collisions than {second.name}"
+            pair = (found[learner, reward.name, TOO][ALL] for reward in (first, second))
+            yield _claim(setting, text, "collisions", *pair)
+        too, alone = (found[learner, COLLISION_AWARE.name, trained_on] for trained_on in (TOO, ALONE))
+        for metric, what in (("collisions", "fewer collisions"), ("spl", "higher SPL")):
+            text = f"{learner}: {ALL}, {COLLISION_AWARE.name}, {what} if trained on {TOO} than on {ALONE}"
+            yield _claim(setting, text, metric, too[ALL], alone[ALL])
+        text = f"{learner}: {OWN}, {COLLISION_AWARE.name}, fewer collisions if trained on {ALONE} than on {TOO}"
+        yield _claim(setting, text, "collisions", alone[OWN], too[OWN])
+
+
+def _claim(setting: Setting, text: str, metric: str, first: Scores, second: Scores) -> Claim:
+    judged = judged_more if metric == "spl" else judged_less
+    claim = judged(text, metric, first.of(metric), second.of(metric), setting.world().target_scene.numpy())
+    return with_failures(claim, first.of("success"), second.of("success"))
