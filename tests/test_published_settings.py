@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -476,6 +476,17 @@ def test_figure_6_of_fresh_seeds_is_what_its_record_comes_to(tmp_path: Path) -> 
     assert len(seconds) == 25 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page
 
 
+def check_unclipped_fixed_points(recorded: Sequence[Sequence[Any]], page: str) -> None:
+    """Where training without clipping could rest: one length, collisions by reward."""
+    told = words_of(r"without clipping at (\S+) steps, and (\S+) \(`shortest`\) and (\S+) collisions \(`coll", page)
+    exact = {(row[0], row[2]): row[-3] for row in recorded}
+    steps, *collisions = told.groups()
+    for reward, written in zip(("shortest", "collision-aware"), collisions, strict=True):
+        name = f"soft fixed point ({reward}, unclipped)"
+        assert_written(steps, exact["steps", name], name)
+        assert_written(written, exact["collisions", name], name)
+
+
 @pytest.mark.slow
 def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_path: Path) -> None:
     unpack("paper-bathroom", tmp_path / "paper")
@@ -497,7 +508,9 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
         for row in sections[0].tables[0].rows
         if row[0] == "steps" and row[3:5] == (5, "0 of 25") and f"{row[7]:.2f}" == "8.79"
     }
-    assert check_beside(rows, sections[0].tables[0].rows, 1, 2) == BESIDE | LEARNERS
+    fixed = {f"soft fixed point ({name})" for name in ("shortest", "bump", "collision-aware")}
+    assert check_beside(rows, sections[0].tables[0].rows, 1, 2) == BESIDE | LEARNERS | fixed
+    check_unclipped_fixed_points(sections[0].tables[0].rows, page)
     assert not sections[0].missing and solved == {"q-learning", "bc", "planner on a learnt map", "nearest picture"}
     seconds = seconds_of_runs(tmp_path / "paper", "a2c-*")
     assert f"{round(min(seconds), -1):,.0f} to {round(max(seconds), -1):,.0f} s a run" in page
