@@ -25,7 +25,7 @@ from clearway.agents.agent import POSE, Agent, Decisions, Observation, State
 from clearway.agents.generalist import Generalist
 from clearway.agents.mapping import MappingAgent
 from clearway.agents.tour_map import map_of
-from clearway.api.takes import perturbations_asked
+from clearway.api.perturbations import perturbations_asked
 from clearway.evaluation.goals import GoalEvaluation, evaluate_goals
 from clearway.evaluation.tours import Touring
 from clearway.learn.provenance import hardware, package_versions

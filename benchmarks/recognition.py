@@ -32,7 +32,7 @@ import torch
 from by_scene import interval
 
 import clearway
-from clearway.api.takes import perturbations_asked
+from clearway.api.perturbations import perturbations_asked
 from clearway.errors import EncoderError
 from clearway.learn.presets import DEFAULT
 from clearway.learn.provenance import hardware, package_versions

@@ -159,6 +159,10 @@ def test_more_frames_come_to_what_the_record_holds(tmp_path: Path) -> None:
                 "lost": int((reached == 0).sum()),
                 "figures": (steps[of_it].mean(), steps[~of_it].mean(), collisions[~of_it].mean()),
             }
+    assert len(runs) == 6 and all(set(own) == {5, 6, 7} for own in agents.values())
+    ends = [(folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()[-1] for folder in runs]
+    updates = [json.loads(end)["updates"] for end in ends]
+    assert {round(count, -5) for count in updates} == {700_000} and "some 700,000 updates" in page
     shown = {(row[0], row[1]): row[2:] for row in rows_of(page)[1:]}
     assert set(shown) == set(agents)
     for arm, (lost, *written) in shown.items():

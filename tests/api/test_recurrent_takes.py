@@ -6,8 +6,8 @@ import numpy as np
 
 import clearway
 from clearway.agents.agent import FEATURES
-from clearway.api import takes as api_takes
 from clearway.api import training
+from clearway.api.perturbations import perturbations_asked
 from clearway.evaluation.takes import Takes
 from clearway.learn.seeds import SEED_LIMIT
 from helpers.made import corridor_scene
@@ -28,7 +28,7 @@ def test_a_training_sees_so_many_takes_of_every_pose_under_all_perturbations(tmp
     plain = clearway.train(scene, [8, 16], algorithm=clearway.Recurrent(**SMALL), seed=3)
     assert not asked
     other = clearway.train(scene, [8, 16], algorithm=clearway.Recurrent(**SMALL), perturb="all", takes=2, seed=3)
-    everything = api_takes.perturbations_asked("all").to_json()
+    everything = perturbations_asked("all").to_json()
     assert asked == [
         (1, everything, (FEATURES,), None, 2, SEED_LIMIT - 4)
     ]  # others than an evaluation with seed 3 sees

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from clearway.api import training
+from clearway.api.perturbations import perturbations_asked
 from clearway.api.run_settings import reward_options
-from clearway.api.takes import perturbations_asked
 from clearway.api.training import train
 from clearway.evaluation.takes import Takes
 from clearway.learn.run_folder import RunFolder

@@ -7,7 +7,7 @@ import torch
 
 import clearway
 from clearway.api import training
-from clearway.api.takes import perturbations_asked
+from clearway.api.perturbations import perturbations_asked
 from clearway.api.training import chosen_learner
 from clearway.errors import ArgumentError, ClearwayError
 from clearway.learn.presets import DEFAULT, PAPER_A3C

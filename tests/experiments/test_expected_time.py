@@ -106,6 +106,7 @@ def test_a_walk_is_tried_by_an_agent_that_has_learnt_nothing(tmp_path: Path, mon
     begun = request_of(job.run).trainer().tensors()
     own = {name: tensor for name, tensor in acting.items() if name.startswith("network.")}
     assert own and all(torch.equal(tensor, begun[name]) for name, tensor in own.items())
+    assert not (tmp_path / "runs").exists()
 
 
 def test_shortest_steps_are_means_over_all_starts_target_by_target(tmp_path: Path) -> None:

@@ -201,6 +201,10 @@ def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> Non
     there, elsewhere = (off_grid.section(own) for own in (setting, gone))
     assert not off_grid.jobs(gone)
     assert elsewhere.tables == there.tables and elsewhere.claims == there.claims and elsewhere.tables
+    assert not elsewhere.missing and "No more can be walked here: scene walkable has no record" in elsewhere.text
+    job = off_grid.jobs(setting)[0]
+    trial_path(setting.out, job.run, job.trials[0]).unlink()
+    assert off_grid.section(gone).missing == (job.run.name,)
 
 
 def test_fewer_contacts_of_five_seeds_are_told(setting: Setting) -> None:

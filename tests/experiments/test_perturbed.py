@@ -115,6 +115,10 @@ def test_a_job_trains_on_perturbed_pictures_and_walks_on_others(setting: Setting
     second = table.target >= len(FIRST)
     for name in ("steps", "collisions", "reached"):
         np.testing.assert_array_equal(getattr(table, name)[second], getattr(alone, name))
+    plain = replace(job, run=replace(job.run, perturbed=None))
+    do(setting.out, plain, threads=1)
+    weights = [load_network(run_folder(setting.out, one.run).path).network.state_dict() for one in (job, plain)]
+    assert any((weights[0][name] != weights[1][name]).any() for name in weights[0])  # it has learnt from others
 
 
 def test_who_goes_by_the_nearest_picture_is_no_agent_of_the_run(setting: Setting, asked, monkeypatch) -> None:
@@ -192,6 +196,22 @@ def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> Non
     there, elsewhere = (perturbed.section(replace(setting, scenes=own)) for own in (setting.scenes, gone))
     assert not perturbed.jobs(replace(setting, scenes=gone))
     assert elsewhere.tables == there.tables and elsewhere.claims == there.claims and elsewhere.tables
+    assert not elsewhere.missing and "No more can be walked here: scene walkable has no features by" in elsewhere.text
+    assert "No more" not in there.text
+    jobs = perturbed.jobs(setting)
+    trial_path(setting.out, jobs[0].run, jobs[0].trials[0]).unlink()
+    assert perturbed.section(replace(setting, scenes=gone)).missing == (jobs[0].run.name,)
+
+
+def test_episodes_of_another_experiment_are_not_its_own(setting: Setting) -> None:
+    """Own pictures are seen elsewhere, too, by the same agents."""
+    walked(setting, {}, {})
+    gone = replace(setting, scenes=tuple(replace(scene, encoder=None) for scene in setting.scenes))
+    for kind in perturbed._kinds(setting):
+        for seen, jobs in kind.jobs.items():
+            for job in jobs if seen != OWN else ():
+                trial_path(setting.out, job.run, job.trials[0]).unlink()
+    assert perturbed.section(gone).text.startswith("Nothing was walked. ")
 
 
 def test_episodes_on_perturbed_pictures_are_counted_beforehand(setting: Setting, asked, monkeypatch) -> None:

@@ -117,6 +117,7 @@ def killed(process: int, out: Path, delay_s: float) -> bool:
     time.sleep(delay_s)
     os.kill(process, signal.SIGKILL)
     _, status = os.waitpid(process, 0)
+    assert os.WIFSIGNALED(status) or status == 0, "a training failed"
     return os.WIFSIGNALED(status)
 
 

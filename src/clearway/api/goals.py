@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_path, as_seed, as_whole
+from clearway.api.perturbations import Perturbed, perturbations_asked
 from clearway.api.scenes import Scenes, load_scenes
-from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.choices import GENERALIST, GOAL_STEPS, GOALS, is_generalist
 from clearway.errors import ArgumentError
 from clearway.live.conditions import Perturbations

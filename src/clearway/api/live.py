@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from clearway.api.arguments import as_path, as_seed, as_whole
 from clearway.api.goals import MOST_TOUR_STEPS, check_can_tour, goal_agent, named_agent
+from clearway.api.perturbations import Perturbed, perturbations_asked
 from clearway.api.scenes import Scenes, load_scenes
-from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.choices import GOAL_STEPS, GOALS
 from clearway.errors import ArgumentError
 from clearway.live.conditions import REFERENCE, Condition, Perturbations, as_it_was_built, label_of, sweep_settings

@@ -17,9 +17,9 @@ import numpy as np
 
 from clearway.agents.agent import FEATURES
 from clearway.api.arguments import as_choice, as_path, as_seed, as_settings, as_truth, as_whole, as_word, as_workers
+from clearway.api.perturbations import Perturbed, perturbations_asked
 from clearway.api.run_settings import leave_settings, reward_options
 from clearway.api.scenes import Scenes, by_name, scenes_and_files
-from clearway.api.takes import Perturbed, perturbations_asked
 from clearway.api.targets import Targets, chosen_targets, told_of_held_out
 from clearway.choices import FeatureStore, TrackerName, ZoneLevel
 from clearway.errors import ArgumentError

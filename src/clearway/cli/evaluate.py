@@ -123,7 +123,7 @@ class Evaluate:
     def _at_goals(self) -> None:
         from clearway.api.arguments import as_whole
         from clearway.api.goals import goal_agent
-        from clearway.api.takes import perturbations_asked
+        from clearway.api.perturbations import perturbations_asked
         from clearway.cli.goals import check_knows_any_room, evaluate_at_goals
         from clearway.views.seen import TAKES
 

@@ -85,7 +85,7 @@ def _told_walking(out: Path, left: Sequence[Job], workers: int, threads: int) ->
         if not is_ours(run.learner):
             others += episodes  # what such an agent does untrained is not ours to try
             continue
-        alike = run.kind, run.scenes
+        alike = replace(run, perturbed=None).kind, run.scenes  # it is tried on the scenes' own pictures
         if alike not in seconds_a_step:
             seconds_a_step[alike] = walking_time(run, trial, threads)
         straight += seconds_a_step[alike] * sum(ways) * trial.episodes_per_target

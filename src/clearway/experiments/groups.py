@@ -16,11 +16,15 @@ from clearway.experiments.job import episodes_of
 from clearway.experiments.plan import Job, PlannedRun, TargetSets, Trial
 from clearway.experiments.section import Value
 from clearway.experiments.setting import Setting
-from clearway.reward import COLLISION_AWARE, SHORTEST, Reward
+from clearway.reward import BUMP, CLEARANCE, COLLISION_AWARE, SHORTEST, Reward
 from clearway.world.world import World
 
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
+REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE, CLEARANCE)
+"""These and two rivals, where pictures are others than in training."""
+REWARD_PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
+"""Of which claims are made there."""
 EXACT = "exact"
 WALKED = "walked"
 """What tables call the learner of figures that are computed, and of those of an agent that learns nothing."""

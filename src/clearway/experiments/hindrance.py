@@ -10,7 +10,7 @@ from clearway.live.live_room import MODEL_SOURCE, check_is_room, check_movable
 from clearway.live.walks import encoder_of
 from clearway.scenes.scene import Scene
 from clearway.views.grid import grid_settings
-from clearway.views.seen import TAKES
+from clearway.views.seen import TAKES, record_seen_by
 
 
 def hindrance(scenes: Iterable[Scene], *, pictured: bool = False) -> str | None:
@@ -26,6 +26,7 @@ def hindrance(scenes: Iterable[Scene], *, pictured: bool = False) -> str | None:
             check_movable(scene.name, REFERENCE, fixed=scene.made_by.source == MODEL_SOURCE)
             if pictured:
                 grid_settings(scene, REFERENCE, TAKES, seed=0).check()
+                record_seen_by([scene])
             encoder_of(scene)
     except ClearwayError as error:
         return str(error)

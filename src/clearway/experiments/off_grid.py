@@ -9,19 +9,18 @@ import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments.groups import WALKED
+from clearway.experiments.groups import REWARD_PAIRS, REWARDS, WALKED
 from clearway.experiments.hindrance import hindrance
-from clearway.experiments.job import any_walked, trial_path
+from clearway.experiments.job import any_walked, trial_path, unfinished
 from clearway.experiments.live_trial import FIGURES, read_live
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, PlannedRun, Walker
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
 from clearway.live.conditions import Condition, sweep_settings
-from clearway.reward import BUMP, CLEARANCE, COLLISION_AWARE, SHORTEST, Reward
+from clearway.reward import CLEARANCE, COLLISION_AWARE, SHORTEST
 
 NAME = "off-grid"
-REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE, CLEARANCE)
 EPISODES_PER_TARGET, STEP_LIMIT = 4, 40
 WORDS = {
     "contacts": "fewer contacts",
@@ -32,7 +31,6 @@ WORDS = {
 }
 LOST = 0.05
 """Share of episodes by which one kind may arrive less often and still be told better; few are walked."""
-PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
 TOUCHING = ("contacts", "least clearance")
 STAYING_NEAR = ("within 10 cm", "within 30 cm", "in the collision zone")
 """Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction."""
@@ -65,8 +63,8 @@ def jobs(setting: Setting) -> list[Job]:
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    groups = _groups(setting)
-    if not any_walked(setting.out, _jobs(groups)) and (why := hindrance(setting.scenes)):
+    groups, why = _groups(setting), hindrance(setting.scenes)
+    if why and not any_walked(setting.out, _jobs(groups)):
         return Section(name=NAME, title="Off the grid", text=f"Nothing was walked. {why}")
     found = {(group.learner, group.reward): _scores(setting, group) for group in groups}
     return Section(
@@ -77,9 +75,11 @@ def section(setting: Setting) -> Section:
             f"episodes a target, {STEP_LIMIT} steps at most, under each setting of a sweep at full strength. Agents of "
             "one seed have the same starts and chances. Claims are of means over the settings. Who goes by the nearest "
             "picture knows those of the grid as it was built, and where the actions of random walkers led there."
+            + (f" No more can be walked here: {why}" if why else "")
         ),
         tables=(_table(setting, found),),
         claims=further(_claims(setting, found)),
+        missing=unfinished(setting.out, _jobs(groups)),
     )
 
 
@@ -143,7 +143,7 @@ def _claims(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> It
     for learner in setting.learners:
         own = {reward: scores.mean(1) for (name, reward), scores in found.items() if name == learner}
         for figure in TOUCHING:
-            for first, second in PAIRS:
+            for first, second in REWARD_PAIRS:
                 yield _claim(setting, f"{learner}, touching", figure, first.name, second.name, own)
         for figure in STAYING_NEAR:
             for first in (COLLISION_AWARE, CLEARANCE):

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
-from clearway.experiments.groups import EXACT, WALKED, Scores, random_walk, scores
+from clearway.experiments.groups import EXACT, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores
 from clearway.experiments.hindrance import hindrance
-from clearway.experiments.job import any_walked, episodes_of
-from clearway.experiments.off_grid import PAIRS, REWARDS
+from clearway.experiments.job import any_walked, episodes_of, unfinished
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, Trial, Walker
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
@@ -63,8 +62,9 @@ def jobs(setting: Setting) -> list[Job]:
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    kinds = _kinds(setting)
-    if not any_walked(setting.out, _jobs(kinds)) and (why := _why_nothing(setting)):
+    kinds, why = _kinds(setting), _why_nothing(setting)
+    others = [job for kind in kinds for seen, own in kind.jobs.items() if seen != OWN for job in own]
+    if why and not any_walked(setting.out, others):  # own pictures are other experiments', too
         return Section(name=NAME, title="Perturbed pictures", text=f"Nothing was walked. {why}")
     found = {
         (kind.learner, kind.agent, kind.trained_on): {seen: _scores(setting, own) for seen, own in kind.jobs.items()}
@@ -81,9 +81,11 @@ def section(setting: Setting) -> Section:
             "Targets are seen in their own. Moves stay those of the grid, wherever a picture shows the furniture. "
             "Agents of one seed have the same starts, chances and pictures."
             + (f" {', '.join(left_out)}: learns from no perturbed pictures, and is left out." if left_out else "")
+            + (f" No more can be walked here: {why}" if why else "")
         ),
         tables=(_table(setting, found),),
         claims=further(_claims(setting, found)),
+        missing=unfinished(setting.out, _jobs(kinds)),
     )
 
 
@@ -108,7 +110,7 @@ def _kinds(setting: Setting) -> list[Kind]:
     for name, learner in setting.learners.items():
         if not learner.sees_takes:
             continue
-        for reward in REWARDS if setting.budget.whole_grid else PAIRS[0]:
+        for reward in REWARDS if setting.budget.whole_grid else REWARD_PAIRS[0]:
             runs = setting.runs(learner, reward)
             taught = tuple(replace(run, perturbed=EVERYTHING) for run in runs)
             found.append(Kind(name, reward.name, TOO, _tried(setting, taught, seen)))
@@ -170,7 +172,7 @@ def _table(setting: Setting, found: Found) -> ReportTable:
 def _claims(setting: Setting, found: Found) -> Iterator[Claim]:
     """Of rewards where everything is perturbed, and of what agents are trained on; six for each learner."""
     for learner in dict.fromkeys(name for name, _, trained_on in found if trained_on):
-        for first, second in PAIRS if setting.budget.whole_grid else PAIRS[:1]:
+        for first, second in REWARD_PAIRS if setting.budget.whole_grid else REWARD_PAIRS[:1]:
             text = f"{learner}: {ALL}, {first.name}, fewer collisions than {second.name}"
             pair = (found[learner, reward.name, TOO][ALL] for reward in (first, second))
             yield _claim(setting, text, "collisions", *pair)

@@ -86,7 +86,7 @@ class PlannedRun:
 
     @cached_property
     def kind(self) -> str:
-        """What the speed of its training depends on: the learner's settings, but not for how many frames."""
+        """What the speed of its training depends on: the learner's settings but its frames, and how many pictures."""
         takes = self.perturbed and self.perturbed.takes  # tables are as long as there are pictures
         return _as_json([self.learner.algorithm, asdict(replace(self.learner, frames=1)), takes])
 
@@ -175,6 +175,18 @@ class Job:
 
     run: PlannedRun
     trials: tuple[Trial | LiveTrial, ...]
+
+
+def by_name(scenes: Iterable[SceneFile], targets: TargetSets) -> dict[str, list[int]]:
+    """Targets by the names of their scenes."""
+    return {scene.name: list(own) for scene, own in zip(scenes, targets, strict=True)}
+
+
+def told_of(run: PlannedRun, targets: TargetSets, trial: Trial | LiveTrial) -> dict[str, object]:
+    """What a file of a trial says it is about."""
+    about = {"run": run.name, "targets": by_name(run.scenes, targets), "seed": trial.seed}
+    walker = {} if trial.walker == "agent" else {"walker": trial.walker}
+    return {**about, "step_limit": trial.step_limit, **walker}
 
 
 def _plain(targets: Iterable[Iterable[int]]) -> TargetSets:

@@ -202,7 +202,8 @@ def _gathered(request: ReproduceRequest, setting: Setting) -> Reproduction:
         for found in map(experiment, _known(request)):
             own = found.jobs(setting)
             missing = unfinished(setting.out, own)  # before it is read: a run that ends meanwhile may be left out of it
-            sections.append(replace(corrected(found.section(setting)), missing=missing))
+            section = corrected(found.section(setting))
+            sections.append(replace(section, missing=tuple(dict.fromkeys((*missing, *section.missing)))))
             jobs += own
     _check_files(sections)
     return Reproduction(tuple(request.commands), tuple(request.changes), setting, merged(jobs), sections)

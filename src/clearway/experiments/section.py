@@ -161,7 +161,8 @@ class Section:
         title: of the section.
         text: what was done, in a few sentences.
         tables, figures, maps, claims: what came of it.
-        missing: runs that are not complete, by name; `clearway reproduce` fills it in.
+        missing: runs that are not complete, by name; `clearway reproduce` fills it in from the jobs, of which there may
+            be fewer: a section that has none to offer names them itself.
     """
 
     name: str

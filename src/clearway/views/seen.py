@@ -12,7 +12,7 @@ from clearway.agents.agent import FEATURES
 from clearway.errors import EncoderError
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.live.conditions import Perturbations, label_of
-from clearway.scenes.scene import Scene
+from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
 
 if TYPE_CHECKING:
@@ -90,10 +90,16 @@ def _encoding(scenes: Sequence[Scene], encoder: Encoder | None) -> Callable[[np.
         EncoderError: theirs is unknown, cannot be had or takes no colour pictures.
     """
     from clearway.perception.encode import encoder_from_record, features_of, kept_features
-    from clearway.perception.encoder import sensor_of
 
     if encoder is not None:
         return partial(features_of, encoder=encoder)
+    return partial(kept_features, encoder=encoder_from_record(record_seen_by(scenes)))
+
+
+def record_seen_by(scenes: Sequence[Scene]) -> EncoderRecord:
+    """What made the scenes' features. Raises EncoderError where it is unknown or takes no colour pictures."""
+    from clearway.perception.encoder import sensor_of
+
     record = scenes[0].encoder
     if record is None:
         problem = f"scene {scenes[0].name} has no features by a known encoder, and the agent sees features"
@@ -101,4 +107,4 @@ def _encoding(scenes: Sequence[Scene], encoder: Encoder | None) -> Callable[[np.
     if (seen := sensor_of(record)) != RGB:
         problem = f"encoder {record.name} sees {seen}, and perturbed takes are colour pictures"
         raise EncoderError(f"{problem}. Leave perturb out")
-    return partial(kept_features, encoder=encoder_from_record(record))
+    return record
