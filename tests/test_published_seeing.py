@@ -385,52 +385,6 @@ def test_what_is_said_of_walkers_is_what_is_judged_from_their_record(monkeypatch
         assert_written(written, float(value), said[0])
 
 
-def test_agents_of_perturbed_pictures_walk_as_their_record_says() -> None:
-    found = json.loads((DOCS / "figures" / "reactive.json").read_text(encoding="utf-8"))
-    page = (DOCS / "learning.md").read_text(encoding="utf-8")
-    part = page.partition("\n## Perturbed pictures\n")[2].partition("\n### ")[0]
-    rows = [line.strip("| ").split(" | ") for line in part.splitlines() if "%" in line]
-    asked = [(kind, seen) for kind in ("own", "perturbed") for seen in ("none", "geometry", "all")]
-    for (kind, seen), row in zip(asked, rows, strict=True):
-        assert row[-4].strip("`| ") == seen.replace("none", "own")
-        for name, cell in zip(("success_4x", "spl", "collisions"), row[-3:], strict=True):
-            scale = 1 if name == "collisions" else 100
-            values = [scale * found["figures"][f"{kind}-{seed}"][seen][name] for seed in range(3)]
-            written = numbers(cell)
-            for number, value in zip(written, (np.mean(values), min(values), max(values)), strict=len(written) > 1):
-                assert_written(number, float(value), f"{name} of {kind}, {seen}")
-    runs = found["runs"]
-    took = [[runs[f"{kind}-{seed}"]["seconds"] for seed in range(3)] for kind in ("own", "perturbed")]
-    told = [f"{min(seconds)} to {max(seconds)} s" for seconds in took]
-    assert all(one in part for one in told)
-    assert {run["frames"] for run in runs.values()} == {300_000}
-
-
-def test_rewards_on_perturbed_pictures_are_told_as_their_record_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    benchmarks = DOCS.parent / "benchmarks"
-    monkeypatch.syspath_prepend(benchmarks)
-    judged = runpy.run_path(str(benchmarks / "reactive.py"))["judged"]
-    found = json.loads((DOCS / "figures" / "reactive-rewards.json").read_text(encoding="utf-8"))
-    page = (DOCS / "learning.md").read_text(encoding="utf-8")
-    part = page.partition("\n### Four rewards\n")[2].partition("\n## ")[0]
-    rows = [line.strip("| ").split(" | ")[-3:] for line in part.splitlines() if "%" in line]
-    kinds = ("shortest", "bump", "collision-aware", "clearance")
-    for (kind, seen), row in zip(((kind, seen) for kind in kinds for seen in ("none", "all")), rows, strict=True):
-        for name, cell in zip(("success_4x", "spl", "collisions"), row, strict=True):
-            scale = 1 if name == "collisions" else 100
-            values = [scale * found["figures"][f"{kind}-{seed}"][seen][name] for seed in range(5)]
-            for number, value in zip(numbers(cell), (np.mean(values), min(values), max(values)), strict=True):
-                assert_written(number, float(value), f"{name} of {kind}, {seen}")
-    told = re.findall(r"\| `(\S+)` than `(\S+)` \| (\S+) \((\S+) to (\S+)\) \| (\S+) \|", part)
-    assert len(told) == 3
-    for (*_, more, low, high, p), line in zip(told, judged(found["figures"], [row[:2] for row in told]), strict=True):
-        fewer, least, most, chance = words_of(r": undecided; (\S+) \[(\S+) to (\S+)\] fewer, p = (\S+) ", line).groups()
-        for written, value in ((more, fewer), (low, most), (high, least)):
-            assert_written(written, -float(value), line)
-        assert p == chance
-    assert {run["frames"] for run in found["runs"].values()} == {300_000}
-
-
 def test_adapting_takes_as_many_frames_as_its_record_says() -> None:
     record = json.loads((DOCS / "figures" / "adapting.json").read_text(encoding="utf-8"))["frames, seconds"]
     lines = (DOCS / "learning.md").read_text(encoding="utf-8").splitlines()
