@@ -139,7 +139,10 @@ def _write(found: Reproduction, out: Path, as_json: bool) -> None:
         "scenes": ", ".join(f"{scene.name} ({scene.state_count} poses)" for scene in setting.scenes),
         "features": setting.encoder,
         "seeds": ", ".join(map(str, setting.seeds)),
-        "on the grid": f"{budget.episodes_per_target} episodes a target, at most {budget.step_limit:,} steps",
+        "on the grid": (
+            f"{budget.episodes_per_target} episodes a target, at most {budget.step_limit:,} steps where a section does "
+            "not say otherwise"
+        ),
         "learners": "; ".join(learners),
         **made_by(out, found.jobs),
     }
