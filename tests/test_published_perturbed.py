@@ -66,7 +66,7 @@ def test_perturbed_pictures_are_what_their_record_comes_to(tmp_path: Path) -> No
         assert_written(spl.removesuffix(" %"), 100 * means["collision-aware", *arm]["SPL"], seen)
         assert_written(collisions, means["collision-aware", *arm]["collisions"], seen)
     seconds = seconds_of_runs(tmp_path / "runs")
-    assert len(seconds) == 50 and f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in ASKED
+    assert len(seconds) == 50 and f"{min(seconds):.0f} to {max(seconds):.0f} s of training a run" in ASKED
 
 
 def test_earlier_agents_on_perturbed_pictures_are_what_their_records_come_to() -> None:
@@ -87,6 +87,20 @@ def test_earlier_agents_on_perturbed_pictures_are_what_their_records_come_to() -
     for kind in ("own", "perturbed"):
         took = [records[0]["runs"][f"{kind}-{seed}"]["seconds"] for seed in range(3)]
         assert f"{min(took)} to {max(took)} s" in EARLIER
+
+
+def test_earlier_figures_lie_outside_later_intervals_as_often_as_is_said() -> None:
+    earlier, _ = (rows_of(part)[1:] for part in EARLIER.split("\n\n") if part.startswith("| "))
+    later = {tuple(row[:3]): row[3:] for row in rows_of(ASKED) if len(row) == 6}
+    below, above = [0, 0, 0], [0, 0, 0]
+    for seen, agent, trained_on, _, *cells in earlier:
+        for figure, (cell, other) in enumerate(zip(cells, later[seen, agent, trained_on], strict=True)):
+            mean, (_, low, high) = float(numbers(cell)[0]), map(float, numbers(other))
+            below[figure] += mean < low
+            above[figure] += mean > high
+    assert (below[1:], above[1:]) == ([1, 0], [2, 11])
+    assert "Of these 14 means of collisions 11 lie above the intervals of ten seeds" in EARLIER
+    assert "of SPL one lies below its interval, and two above." in EARLIER
 
 
 def test_four_rewards_on_perturbed_pictures_are_judged_from_their_record() -> None:

@@ -98,6 +98,7 @@ def test_a_job_trains_on_perturbed_pictures_and_walks_on_others(setting: Setting
 
     table, about = read_episodes(trial_path(setting.out, job.run, trial))
     assert about["targets"] == {"walkable": list(FIRST), "again": list(SECOND)} and "walker" not in about
+    assert about["perturbed"] == {"perturbations": DARK.perturbations.to_json(), "takes": 2}
     on_own = run_episodes(
         setting.world(), trained.on_poses(setting.world()), episodes_per_target=3, step_limit=40, seed=3
     )

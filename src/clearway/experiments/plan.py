@@ -185,8 +185,11 @@ def by_name(scenes: Iterable[SceneFile], targets: TargetSets) -> dict[str, list[
 def told_of(run: PlannedRun, targets: TargetSets, trial: Trial | LiveTrial) -> dict[str, object]:
     """What a file of a trial says it is about."""
     about = {"run": run.name, "targets": by_name(run.scenes, targets), "seed": trial.seed}
-    walker = {} if trial.walker == "agent" else {"walker": trial.walker}
-    return {**about, "step_limit": trial.step_limit, **walker}
+    if trial.walker != "agent":
+        about["walker"] = trial.walker
+    if isinstance(trial, Trial) and trial.perturbed is not None:
+        about["perturbed"] = asdict(trial.perturbed)
+    return {**about, "step_limit": trial.step_limit}
 
 
 def _plain(targets: Iterable[Iterable[int]]) -> TargetSets:
