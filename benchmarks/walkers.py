@@ -35,8 +35,11 @@ def learnt(runs: Sequence[Path]) -> dict[str, dict[str, Any]]:
     """By name of folder, what each run was trained by, for how long, and as what its record has it.
 
     Raises:
-        SystemExit: a folder is called by another seed.
+        SystemExit: a folder is called by another seed, or as another one is.
     """
+    names = [run.name for run in runs]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise SystemExit(f"{', '.join(twice)}: given twice. Rename one folder of each name")
     found = {run.name: _learnt(run) for run in runs}
     for name, about in found.items():
         if kind_and_seed(name)[1] != str(about["seed"]):

@@ -207,6 +207,13 @@ def test_counts_below_one_are_refused(clearway, words: tuple, part: str, tmp_pat
     assert not (tmp_path / "out").exists()
 
 
+def test_a_seed_out_of_range_is_refused_before_anything_is_trained(clearway, dumps: Path, tmp_path: Path) -> None:
+    words = ("--scenes", dumps, "--budget", "smoke", "--out", tmp_path / "out")
+    answer = clearway("reproduce", "table1", *words, "--first-seed", 2**31 - 2, "--seeds", 3)
+    assert answer.refusal(f"seed is {2**31}", f"0 to {2**31 - 1}")
+    assert not (tmp_path / "out" / "runs").exists()
+
+
 def test_the_learners_of_the_command_line_are_the_named_ones() -> None:
     own_goals = replace(DEFAULT, goals="seen")
     assert {

@@ -12,6 +12,7 @@ from clearway.experiments.plan import Job
 from clearway.experiments.trajectories import maps
 from clearway.learn import train
 from clearway.learn.figures import Figures
+from clearway.learn.run_folder import RunFolder
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
 from clearway.world.world import World
@@ -62,6 +63,22 @@ def test_a_run_whose_weights_are_gone_begins_anew_with_all_its_trials(tmp_path: 
     assert is_done(tmp_path, first) and not is_done(tmp_path, job)
     do(tmp_path, job, threads=1)
     assert is_done(tmp_path, job) and all(path.read_text().startswith("{") for path in before)
+
+
+def test_trials_of_a_record_stay_where_training_cannot_begin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = made_job(tmp_path)
+    first = replace(job, trials=job.trials[:1])
+    do(tmp_path, first, threads=1)
+    shutil.rmtree(run_folder(tmp_path, job.run).checkpoints)
+    kept = trial_path(tmp_path, job.run, job.trials[0]).read_bytes()
+
+    def refuses(*_: object) -> None:
+        raise RunError("in use")
+
+    monkeypatch.setattr(RunFolder, "held", refuses)
+    with pytest.raises(RunError, match="in use"):
+        do(tmp_path, job, threads=1)
+    assert trial_path(tmp_path, job.run, job.trials[0]).read_bytes() == kept
 
 
 class OnSight:

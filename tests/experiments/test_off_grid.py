@@ -32,7 +32,7 @@ from clearway.live.walks import stages, walk_setting
 from clearway.perception import depth_grid
 from clearway.reward import COLLISION_AWARE
 from clearway.scenes.digest import scene_digest
-from clearway.scenes.scene import EncoderRecord
+from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.thor_v1 import read_scene, write_scene
 from clearway.zones import Zone, scene_zones
 from helpers.report_tables import by_heading
@@ -41,6 +41,8 @@ from helpers.small_runs import small_learner
 from helpers.small_setting import BUDGET, FRAMES, small_setting
 
 SETTINGS = (Condition("none", Perturbations()), Condition("turn ± 5°", Perturbations(angle_noise=5.0)))
+ORIGIN_M = (9.65, -15.85)
+"""Where the room's corner lies in the coordinates of the scene's file, as of a floor plan."""
 IN_ROOM = {
     "success": "success",
     "contacts": "contacts",
@@ -59,9 +61,13 @@ def live() -> LiveRoom:
 def setting(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> Setting:
     """One small room of ours, five seeds of a learner that finishes in a blink."""
     path = tmp_path / "walkable.h5"
-    write_scene(live.scene, path)
+    write_scene(replace(live.scene, locations_m=live.scene.locations_m + ORIGIN_M), path)
     scene = read_scene(path)
-    monkeypatch.setattr("clearway.live.walks.live_room", lambda scene: replace(live, scene=scene))
+
+    def in_room(scene: Scene) -> LiveRoom:
+        return replace(live, scene=replace(scene, locations_m=scene.locations_m - ORIGIN_M), origin_m=ORIGIN_M)
+
+    monkeypatch.setattr("clearway.live.walks.live_room", in_room)
     return Setting(
         out=tmp_path,
         files=(SceneFile(scene.name, path, scene_digest(scene)),),
@@ -92,7 +98,7 @@ def test_a_trial_s_file_says_what_live_evaluation_says(setting: Setting) -> None
                 expected = own[:, list(METRICS).index(name)]
                 np.testing.assert_allclose(found[number, :, FIGURES.index(figure)], expected, atol=1e-5)
             zones = scene_zones(setting.scenes[0])
-            ends = [zones[nearest_poses(setting.scenes[0], walk)[1:]] == Zone.COLLISION for walk in table.walks]
+            ends = [zones[nearest_poses(places[0].live.scene, walk)[1:]] == Zone.COLLISION for walk in table.walks]
             share = [np.concatenate(ends[2 * target : 2 * target + 2]).mean() for target in range(2)]
             np.testing.assert_allclose(found[number, :, -1], share, atol=1e-6)
     assert (found[0] != found[1]).any()
@@ -199,11 +205,12 @@ def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> Non
     walked(setting, lambda reward, seed: {"contacts": 1.0 + seed})
     gone = replace(setting, scenes=tuple(replace(scene, encoder=None) for scene in setting.scenes))
     there, elsewhere = (off_grid.section(own) for own in (setting, gone))
-    assert not off_grid.jobs(gone)
+    assert off_grid.jobs(gone) == off_grid.jobs(setting)  # whose runs the report names
     assert elsewhere.tables == there.tables and elsewhere.claims == there.claims and elsewhere.tables
     assert not elsewhere.missing and "No more can be walked here: scene walkable has no record" in elsewhere.text
-    job = off_grid.jobs(setting)[0]
+    job, *others = off_grid.jobs(setting)
     trial_path(setting.out, job.run, job.trials[0]).unlink()
+    assert off_grid.jobs(gone) == others
     assert off_grid.section(gone).missing == (job.run.name,)
 
 

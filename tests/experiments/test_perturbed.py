@@ -122,6 +122,15 @@ def test_a_job_trains_on_perturbed_pictures_and_walks_on_others(setting: Setting
     assert any((weights[0][name] != weights[1][name]).any() for name in weights[0])  # it has learnt from others
 
 
+def test_of_a_trained_run_no_training_pictures_are_taken_again(setting: Setting, asked) -> None:
+    job = own_job(setting)
+    do(setting.out, replace(job, trials=()), threads=1)
+    assert asked == [(DARK.perturbations, 2, seed_in_training(2))]
+    on_own = replace(job.trials[0], perturbed=None)
+    do(setting.out, replace(job, trials=(on_own,)), threads=1)
+    assert len(asked) == 1 and trial_path(setting.out, job.run, on_own).exists()
+
+
 def test_who_goes_by_the_nearest_picture_is_no_agent_of_the_run(setting: Setting, asked, monkeypatch) -> None:
     job = own_job(setting, walker="nearest picture")
     do(setting.out, replace(job, trials=()), threads=1)
@@ -195,12 +204,13 @@ def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> Non
     walked(setting, {}, {})
     gone = tuple(replace(scene, encoder=None) for scene in setting.scenes)
     there, elsewhere = (perturbed.section(replace(setting, scenes=own)) for own in (setting.scenes, gone))
-    assert not perturbed.jobs(replace(setting, scenes=gone))
+    assert perturbed.jobs(replace(setting, scenes=gone)) == perturbed.jobs(setting)  # whose runs the report names
     assert elsewhere.tables == there.tables and elsewhere.claims == there.claims and elsewhere.tables
     assert not elsewhere.missing and "No more can be walked here: scene walkable has no features by" in elsewhere.text
     assert "No more" not in there.text
     jobs = perturbed.jobs(setting)
     trial_path(setting.out, jobs[0].run, jobs[0].trials[0]).unlink()
+    assert perturbed.jobs(replace(setting, scenes=gone)) == jobs[1:]
     assert perturbed.section(replace(setting, scenes=gone)).missing == (jobs[0].run.name,)
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clearway.errors import RunError
 from clearway.experiments import plan
 from clearway.experiments.plan import Job, PlannedRun, SceneFile, Trial, merged
 from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Reward, Term, Time
@@ -34,6 +35,12 @@ def test_a_scene_s_path_does_not_matter_its_content_does() -> None:
 )
 def test_whatever_changes_the_agent_changes_the_name(change: dict) -> None:
     assert replace(RUN, **change).name != RUN.name
+
+
+def test_a_seed_out_of_range_is_refused() -> None:
+    assert replace(RUN, seed=2**31 - 1).seed == 2**31 - 1
+    with pytest.raises(RunError, match=f"seed is {2**31}, expected 0 to {2**31 - 1}"):
+        replace(RUN, seed=2**31)
 
 
 def test_a_learner_s_name_is_what_it_was_before_it_could_set_itself_goals() -> None:

@@ -57,14 +57,14 @@ def test_failed_targets_are_told_beside_the_means() -> None:
     claim = judged_less("fewer", "steps", scores(1, 1, 1, 1), scores(2, 2, 2, 2), SCENE)
     success = np.ones((4, 2))
     success[2, 1] = 0.99
-    told = with_failures(claim, np.ones((4, 2)), success)
+    told = with_failures(claim, np.ones((4, 2)), success, SCENE)
     assert told.evidence.endswith(
         "Failed targets, over all seeds: 0 of 8, 1 of 8; episodes that arrived: 100.00%, 99.88%."
     )
     assert told.verdict == "holds"
-    same = with_failures(claim, np.ones((4, 2)), np.ones((4, 2)))
+    same = with_failures(claim, np.ones((4, 2)), np.ones((4, 2)), SCENE)
     assert same.evidence.endswith("Failed targets, over all seeds: 0 of 8, 0 of 8.")
-    assert with_failures(claim, np.empty((0, 2)), success) == claim
+    assert with_failures(claim, np.empty((0, 2)), success, SCENE) == claim
 
 
 def test_who_arrives_less_often_is_not_told_better() -> None:
@@ -72,14 +72,26 @@ def test_who_arrives_less_often_is_not_told_better() -> None:
     spinning, walking = np.zeros((4, 2)), np.ones((4, 2))
     fewer = judged_less("fewer", "collisions", scores(0, 0, 0, 0), scores(1, 2, 1, 2), SCENE)
     assert fewer.verdict == "holds"
-    assert with_failures(fewer, spinning, walking).verdict == "undecided"
-    assert with_failures(fewer, walking, spinning).verdict == "holds"
-    assert with_failures(fewer, walking - 0.009, walking).verdict == "holds"
-    assert with_failures(fewer, walking - 0.011, walking).verdict == "undecided"
+    assert with_failures(fewer, spinning, walking, SCENE).verdict == "undecided"
+    assert with_failures(fewer, walking, spinning, SCENE).verdict == "holds"
+    assert with_failures(fewer, walking - 0.009, walking, SCENE).verdict == "holds"
+    assert with_failures(fewer, walking - 0.011, walking, SCENE).verdict == "undecided"
     other = judged_less("fewer", "collisions", scores(1, 2, 1, 2), scores(0, 0, 0, 0), SCENE)
     assert other.verdict == "does not hold"
-    assert with_failures(other, walking, spinning).verdict == "undecided"
-    assert with_failures(other, spinning, walking).verdict == "does not hold"
+    assert with_failures(other, walking, spinning, SCENE).verdict == "undecided"
+    assert with_failures(other, spinning, walking, SCENE).verdict == "does not hold"
+
+
+def test_arrivals_weigh_scenes_alike_as_the_figures_do() -> None:
+    """One target in a scene where a twentieth gets lost, nine in another: half of a twentieth, not a tenth of it."""
+    scenes = np.array([0, *[1] * 9])
+    fewer, more = np.full((4, 10), 1.0) + np.arange(4)[:, None] / 10, np.full((4, 10), 2.0)
+    claim = judged_less("fewer", "collisions", fewer, more, scenes)
+    lost = np.ones((4, 10))
+    lost[:, 0] = 0.95
+    assert claim.verdict == "holds" and lost.mean() > 0.99
+    told = with_failures(claim, lost, np.ones((4, 10)), scenes)
+    assert told.verdict == "undecided" and "episodes that arrived: 97.50%, 100.00%" in told.evidence
 
 
 @pytest.mark.parametrize(("more", "verdict"), [(1.015, "holds"), (1.025, "does not hold")])

@@ -64,6 +64,9 @@ class Reproduce:
 
     def run(self) -> None:
         """Run what is missing, write the report, say where it is."""
+        from clearway.rooms.build import check_mujoco
+
+        check_mujoco()
         from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
 
@@ -114,6 +117,9 @@ class Report:
 
     def run(self) -> None:
         """Write the report, say where it is."""
+        from clearway.rooms.build import check_mujoco
+
+        check_mujoco()
         from clearway.experiments.reproduce import gather
 
         _write(gather(self.folder), self.folder, self.json)

@@ -98,4 +98,4 @@ def _claims(setting: Setting, groups: list[Group]) -> Iterator[Claim]:
             than = other[1] if other[0] == name else other[0].removeprefix(f"{name}, ")
             text = f"{name}: fewer {metric} than with {than}"
             claim = judged_less(text, metric, ours.of(metric), theirs.of(metric), scenes)
-            yield with_failures(claim, ours.of("success"), theirs.of("success"))
+            yield with_failures(claim, ours.of("success"), theirs.of("success"), scenes)

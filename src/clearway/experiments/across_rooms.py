@@ -170,7 +170,8 @@ def _claims(setting: Setting, learner: str, rooms: Sequence[dict[str, InRoom]]) 
             ours, theirs = ours + 1 / episodes, theirs + 1 / episodes
         claim = _judged(text, FIGURES[figure], ours, theirs, 1 + SAME if figure == "steps" else 1.0)
         ours, theirs = (np.concatenate([_success(own)[kind].ravel() for own in complete])[None] for kind in (0, 1))
-        yield claim if figure == "frames" else with_failures(claim, ours, theirs)  # which counts failures itself
+        rooms_of = np.repeat(np.arange(len(complete)), [_success(own)[0].size for own in complete])
+        yield claim if figure == "frames" else with_failures(claim, ours, theirs, rooms_of)  # which counts failures
 
 
 def _success(own: dict[str, InRoom]) -> tuple[np.ndarray, np.ndarray]:

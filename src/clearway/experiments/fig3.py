@@ -119,7 +119,8 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
         ours, theirs = (own.of("collisions").max(axis=1, keepdims=True) for own in pair)
         text = f"{learner}: fewer collisions in the worst case (the target with the most, in each run)"
         claim = judged_less(text, "collisions on a run's worst target", ours, theirs, ONE_TARGET)
-        yield with_failures(claim, *(own.of("success") for own in pair))
+        arrived, others = (own.of("success") for own in pair)
+        yield with_failures(claim, arrived, others, world.target_scene.numpy())
 
 
 def _best_and_worst(setting: Setting, group: Group, metric: str, targets: np.ndarray) -> list[Series]:

@@ -77,6 +77,7 @@ def _table(setting: Setting, groups: Sequence[Group]) -> ReportTable:
 def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
     """The collision-aware agent is ahead halfway, and has then nearly come to its end."""
     world = setting.world()
+    scenes = world.target_scene.numpy()
     found = []
     for learner in setting.learners:
         halfway = {
@@ -87,17 +88,16 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> list[Claim]:
         ours, baseline = halfway[COLLISION_AWARE.name], halfway[SHORTEST.name]
         for metric in METRICS:
             text = f"{learner}: learns faster (fewer {metric} halfway)"
-            scene = world.target_scene.numpy()
-            claim = judged_less(text, f"{metric} halfway", ours.of(metric), baseline.of(metric), scene)
-            found.append(with_failures(claim, ours.of("success"), baseline.of("success")))
+            claim = judged_less(text, f"{metric} halfway", ours.of(metric), baseline.of(metric), scenes)
+            found.append(with_failures(claim, ours.of("success"), baseline.of("success"), scenes))
         (end,) = (
             group.scores(setting.out, world.target_count)
             for group in groups
             if (group.learner, group.agent, group.trial.halfway) == (learner, COLLISION_AWARE.name, False)
         )
         text = f"{learner}: halfway is close to the end (no more steps)"
-        claim = judged_no_more(text, "steps", ours.of("steps"), end.of("steps"), world.target_scene.numpy())
-        found.append(with_failures(claim, ours.of("success"), end.of("success")))
+        claim = judged_no_more(text, "steps", ours.of("steps"), end.of("steps"), scenes)
+        found.append(with_failures(claim, ours.of("success"), end.of("success"), scenes))
     return found
 
 

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from clearway.errors import ClearwayError
+from clearway.experiments.job import is_done
+from clearway.experiments.plan import Job
 from clearway.live.conditions import REFERENCE
 from clearway.live.live_room import MODEL_SOURCE, check_is_room, check_movable
 from clearway.live.walks import encoder_of
 from clearway.scenes.scene import Scene
 from clearway.views.grid import grid_settings
 from clearway.views.seen import TAKES, record_seen_by
+
+
+def feasible(out: Path, jobs: Iterable[Job], why: str | None) -> list[Job]:
+    """All of the jobs; where something hinders them (`why`), those that are done, of which a report tells."""
+    return [job for job in jobs if why is None or is_done(out, job)]
 
 
 def hindrance(scenes: Iterable[Scene], *, pictured: bool = False) -> str | None:

@@ -7,7 +7,7 @@ is, so a job that was interrupted goes on from its last checkpoint.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,30 +69,42 @@ def do(out: Path, job: Job, threads: int) -> None:
         ClearwayError: a scene is missing or has changed, or training failed.
     """
     set_threads(threads)
-    run = job.run
-    request = request_of(run)
-    own = run_folder(out, run)
-    if not checkpoints(own.checkpoints) and (own.path / TRIALS).exists():  # what an agent did that is no more
-        shutil.rmtree(own.path / TRIALS)
-    folder = train(request, own.path, resume=True, milestones=(run.halfway,))
+    run, scenes = job.run, _scenes(job.run)
+    folder = run_folder(out, run)
+    if folder.trained_frames() < run.learner.frames:
+        _train(folder, run, scenes)
     for trial in job.trials:
         path = trial_path(out, run, trial)
         if path.exists():
             continue
         if isinstance(trial, LiveTrial):
-            walk_live(path, folder.path, request.scenes, run, trial)
+            walk_live(path, folder.path, scenes, run, trial)
         else:
-            walk_on_grid(path, folder, request.scenes, run, trial)
+            walk_on_grid(path, folder, scenes, run, trial)
 
 
-def request_of(run: PlannedRun) -> RunRequest:
-    """What to train, with the scenes as they lie in their files; perturbed pictures are taken where they are not kept.
+def _train(folder: RunFolder, run: PlannedRun, scenes: Sequence[Scene]) -> None:
+    """Train the run, or what is left of it; what an agent did that is no more, as of a record, goes."""
+
+    def begun(path: Path) -> None:
+        if (path / TRIALS).exists():
+            shutil.rmtree(path / TRIALS)
+
+    train(request_of(run, scenes), folder.path, resume=True, milestones=(run.halfway,), on_begin=begun)
+
+
+def request_of(run: PlannedRun, scenes: Sequence[Scene] | None = None) -> RunRequest:
+    """What to train; perturbed pictures are taken where they are not kept.
+
+    Args:
+        run: to be trained.
+        scenes: of the run; None: they are read from their files.
 
     Raises:
         ClearwayError: a scene is missing or has changed, or perturbed pictures cannot be taken.
     """
     request = RunRequest(
-        scenes=_scenes(run),
+        scenes=_scenes(run) if scenes is None else scenes,
         targets={scene.name: targets for scene, targets in zip(run.scenes, run.targets, strict=True)},
         learner=run.learner,
         reward=run.reward,

@@ -56,7 +56,9 @@ def walk_live(path: Path, folder: Path, scenes: Sequence[Scene], run: PlannedRun
                 run_live_episodes(place.live, place.world, agent, place.camera, setting.perturbations, protocol)
                 for place, agent in zip(places, agents, strict=True)
             ]
-            found[setting.label] = [_columns(*one) for one in zip(tables, scenes, zones, strict=True)]
+            found[setting.label] = [
+                _columns(table, place.live.scene, own) for table, place, own in zip(tables, places, zones, strict=True)
+            ]
     about = told_of(run, run.targets, trial)
     content = {"format_version": FORMAT_VERSION, "about": about, "settings": found}
     with written_whole(path) as part:
@@ -87,7 +89,12 @@ def read_live(path: Path, settings: Iterable[Condition], episodes_per_target: in
 
 
 def nearest_poses(scene: Scene, walk: np.ndarray) -> np.ndarray:
-    """(T,) int64, the states that places and headings (T, 3) are nearest to: first the place, then the heading."""
+    """(T,) int64, the states that places and headings (T, 3) are nearest to: first the place, then the heading.
+
+    Args:
+        scene: in the room's coordinates, as the walk is; those of a floor plan's file begin elsewhere.
+        walk: metres, metres, degrees.
+    """
     away_m2 = ((walk[:, None, :2] - scene.locations_m) ** 2).sum(-1)
     turned_deg = np.abs((walk[:, None, 2] - scene.headings_deg + 180) % 360 - 180)
     return np.lexsort((turned_deg, away_m2.round(DIGITS)), axis=-1)[:, 0]

@@ -93,4 +93,4 @@ def _claims(setting: Setting, groups: Sequence[Group], mapped: Sequence[Mapped])
         ours = group.scores(setting.out, world.target_count)
         text = f"{group.learner}: fewer steps than a {PLANNER} of {planner.frames:,} frames"
         claim = judged_less(text, "steps", ours.of("steps"), theirs.of("steps"), scenes)
-        yield replace(with_failures(claim, ours.of("success"), theirs.of("success")), further=True)
+        yield replace(with_failures(claim, ours.of("success"), theirs.of("success"), scenes), further=True)

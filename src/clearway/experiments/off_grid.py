@@ -10,7 +10,7 @@ import numpy as np
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.evaluation.across_seeds import mean_estimate
 from clearway.experiments.groups import REWARD_PAIRS, REWARDS, WALKED
-from clearway.experiments.hindrance import hindrance
+from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, trial_path, unfinished
 from clearway.experiments.live_trial import FIGURES, read_live
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, PlannedRun, Walker
@@ -57,8 +57,8 @@ def settings(setting: Setting) -> list[Condition]:
 
 
 def jobs(setting: Setting) -> list[Job]:
-    """What must be done; nothing where scenes cannot be walked in."""
-    return [] if hindrance(setting.scenes) else _jobs(_groups(setting))
+    """What must be done; where scenes cannot be walked in, what is done already."""
+    return feasible(setting.out, _jobs(_groups(setting)), hindrance(setting.scenes))
 
 
 def section(setting: Setting) -> Section:
@@ -155,5 +155,5 @@ def _claim(setting: Setting, family: str, figure: str, first: str, second: str, 
     one, other = (own[name][..., FIGURES.index(figure)] for name in (first, second))
     judged = judged_more if figure == "least clearance" else judged_less
     text = f"{family}: {first}, {WORDS[figure]} than {second}"
-    arrived = (own[name][..., FIGURES.index("success")] for name in (first, second))
-    return with_failures(judged(text, figure, one, other, scenes), *arrived, lost=LOST)
+    arrived, others = (own[name][..., FIGURES.index("success")] for name in (first, second))
+    return with_failures(judged(text, figure, one, other, scenes), arrived, others, scenes, lost=LOST)

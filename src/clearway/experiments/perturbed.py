@@ -9,7 +9,7 @@ import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.experiments.groups import EXACT, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores
-from clearway.experiments.hindrance import hindrance
+from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, episodes_of, unfinished
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, Trial, Walker
 from clearway.experiments.section import Claim, ReportTable, Section, Value
@@ -56,8 +56,8 @@ Found = Mapping[tuple[str, str, str | None], Mapping[str, Scores]]
 
 
 def jobs(setting: Setting) -> list[Job]:
-    """What must be done; nothing where no other pictures of the scenes can be taken."""
-    return [] if hindrance(setting.scenes, pictured=True) else _jobs(_kinds(setting))
+    """What must be done; where no other pictures of the scenes can be taken, what is done already."""
+    return feasible(setting.out, _jobs(_kinds(setting)), _why_nothing(setting))
 
 
 def section(setting: Setting) -> Section:
@@ -75,9 +75,10 @@ def section(setting: Setting) -> Section:
         name=NAME,
         title="Perturbed pictures",
         text=(
-            f"Agents of which all but one were trained on {EVERYTHING.takes} perturbed pictures of every pose beside "
-            f"its own, on the grid: episodes of at most {STEP_LIMIT} steps, in which they see the poses' own pictures, "
-            f"or {EVERYTHING.takes} others of each, one a step and none twice to the bit, that no training has seen. "
+            "Agents on the grid. Where the table says so, they were trained on "
+            f"{EVERYTHING.takes} perturbed pictures of every pose beside its own. In episodes of at most {STEP_LIMIT} "
+            "steps they see the poses' own pictures, or "
+            f"{EVERYTHING.takes} others of each, one a step and none twice to the bit, that no training has seen. "
             "Targets are seen in their own. Moves stay those of the grid, wherever a picture shows the furniture. "
             "Agents of one seed have the same starts, chances and pictures."
             + (f" {', '.join(left_out)}: learns from no perturbed pictures, and is left out." if left_out else "")
@@ -186,5 +187,6 @@ def _claims(setting: Setting, found: Found) -> Iterator[Claim]:
 
 def _claim(setting: Setting, text: str, metric: str, first: Scores, second: Scores) -> Claim:
     judged = judged_more if metric == "spl" else judged_less
-    claim = judged(text, metric, first.of(metric), second.of(metric), setting.world().target_scene.numpy())
-    return with_failures(claim, first.of("success"), second.of("success"))
+    target_scene = setting.world().target_scene.numpy()
+    claim = judged(text, metric, first.of(metric), second.of(metric), target_scene)
+    return with_failures(claim, first.of("success"), second.of("success"), target_scene)

@@ -16,6 +16,7 @@ from clearway.learn.foreign_agent import is_ours
 from clearway.learn.learner import Learner
 from clearway.learn.old_runs import without_later
 from clearway.learn.plugged import paid_by
+from clearway.learn.seeds import check_seed
 from clearway.live.conditions import Condition, Perturbations
 from clearway.reward import Reward
 from clearway.views.seen import TAKES
@@ -61,6 +62,9 @@ class PlannedRun:
         targets: of each scene.
         reward, learner, seed, zone_level: see there.
         perturbed: pictures that are seen beside the scenes' own; None: there are none.
+
+    Raises:
+        RunError: the seed is out of range.
     """
 
     scenes: tuple[SceneFile, ...]
@@ -72,6 +76,7 @@ class PlannedRun:
     perturbed: PerturbedPictures | None = None
 
     def __post_init__(self) -> None:
+        check_seed(self.seed)
         object.__setattr__(self, "targets", _plain(self.targets))
 
     @property

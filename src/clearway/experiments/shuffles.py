@@ -91,5 +91,5 @@ def _claims(setting: Setting, groups: list[Group]) -> list[Claim]:
         text = f"{learner}: {ours.agent}, fewer collisions than {theirs.agent}"
         scenes = world.target_scene.numpy()
         claim = judged_less(text, "collisions", own.of("collisions"), other.of("collisions"), scenes)
-        found.append(with_failures(claim, own.of("success"), other.of("success")))
+        found.append(with_failures(claim, own.of("success"), other.of("success"), scenes))
     return found

@@ -65,8 +65,9 @@ def _tenth(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
         ours, theirs = (found[learner, reward.name] for reward in (COLLISION_AWARE, SHORTEST))
         text = f"{learner}: less than a tenth of the collisions with the shortest-path reward"
         pair = ours.of("collisions"), theirs.of("collisions") / 10
-        claim = judged_less(text, "collisions and a tenth of theirs", *pair, world.target_scene.numpy())
-        yield with_failures(claim, ours.of("success"), theirs.of("success"))
+        target_scene = world.target_scene.numpy()
+        claim = judged_less(text, "collisions and a tenth of theirs", *pair, target_scene)
+        yield with_failures(claim, ours.of("success"), theirs.of("success"), target_scene)
 
 
 def claims(setting: Setting, groups: Sequence[Group], where: str = "") -> list[Claim]:
@@ -93,5 +94,6 @@ def claims(setting: Setting, groups: Sequence[Group], where: str = "") -> list[C
             ):
                 claim = judged(f"{learner}: {text}", what, ours.of(what), theirs.of(what), target_scene)
                 further = baseline != SHORTEST.name or learner.endswith(UNCLIPPED)
-                found.append(replace(with_failures(claim, ours.of("success"), theirs.of("success")), further=further))
+                claim = with_failures(claim, ours.of("success"), theirs.of("success"), target_scene)
+                found.append(replace(claim, further=further))
     return found

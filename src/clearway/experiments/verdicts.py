@@ -15,6 +15,7 @@ from clearway.evaluation.across_seeds import (
     permutation_p,
     probability_of_less,
 )
+from clearway.evaluation.metrics import by_scene
 from clearway.experiments.section import Claim, Verdict
 
 SAME = 0.02  # means within this share of each other count as equal
@@ -56,7 +57,9 @@ def judged_no_more(text: str, what: str, first: np.ndarray, second: np.ndarray, 
     return _judged(text, what, first, second, target_scene, allowed=allowed)
 
 
-def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray, *, lost: float = LOST) -> Claim:
+def with_failures(
+    claim: Claim, first: np.ndarray, second: np.ndarray, target_scene: np.ndarray, *, lost: float = LOST
+) -> Claim:
     """The claim, its evidence saying on how many targets some episode failed, which may be all that a mean tells of.
 
     Undecided where those whom the verdict favours arrive less often: who stands still does not collide.
@@ -65,12 +68,13 @@ def with_failures(claim: Claim, first: np.ndarray, second: np.ndarray, *, lost: 
         claim: of two kinds of agents.
         first: (R, M) success, 1 where every episode reached the target.
         second: (R', M) success.
+        target_scene: (M,) int.
         lost: share of episodes by which one kind may arrive less often and still be told better.
     """
     if not first.size or not second.size:
         return claim
     told = f"Failed targets, over all seeds: {failed_targets(first)}, {failed_targets(second)}"
-    arrived, other = float(first.mean()), float(second.mean())
+    arrived, other = (float(by_scene(each[..., None], target_scene).mean()) for each in (first, second))
     if min(arrived, other) < 1:
         told += f"; episodes that arrived: {arrived:.2%}, {other:.2%}"
     favours = {"holds": arrived - other, "does not hold": other - arrived}

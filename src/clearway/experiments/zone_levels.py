@@ -77,7 +77,7 @@ def _claims(setting: Setting, groups: list[Group]) -> list[Claim]:
                 theirs.of(metric),
                 scenes,
             )
-            found.append(with_failures(claim, ours.of("success"), theirs.of("success")))
+            found.append(with_failures(claim, ours.of("success"), theirs.of("success"), scenes))
         for other in (shortest, poses):
             ours_settled, theirs_settled = (frames_until_settled(setting.out, each, mark)[0] for each in (cells, other))
             text = f"{learner}: settles sooner with zones of cells than {other.agent.removeprefix(SAME)}"

@@ -76,4 +76,4 @@ def _claims(setting: Setting, groups: Sequence[Group]) -> Iterator[Claim]:
                 theirs = found[learner, other.name]
                 text = f"{learner}: {COLLISION_AWARE.name}, {WORDS[figure]} than {other.name}"
                 claim = judged_less(text, FIGURES[figure], ours.of(figure), theirs.of(figure), scenes)
-                yield with_failures(claim, ours.of("success"), theirs.of("success"))
+                yield with_failures(claim, ours.of("success"), theirs.of("success"), scenes)

@@ -156,7 +156,7 @@ class RunFolder:
             self.check_free()
             return None
         before = self.read_record()
-        check_goes_on(before, record, self._trained_frames, str(self.path), "--out")
+        check_goes_on(before, record, self.trained_frames, str(self.path), "--out")
         return before
 
     def check_place(self) -> None:
@@ -184,14 +184,18 @@ class RunFolder:
         Warns:
             UserWarning: its schedules go on as those of so many frames.
         """
-        told = f"{self.path}: was finished after {self._trained_frames():,} frames, and goes on to {frames:,}"
+        told = f"{self.path}: was finished after {self.trained_frames():,} frames, and goes on to {frames:,}"
         warnings.warn(f"{told}; results will not be those of one training so long", stacklevel=4)
         longer = before.with_frames(frames)
         self.write_record(longer)
         return longer
 
-    def _trained_frames(self) -> int:
-        """Frames of the newest checkpoint; 0 without one."""
+    def trained_frames(self) -> int:
+        """Frames of the newest checkpoint that is whole; 0 where there is none.
+
+        Raises:
+            RunError: none of the checkpoints is whole.
+        """
         any_there = any(self.checkpoints.glob("frames-*"))
         return read_progress(newest_checkpoint(self.checkpoints)).frames if any_there else 0
 

@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from clearway.errors import ArgumentError, SceneError
+from clearway.learn.seeds import SEED_LIMIT
 from clearway.live.conditions import Perturbations
 from clearway.live.words import GEOMETRY
 from clearway.scenes.sensors import RGB, SENSORS, Sensor, check_names
 
 SIDES_PX = (16, 1024)  # least and most of a picture's height and width
 MOST_POSES, MOST_TAKES = 100_000, 100
-MOST_SEED = 2**31 - 1
 MOST_BYTES = 4 * 1024**3  # of a room's pictures, which are in memory together when they are taken
 
 
@@ -48,7 +48,7 @@ class ViewSettings:
         for name, number, low, high in (
             ("poses", self.poses, 1, MOST_POSES),
             ("takes", self.takes, 1, MOST_TAKES),
-            ("seed", self.seed, 0, MOST_SEED),
+            ("seed", self.seed, 0, SEED_LIMIT - 1),
             *(("size", side, *SIDES_PX) for side in self.size_px),
         ):
             if not low <= number <= high:
