@@ -5,19 +5,16 @@ from dataclasses import dataclass, replace
 from multiprocessing import active_children
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 
-from clearway.experiments import expected_time
-from clearway.experiments.expected_time import _duration, frames_per_second, shortest_steps, told_time, walking_time
-from clearway.experiments.job import request_of, run_folder, trial_path
-from clearway.experiments.plan import LiveTrial
+from clearway.experiments import expected_time, expected_walks
+from clearway.experiments.expected_time import _duration, frames_per_second, told_time
+from clearway.experiments.job import run_folder, trial_path
 from clearway.experiments.reproduce import planned
 from clearway.learn.a2c import A2C
 from clearway.learn.checkpoint import Progress, write_checkpoint
 from clearway.learn.presets import PAPER_A3C
-from clearway.live.conditions import Condition, Perturbations
 from helpers.small_setting import small_setting
 
 
@@ -25,8 +22,8 @@ def test_the_time_is_the_frames_by_the_speed_and_the_workers(tmp_path: Path, mon
     jobs = planned(small_setting(tmp_path), ["fig4"])
     frames = sum(job.run.learner.frames for job in jobs)
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
-    monkeypatch.setattr(expected_time, "walking_time", lambda run, trial, threads: 0.125)
-    monkeypatch.setattr(expected_time, "shortest_steps", lambda scenes, targets: [8.0] * sum(map(len, targets)))
+    monkeypatch.setattr(expected_walks, "walking_time", lambda run, trial, threads: 0.125)
+    monkeypatch.setattr(expected_walks, "shortest_steps", lambda scenes, targets: [8.0] * sum(map(len, targets)))
     episodes = 2 * len(jobs) * 5 * 3  # at the end and halfway, three to each of five targets; of 8 to 40 steps
     walked = f"evaluation {_duration(episodes / 2)} if all go straight, {_duration(episodes * 5 / 2)} if all get lost"
     assert (
@@ -42,8 +39,8 @@ def test_what_has_been_trained_takes_no_time(tmp_path: Path, monkeypatch: pytest
     jobs = planned(small_setting(tmp_path), ["fig4"])
     (first, second), frames = jobs[:2], jobs[0].run.learner.frames
     monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: frames / 7200)
-    monkeypatch.setattr(expected_time, "walking_time", lambda run, trial, threads: 0.125)
-    monkeypatch.setattr(expected_time, "shortest_steps", lambda scenes, targets: [8.0] * sum(map(len, targets)))
+    monkeypatch.setattr(expected_walks, "walking_time", lambda run, trial, threads: 0.125)
+    monkeypatch.setattr(expected_walks, "shortest_steps", lambda scenes, targets: [8.0] * sum(map(len, targets)))
     for run, reached in ((first.run, frames + 3), (second.run, frames // 2)):  # the last update may go beyond
         write_checkpoint(
             run_folder(tmp_path, run).checkpoints, {"weight": torch.zeros(1)}, {}, Progress(reached, 1, 1.0)
@@ -87,39 +84,6 @@ def test_a_speed_is_frames_by_seconds(tmp_path: Path, monkeypatch: pytest.Monkey
     assert 0 < speed < job.run.learner.frames / 1e-4 and time.perf_counter() - began < 60
 
 
-def test_a_walk_is_tried_by_an_agent_that_has_learnt_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (job, *_) = planned(small_setting(tmp_path), ["fig4"])
-    walked, steps = expected_time.run_episodes, []
-
-    def counted(*arguments, **settings):
-        table = walked(*arguments, **settings)
-        steps.append(table.steps.sum())
-        return table
-
-    monkeypatch.setattr(expected_time, "run_episodes", counted)
-    made, acting = expected_time.made_agent, {}
-    monkeypatch.setattr(expected_time, "made_agent", lambda *given: acting.update(given[1]) or made(*given))
-    began = time.perf_counter()
-    found = walking_time(job.run, job.trials[0], threads=1)
-    assert 0 < found * steps[0] < time.perf_counter() - began
-    assert 15 < steps[0] <= 15 * expected_time.TRIED_STEPS  # three episodes to each of five targets
-    begun = request_of(job.run).trainer().tensors()
-    own = {name: tensor for name, tensor in acting.items() if name.startswith("network.")}
-    assert own and all(torch.equal(tensor, begun[name]) for name, tensor in own.items())
-    assert not (tmp_path / "runs").exists()
-
-
-def test_shortest_steps_are_means_over_all_starts_target_by_target(tmp_path: Path) -> None:
-    setting = small_setting(tmp_path)
-    ways = [
-        scene.distances_to(np.array([target]))[0]
-        for scene, own in zip(setting.scenes, setting.targets, strict=True)
-        for target in own
-    ]
-    expected = [sum(steps for steps in way.tolist() if steps > 0) / (way > 0).sum() for way in ways]
-    assert shortest_steps(setting.files, setting.targets) == pytest.approx(expected)
-
-
 @dataclass(frozen=True)
 class Foreign(A2C):
     """Another package's algorithm."""
@@ -133,14 +97,6 @@ def test_episodes_of_other_packages_agents_are_counted_not_tried(
     foreign = replace(job, run=replace(job.run, learner=Foreign(frames=100)))
     told = told_time(tmp_path, [foreign], [foreign], 1, 1)
     assert told.endswith("of training here at least; 30 episodes of other packages' agents")
-
-
-def test_episodes_off_the_grid_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (job, *_) = planned(small_setting(tmp_path), ["fig4"])
-    monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: 1e6)
-    settings = Condition("none", Perturbations()), Condition("turn", Perturbations(angle_noise=5))
-    live = replace(job, trials=(LiveTrial(settings, 4, 40),))
-    assert told_time(tmp_path, [live], [live], 1, 1).endswith("of training here at least; 40 episodes off the grid")
 
 
 def test_asynchronous_workers_are_tried_too_and_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

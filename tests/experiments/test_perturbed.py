@@ -14,7 +14,7 @@ from clearway.agents.by_features import FeatureAgent
 from clearway.agents.on_learnt_map import MOST_A_POSE, MapPlanner, frames_of, nearest_pictures, seen_by_walkers
 from clearway.evaluation.episode_files import read_episodes, write_episodes
 from clearway.evaluation.episodes import EpisodeTable, run_episodes
-from clearway.experiments import expected_time, grid_trial, perturbed
+from clearway.experiments import expected_time, expected_walks, grid_trial, perturbed
 from clearway.experiments.correction import corrected
 from clearway.experiments.job import do, run_folder, trial_path
 from clearway.experiments.plan import Job, PerturbedPictures, SceneFile, Trial, merged
@@ -225,17 +225,19 @@ def test_episodes_of_another_experiment_are_not_its_own(setting: Setting) -> Non
     assert perturbed.section(gone).text.startswith("Nothing was walked. ")
 
 
-def test_episodes_on_perturbed_pictures_are_counted_beforehand(setting: Setting, asked, monkeypatch) -> None:
+def test_what_perturbed_pictures_take_is_told_beforehand(setting: Setting, asked, monkeypatch) -> None:
     monkeypatch.setattr(expected_time, "TRIED_S", 0.01)
+    monkeypatch.setattr(expected_walks, "picture_time", lambda *_: 0.5)
+    monkeypatch.setattr(expected_walks, "walking_time", lambda *_: 0.0)
     tried, measure = [], expected_time.frames_per_second
     monkeypatch.setattr(
         expected_time, "frames_per_second", lambda run, n: tried.append(run.perturbed) or measure(run, n)
     )
     jobs = merged(perturbed.jobs(setting))
     told = expected_time.told_time(setting.out, jobs, jobs, 1, 1)
-    episodes = (25 + 5) * 2 * 5 * 3  # of runs and of the nearest picture, two trials, five targets, three each
+    taken = 3 * 5 * 4 * 2 * setting.scenes[0].state_count  # trained on, two seen; of five seeds, four takes, two scenes
     assert told.startswith("25 runs, 25 to be trained, 1 at a time: ")
-    assert told.endswith(f"; {episodes} episodes on perturbed pictures")
+    assert f"; {taken:,} perturbed pictures " in told
     assert tried == [perturbed.EVERYTHING, None] and not asked  # no picture is taken beforehand
 
 
