@@ -335,14 +335,14 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
     assert len(means) == 6
     names = {"nearest picture": "nearest picture", "walked": "random walk"}
     for row in means:
-        name = names.get(str(row["learner"]), row["reward"])
+        name = names.get(str(row["learner"]), row["agent"])
         (line,) = [line for line in lines if line.startswith(f"| {name} |") and line.count("|") == 8]
         for cell, name in zip(line.strip("|").split("|")[1:], figures, strict=True):
             scale = 1 if name == "contacts" else 100
             ends = (float(end) for end in str(row[f"95 % of {name}"]).split(" to "))
             for written, value in zip(re.findall(r"[\d.]+", cell), (float(str(row[name])), *ends), strict=True):
                 assert abs(float(written) - scale * value) <= (0.0051 if name == "contacts" else 0.051), (
-                    f"{row['reward']}, {name}"
+                    f"{row['agent']}, {name}"
                 )
     under = [line.strip("| ").split(" | ") for line in lines if line.count("|") == 8 and "%, " in line]
     assert [label for label, *_ in under] == [str(row["setting"]) for row in rows[6::6]]

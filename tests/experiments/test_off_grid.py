@@ -144,7 +144,7 @@ def test_tables_hold_who_needs_no_training(setting: Setting) -> None:
     (table,) = off_grid.section(setting).tables
     rows = by_heading(table)
     own = [row for row in rows if row["learner"] in ("nearest picture", "walked")]
-    assert {row["reward"] for row in own} == {"4,700 frames", "random walk"}
+    assert {row["agent"] for row in own} == {"4,700 frames", "random walk"}
     assert all((row["seeds"], row["contacts"]) == (5, 3.0) for row in own)
     assert len(own) == 2 * (1 + len(off_grid.settings(setting)))
     for job in off_grid.jobs(setting):

@@ -13,7 +13,7 @@ from clearway.experiments.groups import REWARD_PAIRS, REWARDS, WALKED
 from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, trial_path, unfinished
 from clearway.experiments.live_trial import FIGURES, read_live
-from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, PlannedRun, Walker
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, LiveTrial, PlannedRun, WalkerName
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
@@ -41,12 +41,12 @@ class LiveGroup:
     """Agents that differ in their seed alone, and what they are asked.
 
     Attributes:
-        learner, reward: names; of agents that need no training what stands for these in a table.
+        learner, agent: names, the agent's that of its reward; of agents that need no training what stands for these.
         jobs: one a seed.
     """
 
     learner: str
-    reward: str
+    agent: str
     jobs: tuple[Job, ...]
 
 
@@ -66,7 +66,7 @@ def section(setting: Setting) -> Section:
     groups, why = _groups(setting), hindrance(setting.scenes)
     if why and not any_walked(setting.out, _jobs(groups)):
         return Section(name=NAME, title="Off the grid", text=f"Nothing was walked. {why}")
-    found = {(group.learner, group.reward): _scores(setting, group) for group in groups}
+    found = {(group.learner, group.agent): _scores(setting, group) for group in groups}
     return Section(
         name=NAME,
         title="Off the grid",
@@ -102,7 +102,7 @@ def _groups(setting: Setting) -> list[LiveGroup]:
     ]
 
 
-def _tried(setting: Setting, runs: Sequence[PlannedRun], walker: Walker) -> tuple[Job, ...]:
+def _tried(setting: Setting, runs: Sequence[PlannedRun], walker: WalkerName) -> tuple[Job, ...]:
     episodes, asked = min(EPISODES_PER_TARGET, setting.budget.episodes_per_target), tuple(settings(setting))
     return tuple(Job(run, (LiveTrial(asked, episodes, STEP_LIMIT, run.seed, walker),)) for run in runs)
 
@@ -125,17 +125,17 @@ def _table(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> Rep
     rows: list[tuple[Value, ...]] = []
     labels = [one.label for one in settings(setting)]
     for number, label in enumerate(["all settings, mean", *labels]):
-        for (learner, reward), scores in found.items():
+        for (learner, agent), scores in found.items():
             own = scores.mean(1) if number == 0 else scores[:, number - 1]
             estimates = [mean_estimate(own[..., index], scenes) if len(own) else None for index in range(len(FIGURES))]
             figures = (value for each in estimates for value in ((each.value, each.ends) if each else (None, None)))
-            rows.append((label, learner, reward, len(own), *figures))
+            rows.append((label, learner, agent, len(own), *figures))
     headings = (heading for name in FIGURES for heading in (name, f"95 % of {name}"))
     notes = (
         "Least clearance: of an episode, metres. The last three are shares of the time; the collision zone is that of "
         "the nearest pose of the grid as it was built.",
     )
-    return ReportTable(NAME, "Off the grid", ("setting", "learner", "reward", "seeds", *headings), tuple(rows), notes)
+    return ReportTable(NAME, "Off the grid", ("setting", "learner", "agent", "seeds", *headings), tuple(rows), notes)
 
 
 def _claims(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> Iterator[Claim]:

@@ -11,7 +11,7 @@ from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
 from clearway.experiments.groups import EXACT, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores
 from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, episodes_of, unfinished
-from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, Trial, Walker
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, Trial, WalkerName
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
@@ -129,7 +129,7 @@ def _tried(
     setting: Setting,
     runs: tuple[PlannedRun, ...],
     seen: Mapping[str, PerturbedPictures | None],
-    walker: Walker = "agent",
+    walker: WalkerName = "agent",
 ) -> dict[str, tuple[Job, ...]]:
     """Jobs by what is seen, by each run's seed."""
     trial = setting.trial(step_limit=STEP_LIMIT)

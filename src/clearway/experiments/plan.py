@@ -24,7 +24,7 @@ from clearway.views.seen import TAKES
 TargetSets = tuple[tuple[int, ...], ...]
 """Targets of each scene, in the scenes' order; states in the scene's own numbering."""
 
-Walker: TypeAlias = Literal["agent", "nearest picture", "random walk"]
+WalkerName: TypeAlias = Literal["agent", "nearest picture", "random walk"]
 NEAREST: Final = "nearest picture"
 RANDOM_WALK: Final = "random walk"
 
@@ -131,7 +131,7 @@ class Trial:
     step_limit: int = STEP_LIMIT
     seed: int = 0
     perturbed: PerturbedPictures | None = None
-    walker: Walker = "agent"
+    walker: WalkerName = "agent"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "targets", _plain(self.targets))
@@ -163,7 +163,7 @@ class LiveTrial:
     episodes_per_target: int
     step_limit: int
     seed: int = 0
-    walker: Walker = "agent"
+    walker: WalkerName = "agent"
 
     @cached_property
     def name(self) -> str:
