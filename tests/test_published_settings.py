@@ -372,7 +372,7 @@ def check_who_had_settled(setting: Setting, page: str) -> None:
     for group in off_grid._groups(setting)[:2]:
         scores = off_grid._scores(setting, group)
         has = [settled_row(run_folder(setting.out, job.run).metrics(), mark) is not None for job in group.jobs]
-        told[group.reward] = np.array(has), scores[:, 0, :, 0].mean(1), scores[..., 1].mean((1, 2))
+        told[group.agent] = np.array(has), scores[:, 0, :, 0].mean(1), scores[..., 1].mean((1, 2))
     assert off_grid.FIGURES[:2] == ("success", "contacts")
     has, arrive, _ = told["shortest"]
     assert has.sum() == 3 and set(arrive[~has].round(2)) == {0.3}
