@@ -46,6 +46,7 @@ ASKED_FIRST = {
     ("fig6-bathroom", ""): {67},
     ("four-rooms-default", ""): {64, 65},
     ("four-rooms-longer", ""): {37},
+    ("four-rooms-seeds", ""): {73},
     ("four-rooms-zones", ""): {66},
     ("further-room", ""): {69},
     ("hard-bathroom", ""): {58},
