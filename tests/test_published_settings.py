@@ -369,10 +369,10 @@ def test_off_the_grid_is_what_its_record_comes_to(tmp_path: Path) -> None:
 def check_who_had_settled(setting: Setting, page: str) -> None:
     """What unsettled runs do off the grid: of `shortest` unperturbed, of `bump` over all settings."""
     mark, told = mark_steps(setting, setting.targets), {}
-    for group in off_grid._groups(setting)[:2]:
-        scores = off_grid._scores(setting, group)
-        has = [settled_row(run_folder(setting.out, job.run).metrics(), mark) is not None for job in group.jobs]
-        told[group.agent] = np.array(has), scores[:, 0, :, 0].mean(1), scores[..., 1].mean((1, 2))
+    for (_, agent), jobs in [*off_grid._planned(setting).items()][:2]:
+        scores = off_grid._scores(setting, jobs)
+        has = [settled_row(run_folder(setting.out, job.run).metrics(), mark) is not None for job in jobs]
+        told[agent] = np.array(has), scores[:, 0, :, 0].mean(1), scores[..., 1].mean((1, 2))
     assert off_grid.FIGURES[:2] == ("success", "contacts")
     has, arrive, _ = told["shortest"]
     assert has.sum() == 3 and set(arrive[~has].round(2)) == {0.3}

@@ -12,18 +12,15 @@ from clearway.experiments import expected_time, expected_walks
 from clearway.experiments.expected_time import told_time
 from clearway.experiments.expected_walks import picture_time, shortest_steps, walking_time
 from clearway.experiments.job import request_of, trial_path
-from clearway.experiments.plan import RANDOM_WALK, Job, LiveTrial, PerturbedPictures, SceneFile
+from clearway.experiments.plan import RANDOM_WALK, Job, LiveTrial, PerturbedPictures
 from clearway.experiments.reproduce import planned
 from clearway.experiments.setting import Setting
-from clearway.learn.presets import PAPER_A2C
 from clearway.live.conditions import Condition, Perturbations
 from clearway.live.live_room import LiveRoom
 from clearway.reward import COLLISION_AWARE, SHORTEST
-from clearway.scenes.digest import scene_digest
-from clearway.scenes.thor_v1 import read_scene, write_scene
+from helpers.live_setting import live_setting
 from helpers.small_live import walkable_live
-from helpers.small_runs import small_learner
-from helpers.small_setting import BUDGET, FRAMES, small_setting
+from helpers.small_setting import small_setting
 
 SETTINGS = (Condition("none", Perturbations()), Condition("turn", Perturbations(angle_noise=5.0)))
 
@@ -68,20 +65,7 @@ def live() -> LiveRoom:
 
 @pytest.fixture
 def in_room(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> Setting:
-    """One small room of ours, and two seeds."""
-    path = tmp_path / "walkable.h5"
-    write_scene(live.scene, path)
-    scene = read_scene(path)
-    monkeypatch.setattr("clearway.live.walks.live_room", lambda scene: replace(live, scene=scene))
-    return Setting(
-        out=tmp_path,
-        files=(SceneFile(scene.name, path, scene_digest(scene)),),
-        scenes=(scene,),
-        targets=((5, 40),),
-        budget=BUDGET,
-        seeds=(0, 1),
-        learners={"paper": small_learner(PAPER_A2C, frames=FRAMES)},
-    )
+    return live_setting(tmp_path, live, monkeypatch, seeds=2)
 
 
 def test_walks_off_the_grid_are_tried_in_the_room_by_who_needs_pictures_and_who_does_not(

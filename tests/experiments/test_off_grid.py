@@ -19,11 +19,10 @@ from clearway.experiments import live_trial, off_grid
 from clearway.experiments.correction import corrected
 from clearway.experiments.job import do, is_done, trial_path, unfinished
 from clearway.experiments.live_trial import COLUMNS, FIGURES, nearest_poses, read_live
-from clearway.experiments.plan import Job, LiveTrial, SceneFile
+from clearway.experiments.plan import Job, LiveTrial
 from clearway.experiments.section import Claim
 from clearway.experiments.setting import Setting
 from clearway.learn.load import load_network
-from clearway.learn.presets import PAPER_A2C
 from clearway.live.conditions import Condition, Perturbations
 from clearway.live.episodes import LiveProtocol
 from clearway.live.live_room import LiveRoom
@@ -31,18 +30,14 @@ from clearway.live.results import METRICS
 from clearway.live.walks import stages, walk_setting
 from clearway.perception import depth_grid
 from clearway.reward import COLLISION_AWARE
-from clearway.scenes.digest import scene_digest
-from clearway.scenes.scene import EncoderRecord, Scene
-from clearway.scenes.thor_v1 import read_scene, write_scene
+from clearway.scenes.scene import EncoderRecord
 from clearway.zones import Zone, scene_zones
+from helpers.live_setting import live_setting
 from helpers.report_tables import by_heading
 from helpers.small_live import walkable_live
-from helpers.small_runs import small_learner
-from helpers.small_setting import BUDGET, FRAMES, small_setting
+from helpers.small_setting import small_setting
 
 SETTINGS = (Condition("none", Perturbations()), Condition("turn ± 5°", Perturbations(angle_noise=5.0)))
-ORIGIN_M = (9.65, -15.85)
-"""Where the room's corner lies in the coordinates of the scene's file, as of a floor plan."""
 IN_ROOM = {
     "success": "success",
     "contacts": "contacts",
@@ -59,24 +54,7 @@ def live() -> LiveRoom:
 
 @pytest.fixture
 def setting(tmp_path: Path, live: LiveRoom, monkeypatch: pytest.MonkeyPatch) -> Setting:
-    """One small room of ours, five seeds of a learner that finishes in a blink."""
-    path = tmp_path / "walkable.h5"
-    write_scene(replace(live.scene, locations_m=live.scene.locations_m + ORIGIN_M), path)
-    scene = read_scene(path)
-
-    def in_room(scene: Scene) -> LiveRoom:
-        return replace(live, scene=replace(scene, locations_m=scene.locations_m - ORIGIN_M), origin_m=ORIGIN_M)
-
-    monkeypatch.setattr("clearway.live.walks.live_room", in_room)
-    return Setting(
-        out=tmp_path,
-        files=(SceneFile(scene.name, path, scene_digest(scene)),),
-        scenes=(scene,),
-        targets=((5, 40),),
-        budget=replace(BUDGET, episodes_per_target=2),
-        seeds=tuple(range(5)),
-        learners={"paper": small_learner(PAPER_A2C, frames=FRAMES)},
-    )
+    return live_setting(tmp_path, live, monkeypatch)
 
 
 @pytest.mark.slow

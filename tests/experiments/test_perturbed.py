@@ -218,10 +218,9 @@ def test_episodes_of_another_experiment_are_not_its_own(setting: Setting) -> Non
     """Own pictures are seen elsewhere, too, by the same agents."""
     walked(setting, {}, {})
     gone = replace(setting, scenes=tuple(replace(scene, encoder=None) for scene in setting.scenes))
-    for kind in perturbed._kinds(setting):
-        for seen, jobs in kind.jobs.items():
-            for job in jobs if seen != OWN else ():
-                trial_path(setting.out, job.run, job.trials[0]).unlink()
+    for (seen, *_), jobs in perturbed._planned(setting).items():
+        for job in jobs if seen != OWN else ():
+            trial_path(setting.out, job.run, job.trials[0]).unlink()
     assert perturbed.section(gone).text.startswith("Nothing was walked. ")
 
 
@@ -254,24 +253,23 @@ def test_training_on_perturbed_pictures_is_tried_on_as_many(setting: Setting, ta
 def walked(setting: Setting, collisions: dict[str, int], steps: dict[str, int], lost: str = "") -> dict[str, Claim]:
     """What is claimed where episodes of a kind have these collisions and steps and its seed's, and `lost` is lost."""
     count = setting.world().target_count * setting.budget.episodes_per_target
-    for kind in perturbed._kinds(setting):
-        for seen, jobs in kind.jobs.items():
-            key = f"{kind.agent}, {kind.trained_on}, {seen}"
-            for job in jobs:
-                (trial,) = job.trials
-                table = EpisodeTable(
-                    target=np.arange(setting.world().target_count).repeat(trial.episodes_per_target),
-                    start=np.zeros(count, np.int64),
-                    steps=np.full(count, steps.get(key, 10) + job.run.seed),
-                    collisions=np.full(count, collisions.get(key, 10) + job.run.seed),
-                    reached=np.full(count, key != lost),
-                    shortest_path_steps=np.full(count, 5),
-                    zone_steps=np.zeros((count, 3), np.int64),
-                    looped=np.zeros(count, bool),
-                )
-                path = trial_path(setting.out, job.run, trial)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                write_episodes(path, table, {})
+    for (seen, _, agent, trained_on), jobs in perturbed._planned(setting).items():
+        key = f"{agent}, {trained_on}, {seen}"
+        for job in jobs:
+            (trial,) = job.trials
+            table = EpisodeTable(
+                target=np.arange(setting.world().target_count).repeat(trial.episodes_per_target),
+                start=np.zeros(count, np.int64),
+                steps=np.full(count, steps.get(key, 10) + job.run.seed),
+                collisions=np.full(count, collisions.get(key, 10) + job.run.seed),
+                reached=np.full(count, key != lost),
+                shortest_path_steps=np.full(count, 5),
+                zone_steps=np.zeros((count, 3), np.int64),
+                looped=np.zeros(count, bool),
+            )
+            path = trial_path(setting.out, job.run, trial)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_episodes(path, table, {})
     return {claim.text: claim for claim in corrected(perturbed.section(setting)).claims}
 
 

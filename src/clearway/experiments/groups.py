@@ -52,8 +52,7 @@ class Group:
 
     def scores(self, out: Path, target_count: int) -> Scores:
         """The figures of the runs that are complete."""
-        found = [(run.seed, episodes_of(out, run, self.trial)) for run in self.runs]
-        return scores({seed: table for seed, table in found if table is not None}, target_count)
+        return scores_of(out, self.jobs(), target_count)
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,17 @@ def scores(tables: Mapping[int, EpisodeTable], target_count: int) -> Scores:
     """The figures of tables by seed, all over the same targets."""
     values = [by_target(table, target_count) for table in tables.values()]
     return Scores(tuple(tables), np.stack(values) if values else np.empty((0, target_count, len(METRIC_NAMES))))
+
+
+def scores_of(out: Path, jobs: Iterable[Job], target_count: int) -> Scores:
+    """The figures of the jobs that are complete, one a seed, each with one trial on the grid."""
+    found = {}
+    for job in jobs:
+        (trial,) = job.trials
+        assert isinstance(trial, Trial)
+        if (table := episodes_of(out, job.run, trial)) is not None:
+            found[job.run.seed] = table
+    return scores(found, target_count)
 
 
 def random_walk(world: World, trial: Trial) -> Scores:

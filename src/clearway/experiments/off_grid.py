@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -36,18 +36,8 @@ STAYING_NEAR = ("within 10 cm", "within 30 cm", "in the collision zone")
 """Of both kinds of figures six claims are made: five seeds of an agent decide no more after Holm's correction."""
 
 
-@dataclass(frozen=True)
-class LiveGroup:
-    """Agents that differ in their seed alone, and what they are asked.
-
-    Attributes:
-        learner, agent: names, the agent's that of its reward; of agents that need no training what stands for these.
-        jobs: one a seed.
-    """
-
-    learner: str
-    agent: str
-    jobs: tuple[Job, ...]
+Row = tuple[str, str]
+"""Learner and agent, by its reward; of agents that need no training what stands for these in a table."""
 
 
 def settings(setting: Setting) -> list[Condition]:
@@ -58,15 +48,15 @@ def settings(setting: Setting) -> list[Condition]:
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done; where scenes cannot be walked in, what is done already."""
-    return feasible(setting.out, _jobs(_groups(setting)), hindrance(setting.scenes))
+    return feasible(setting.out, chain(*_planned(setting).values()), hindrance(setting.scenes))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    groups, why = _groups(setting), hindrance(setting.scenes)
-    if why and not any_walked(setting.out, _jobs(groups)):
+    planned, why = _planned(setting), hindrance(setting.scenes)
+    if why and not any_walked(setting.out, chain(*planned.values())):
         return Section(name=NAME, title="Off the grid", text=f"Nothing was walked. {why}")
-    found = {(group.learner, group.agent): _scores(setting, group) for group in groups}
+    found = {row: _scores(setting, own) for row, own in planned.items()}
     return Section(
         name=NAME,
         title="Off the grid",
@@ -79,27 +69,22 @@ def section(setting: Setting) -> Section:
         ),
         tables=(_table(setting, found),),
         claims=further(_claims(setting, found)),
-        missing=unfinished(setting.out, _jobs(groups)),
+        missing=unfinished(setting.out, chain(*planned.values())),
     )
 
 
-def _jobs(groups: Sequence[LiveGroup]) -> list[Job]:
-    return [job for group in groups for job in group.jobs]
-
-
-def _groups(setting: Setting) -> list[LiveGroup]:
-    trained = [
-        LiveGroup(name, reward.name, _tried(setting, setting.runs(learner, reward), "agent"))
+def _planned(setting: Setting) -> dict[Row, tuple[Job, ...]]:
+    """Jobs, one a seed: of those that are trained, then of two that walk to the targets of the first of them."""
+    found = {
+        (name, reward.name): _tried(setting, setting.runs(learner, reward), "agent")
         for name, learner in setting.learners.items()
         for reward in REWARDS
-    ]
-    beside = setting.runs(next(iter(setting.learners.values())), REWARDS[0])  # theirs are the targets, not the agents
+    }
+    beside = setting.runs(next(iter(setting.learners.values())), REWARDS[0])
     frames = f"{frames_of(setting.world(), MOST_A_POSE):,} frames"
-    return [
-        *trained,
-        LiveGroup(NEAREST, frames, _tried(setting, beside, NEAREST)),
-        LiveGroup(WALKED, RANDOM_WALK, _tried(setting, beside, RANDOM_WALK)),
-    ]
+    found[NEAREST, frames] = _tried(setting, beside, NEAREST)
+    found[WALKED, RANDOM_WALK] = _tried(setting, beside, RANDOM_WALK)
+    return found
 
 
 def _tried(setting: Setting, runs: Sequence[PlannedRun], walker: WalkerName) -> tuple[Job, ...]:
@@ -107,10 +92,10 @@ def _tried(setting: Setting, runs: Sequence[PlannedRun], walker: WalkerName) -> 
     return tuple(Job(run, (LiveTrial(asked, episodes, STEP_LIMIT, run.seed, walker),)) for run in runs)
 
 
-def _scores(setting: Setting, group: LiveGroup) -> np.ndarray:
+def _scores(setting: Setting, jobs: Iterable[Job]) -> np.ndarray:
     """(R, K, M, J) of the runs that are complete."""
     found = []
-    for job in group.jobs:
+    for job in jobs:
         (trial,) = job.trials
         path = trial_path(setting.out, job.run, trial)
         if path.exists():
@@ -119,7 +104,7 @@ def _scores(setting: Setting, group: LiveGroup) -> np.ndarray:
     return np.stack(found) if found else np.empty((0, len(settings(setting)), count, len(FIGURES)))
 
 
-def _table(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> ReportTable:
+def _table(setting: Setting, found: Mapping[Row, np.ndarray]) -> ReportTable:
     """A row for each kind of agent under all settings together, then under each."""
     scenes = setting.world().target_scene.numpy()
     rows: list[tuple[Value, ...]] = []
@@ -138,7 +123,7 @@ def _table(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> Rep
     return ReportTable(NAME, "Off the grid", ("setting", "learner", "agent", "seeds", *headings), tuple(rows), notes)
 
 
-def _claims(setting: Setting, found: Mapping[tuple[str, str], np.ndarray]) -> Iterator[Claim]:
+def _claims(setting: Setting, found: Mapping[Row, np.ndarray]) -> Iterator[Claim]:
     """Two families for each learner: what agents touch or come near to, and how long they stay near."""
     for learner in setting.learners:
         own = {reward: scores.mean(1) for (name, reward), scores in found.items() if name == learner}

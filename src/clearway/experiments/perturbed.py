@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
-from clearway.experiments.groups import EXACT, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores
+from clearway.experiments.groups import EXACT, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores_of
 from clearway.experiments.hindrance import feasible, hindrance
-from clearway.experiments.job import any_walked, episodes_of, unfinished
-from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, Trial, WalkerName
+from clearway.experiments.job import any_walked, unfinished
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, WalkerName
 from clearway.experiments.section import Claim, ReportTable, Section, Value
 from clearway.experiments.setting import Setting
 from clearway.experiments.verdicts import further, judged_less, judged_more, with_failures
@@ -36,41 +37,25 @@ METRICS = ("success", "sc_4x", "spl", "collisions")
 HEADINGS = ("success", "within 4 x shortest", "SPL", "collisions")
 
 
-@dataclass(frozen=True)
-class Kind:
-    """Agents that differ in their seed alone.
-
-    Attributes:
-        learner, agent, trained_on: names; of those that are not trained what stands for these in a table.
-        jobs: by what is seen, one a seed.
-    """
-
-    learner: str
-    agent: str
-    trained_on: str | None
-    jobs: Mapping[str, tuple[Job, ...]]
-
-
-Found = Mapping[tuple[str, str, str | None], Mapping[str, Scores]]
-"""By learner, agent and what it was trained on, then by what is seen."""
+Row = tuple[str, str, str, str | None]
+"""What is seen on the way, learner, agent, and what it was trained on; of those that are not trained what stands for
+learner and agent in a table, and None."""
 
 
 def jobs(setting: Setting) -> list[Job]:
     """What must be done; where no other pictures of the scenes can be taken, what is done already."""
-    return feasible(setting.out, _jobs(_kinds(setting)), _why_nothing(setting))
+    return feasible(setting.out, chain(*_planned(setting).values()), _why_nothing(setting))
 
 
 def section(setting: Setting) -> Section:
     """What came of it."""
-    kinds, why = _kinds(setting), _why_nothing(setting)
-    others = [job for kind in kinds for seen, own in kind.jobs.items() if seen != OWN for job in own]
+    planned, why = _planned(setting), _why_nothing(setting)
+    others = [job for (seen, *_), own in planned.items() if seen != OWN for job in own]
     if why and not any_walked(setting.out, others):  # own pictures are other experiments', too
         return Section(name=NAME, title="Perturbed pictures", text=f"Nothing was walked. {why}")
-    found = {
-        (kind.learner, kind.agent, kind.trained_on): {seen: _scores(setting, own) for seen, own in kind.jobs.items()}
-        for kind in kinds
-    }
-    left_out = [name for name in setting.learners if name not in {kind.learner for kind in kinds}]
+    count = setting.world().target_count
+    found = {row: scores_of(setting.out, own, count) for row, own in planned.items()}
+    left_out = [name for name in setting.learners if name not in {row[1] for row in planned}]
     return Section(
         name=NAME,
         title="Perturbed pictures",
@@ -86,7 +71,7 @@ def section(setting: Setting) -> Section:
         ),
         tables=(_table(setting, found),),
         claims=further(_claims(setting, found)),
-        missing=unfinished(setting.out, _jobs(kinds)),
+        missing=unfinished(setting.out, chain(*planned.values())),
     )
 
 
@@ -96,70 +81,45 @@ def _why_nothing(setting: Setting) -> str | None:
     return hindrance(setting.scenes, pictured=True)
 
 
-def _jobs(kinds: list[Kind]) -> list[Job]:
-    return [job for kind in kinds for own in kind.jobs.values() for job in own]
-
-
 def _seen(setting: Setting) -> Mapping[str, PerturbedPictures | None]:
     """What is seen; in a smoke run, which compares the first pair of rewards alone, the ends."""
     return SEEN if setting.budget.whole_grid else {seen: SEEN[seen] for seen in (OWN, ALL)}
 
 
-def _kinds(setting: Setting) -> list[Kind]:
-    """Those that are trained, then who goes by the nearest picture, beside the first of them."""
-    found, seen = list[Kind](), _seen(setting)
+def _planned(setting: Setting) -> dict[Row, tuple[Job, ...]]:
+    """Jobs, one a seed: by what is seen those that are trained, then the nearest picture, beside the first of them."""
+    trained = dict[tuple[str, str, str], tuple[PlannedRun, ...]]()
     for name, learner in setting.learners.items():
         if not learner.sees_takes:
             continue
         for reward in REWARDS if setting.budget.whole_grid else REWARD_PAIRS[0]:
             runs = setting.runs(learner, reward)
-            taught = tuple(replace(run, perturbed=EVERYTHING) for run in runs)
-            found.append(Kind(name, reward.name, TOO, _tried(setting, taught, seen)))
+            trained[name, reward.name, TOO] = tuple(replace(run, perturbed=EVERYTHING) for run in runs)
             if reward == COLLISION_AWARE:
-                found.append(Kind(name, reward.name, ALONE, _tried(setting, runs, seen)))
-    if not found:
-        return []
+                trained[name, reward.name, ALONE] = runs
+    found = dict[Row, tuple[Job, ...]]()
     frames = f"{frames_of(setting.world(), MOST_A_POSE):,} frames"
-    beside = tuple(job.run for job in found[0].jobs[OWN])
-    others = {name: pictures for name, pictures in seen.items() if pictures is not None}
-    return [*found, Kind(NEAREST, frames, None, _tried(setting, beside, others, NEAREST))]
+    for seen, pictures in _seen(setting).items() if trained else ():
+        for kind, runs in trained.items():
+            found[seen, *kind] = _tried(setting, runs, pictures)
+        if pictures is not None:
+            found[seen, NEAREST, frames, None] = _tried(setting, next(iter(trained.values())), pictures, NEAREST)
+    return found
 
 
 def _tried(
-    setting: Setting,
-    runs: tuple[PlannedRun, ...],
-    seen: Mapping[str, PerturbedPictures | None],
-    walker: WalkerName = "agent",
-) -> dict[str, tuple[Job, ...]]:
-    """Jobs by what is seen, by each run's seed."""
+    setting: Setting, runs: Sequence[PlannedRun], pictures: PerturbedPictures | None, walker: WalkerName = "agent"
+) -> tuple[Job, ...]:
+    """Each run tried by its own seed."""
     trial = setting.trial(step_limit=STEP_LIMIT)
-
-    def job(run: PlannedRun, pictures: PerturbedPictures | None) -> Job:
-        return Job(run, (replace(trial, seed=run.seed, perturbed=pictures, walker=walker),))
-
-    return {name: tuple(job(run, pictures) for run in runs) for name, pictures in seen.items()}
+    return tuple(Job(run, (replace(trial, seed=run.seed, perturbed=pictures, walker=walker),)) for run in runs)
 
 
-def _scores(setting: Setting, jobs: tuple[Job, ...]) -> Scores:
-    """The figures of the jobs that are done."""
-    found = {}
-    for job in jobs:
-        (trial,) = job.trials
-        assert isinstance(trial, Trial)
-        if (table := episodes_of(setting.out, job.run, trial)) is not None:
-            found[job.run.seed] = table
-    return scores(found, setting.world().target_count)
-
-
-def _table(setting: Setting, found: Found) -> ReportTable:
+def _table(setting: Setting, found: Mapping[Row, Scores]) -> ReportTable:
     """A row for what is seen and each kind of agent."""
     world = setting.world()
     scenes = world.target_scene.numpy()
-    rows: list[tuple[Value, ...]] = []
-    for seen in _seen(setting):
-        for kind, own in found.items():
-            if seen in own:
-                rows.append((seen, *kind, len(own[seen]), *own[seen].estimates(METRICS, scenes)))
+    rows: list[tuple[Value, ...]] = [(*row, len(own), *own.estimates(METRICS, scenes)) for row, own in found.items()]
     walked = random_walk(world, setting.trial(step_limit=STEP_LIMIT))
     means = (float(np.mean(walked.in_scenes(metric, scenes))) for metric in METRICS)
     for how, agent, figures in ((WALKED, RANDOM_WALK, means), (EXACT, "shortest path", (1.0, 1.0, 1.0, 0.0))):
@@ -170,19 +130,22 @@ def _table(setting: Setting, found: Found) -> ReportTable:
     return ReportTable(NAME, "Perturbed pictures", (*left, *headings), tuple(rows), notes)
 
 
-def _claims(setting: Setting, found: Found) -> Iterator[Claim]:
+def _claims(setting: Setting, found: Mapping[Row, Scores]) -> Iterator[Claim]:
     """Of rewards where everything is perturbed, and of what agents are trained on; six for each learner."""
-    for learner in dict.fromkeys(name for name, _, trained_on in found if trained_on):
+    for learner in dict.fromkeys(name for _, name, _, trained_on in found if trained_on):
         for first, second in REWARD_PAIRS if setting.budget.whole_grid else REWARD_PAIRS[:1]:
             text = f"{learner}: {ALL}, {first.name}, fewer collisions than {second.name}"
-            pair = (found[learner, reward.name, TOO][ALL] for reward in (first, second))
+            pair = (found[ALL, learner, reward.name, TOO] for reward in (first, second))
             yield _claim(setting, text, "collisions", *pair)
-        too, alone = (found[learner, COLLISION_AWARE.name, trained_on] for trained_on in (TOO, ALONE))
+        (too, alone), (too_on_own, alone_on_own) = (
+            [found[seen, learner, COLLISION_AWARE.name, trained_on] for trained_on in (TOO, ALONE)]
+            for seen in (ALL, OWN)
+        )
         for metric, what in (("collisions", "fewer collisions"), ("spl", "higher SPL")):
             text = f"{learner}: {ALL}, {COLLISION_AWARE.name}, {what} if trained on {TOO} than on {ALONE}"
-            yield _claim(setting, text, metric, too[ALL], alone[ALL])
+            yield _claim(setting, text, metric, too, alone)
         text = f"{learner}: {OWN}, {COLLISION_AWARE.name}, fewer collisions if trained on {ALONE} than on {TOO}"
-        yield _claim(setting, text, "collisions", alone[OWN], too[OWN])
+        yield _claim(setting, text, "collisions", alone_on_own, too_on_own)
 
 
 def _claim(setting: Setting, text: str, metric: str, first: Scores, second: Scores) -> Claim:
