@@ -1,23 +1,24 @@
 """How long trials will take is told before they begin."""
 
 import time
-from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from clearway.errors import RenderError
 from clearway.experiments import expected_time, expected_walks
 from clearway.experiments.expected_time import told_time
-from clearway.experiments.expected_walks import picture_time, shortest_steps, walking_time
-from clearway.experiments.job import request_of, trial_path
-from clearway.experiments.plan import RANDOM_WALK, Job, LiveTrial, PerturbedPictures
+from clearway.experiments.expected_walks import shortest_steps, walking_time
+from clearway.experiments.job import request_of
+from clearway.experiments.plan import RANDOM_WALK, Job, LiveTrial
 from clearway.experiments.reproduce import planned
 from clearway.experiments.setting import Setting
 from clearway.live.conditions import Condition, Perturbations
 from clearway.live.live_room import LiveRoom
-from clearway.reward import COLLISION_AWARE, SHORTEST
+from clearway.reward import COLLISION_AWARE
 from helpers.live_setting import live_setting
 from helpers.small_live import walkable_live
 from helpers.small_setting import small_setting
@@ -80,21 +81,21 @@ def test_walks_off_the_grid_are_tried_in_the_room_by_who_needs_pictures_and_who_
         return table
 
     monkeypatch.setattr(expected_walks, "run_live_episodes", counted)
+    ticks = count(step=10)  # so many seconds from one look at the clock to the next
+    monkeypatch.setattr(expected_walks.time, "perf_counter", lambda: float(next(ticks)))
     runs = in_room.runs(in_room.learners["paper"], COLLISION_AWARE)
     trials = (LiveTrial(SETTINGS, 3, 40), LiveTrial(SETTINGS, 3, 40, walker=RANDOM_WALK))
-    jobs = [Job(run, trials) for run in runs]
-    began = time.perf_counter()
-    expected = expected_walks.expected_walks(in_room.out, jobs, 1)
-    taken = time.perf_counter() - began
-    assert [(sees, wanted) for sees, wanted, _ in seen] == [(("rgb",), SETTINGS[-1].perturbations)] * 2 + [
-        ((), SETTINGS[-1].perturbations)
-    ] * 2
-    assert 2 <= seen[1][2] <= 2 * expected_walks.TRIED_LIVE_STEPS
+    bounds = expected_walks.time_of_walks([(run, trial) for run in runs for trial in trials], 1)
+    monkeypatch.undo()
+    changed = SETTINGS[-1].perturbations
+    assert [(sees, wanted) for sees, wanted, _ in seen] == [(("rgb",), changed)] * 2 + [((), changed)] * 2
+    assert all(2 <= steps <= 2 * expected_walks.TRIED_LIVE_STEPS for *_, steps in seen)
+    seconds = [10 / seen[number][2] for number in (1, 3)]  # a step of who needs pictures, and of who does not
+    each = 2 * 2 * 3  # seeds, settings, episodes to each target
     shortest = sum(shortest_steps(in_room.files, in_room.targets))
-    lost = 2 * 2 * 3 * 2 * 40  # two targets, settings, three episodes, two seeds
-    assert expected.lost_s / expected.straight_s == pytest.approx(lost / (2 * 3 * 2 * shortest))
-    assert 0 < expected.lost_s < lost * 2 * taken
-    assert not expected.pictures and not expected.others and not (in_room.out / "runs").exists()
+    assert bounds.straight_s == pytest.approx(sum(seconds) * each * shortest)
+    assert bounds.lost_s == pytest.approx(sum(seconds) * each * 2 * 40)  # two targets
+    assert not (in_room.out / "runs").exists()
 
 
 def test_episodes_off_the_grid_are_counted_by_settings(in_room: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,45 +108,18 @@ def test_episodes_off_the_grid_are_counted_by_settings(in_room: Setting, monkeyp
     assert told.endswith("; evaluation 48 s if all go straight, 5 min if all get lost")
 
 
-def test_each_perturbed_picture_is_counted_once(in_room: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the trainings of two seeds, and of two agents' trials with the same seeds."""
-    monkeypatch.setattr(expected_walks, "walking_time", lambda run, trial, threads: 0.0)
-    monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: 1e6)
-    tried = []
-    monkeypatch.setattr(expected_walks, "picture_time", lambda run, pictures, threads: tried.append(run) or 0.25)
-    seen = PerturbedPictures(Perturbations(light=0.5), 3)
-    learner = in_room.learners["paper"]
-    runs = [replace(run, perturbed=seen) for run in in_room.runs(learner, COLLISION_AWARE)]
-    runs += in_room.runs(learner, SHORTEST)
-    jobs = [Job(run, (replace(in_room.trial(), seed=run.seed, perturbed=seen),)) for run in runs]
-    poses = in_room.scenes[0].state_count
-    expected = expected_walks.expected_walks(in_room.out, jobs, 1)
-    assert (expected.pictures, expected.pictures_s) == (4 * 3 * poses, 3 * poses) and len(tried) == 1
-    told = told_time(in_room.out, jobs, jobs, 2, 1)
-    assert (
-        f"; {12 * poses:,} perturbed pictures {expected_time._duration(1.5 * poses)}, less where they are kept" in told
-    )
-    for job in jobs[1:]:
-        path = trial_path(in_room.out, job.run, job.trials[0])
-        path.parent.mkdir(parents=True)
-        path.touch()
-    left = expected_walks.expected_walks(in_room.out, jobs[2:], 1)
-    assert not left.pictures and not left.pictures_s
-    assert expected_walks.expected_walks(in_room.out, jobs[:1], 1).pictures == 2 * 3 * poses
-    monkeypatch.setattr(expected_walks, "frames_left", lambda out, run: 0)  # it has been trained
-    assert expected_walks.expected_walks(in_room.out, jobs[:1], 1).pictures == 3 * poses
-
-
-def test_a_perturbed_picture_is_tried_from_other_poses_than_the_target(
+def test_what_cannot_be_tried_here_is_told_and_hinders_nothing(
     in_room: Setting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    encoded, encode = [], expected_walks.features_of
-    monkeypatch.setattr(
-        expected_walks, "features_of", lambda pictures, encoder: encoded.append(pictures) or encode(pictures, encoder)
-    )
+    """As where there are no graphics: who needs no pictures trains all the same."""
+
+    def refuses(*_: object) -> None:
+        raise RenderError("no pictures can be rendered here. Install EGL")
+
+    monkeypatch.setattr(expected_walks, "stages", refuses)
+    monkeypatch.setattr(expected_time, "frames_per_second", lambda run, threads: 1e6)
     (run, _) = in_room.runs(in_room.learners["paper"], COLLISION_AWARE)
-    began = time.perf_counter()
-    found = picture_time(run, PerturbedPictures(Perturbations(camera_pitch_jitter=3.0), 2), 1)
-    assert 0 < found * expected_walks.TRIED_PICTURES < time.perf_counter() - began
-    assert [len(pictures) for pictures in encoded] == [1, expected_walks.TRIED_PICTURES]
-    assert len(np.unique(encoded[1].reshape(len(encoded[1]), -1), axis=0)) > expected_walks.TRIED_PICTURES // 2
+    job = Job(run, (LiveTrial(SETTINGS, 4, 40),))
+    told = told_time(in_room.out, [job], [job], 1, 1)
+    assert told.endswith("; not all can be tried here: no pictures can be rendered here. Install EGL")
+    assert told.startswith("1 runs, 1 to be trained, 1 at a time: ")

@@ -20,6 +20,7 @@ from clearway.experiments.correction import corrected
 from clearway.experiments.job import do, is_done, trial_path, unfinished
 from clearway.experiments.live_trial import COLUMNS, FIGURES, nearest_poses, read_live
 from clearway.experiments.plan import Job, LiveTrial
+from clearway.experiments.reproduce import ReproduceRequest, _gathered
 from clearway.experiments.section import Claim
 from clearway.experiments.setting import Setting
 from clearway.learn.load import load_network
@@ -108,6 +109,10 @@ def test_who_needs_no_training_walks_beside_a_run_s_agent(
     success = figures[0, :, FIGURES.index("success")]
     np.testing.assert_array_equal(success, on_grid.reached.reshape(2, 2).mean(1))  # nothing is changed in the room
     assert json.loads(paths[0].read_text())["about"]["walker"] == walker
+    at_target = scene_zones(setting.scenes[0])[np.array(setting.targets[0])][on_grid.target] == Zone.COLLISION
+    in_zone = on_grid.zone_steps[:, Zone.COLLISION] + (on_grid.reached & at_target)  # a target is no zone of the grid
+    share = in_zone.reshape(2, 2).sum(1) / on_grid.steps.reshape(2, 2).sum(1)
+    np.testing.assert_allclose(figures[0, :, FIGURES.index("in the collision zone")], share, atol=1e-6)
 
 
 def test_trials_of_trained_agents_keep_their_names() -> None:
@@ -185,11 +190,15 @@ def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> Non
     there, elsewhere = (off_grid.section(own) for own in (setting, gone))
     assert off_grid.jobs(gone) == off_grid.jobs(setting)  # whose runs the report names
     assert elsewhere.tables == there.tables and elsewhere.claims == there.claims and elsewhere.tables
-    assert not elsewhere.missing and "No more can be walked here: scene walkable has no record" in elsewhere.text
+    assert not elsewhere.missing and elsewhere.text == there.text
     job, *others = off_grid.jobs(setting)
     trial_path(setting.out, job.run, job.trials[0]).unlink()
     assert off_grid.jobs(gone) == others
-    assert off_grid.section(gone).missing == (job.run.name,)
+    lacking = off_grid.section(gone)
+    assert lacking.missing == (job.run.name,)
+    assert "No more can be walked here: scene walkable has no record" in lacking.text
+    (told,) = _gathered(ReproduceRequest(["off-grid"], setting.out, "smoke"), gone).sections
+    assert told.missing == (job.run.name,)  # though it is no job here
 
 
 def test_fewer_contacts_of_five_seeds_are_told(setting: Setting) -> None:

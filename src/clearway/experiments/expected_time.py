@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from clearway.experiments.expected_walks import expected_walks
-from clearway.experiments.job import frames_left, request_of
+from clearway.errors import ClearwayError
+from clearway.experiments.expected_pictures import asked, time_of_pictures
+from clearway.experiments.expected_walks import of_others, time_of_walks
+from clearway.experiments.job import frames_left, request_of, trial_path
 from clearway.experiments.plan import Job, PlannedRun
 from clearway.learn.train import RunRequest
 from clearway.torch_threads import torch_threads
@@ -63,15 +65,19 @@ def _told_walking(out: Path, left: Sequence[Job], workers: int, threads: int) ->
         workers: jobs side by side.
         threads: of each.
     """
-    beside, expected = min(workers, len(left)), expected_walks(out, left, threads)
+    beside = min(workers, len(left))
+    missing = [(job.run, trial) for job in left for trial in job.trials if not trial_path(out, job.run, trial).exists()]
     told = ""
-    if expected.straight_s is not None and expected.lost_s is not None:
-        least, most = (_duration(seconds / beside) for seconds in (expected.straight_s, expected.lost_s))
-        told = f"; evaluation {least} if all go straight, {most} if all get lost"
-    if expected.pictures:
-        taken = _duration(expected.pictures_s / beside)
-        told += f"; {expected.pictures:,} perturbed pictures {taken}, less where they are kept"
-    return told + (f"; {expected.others:,} episodes of other packages' agents" if expected.others else "")
+    try:
+        if (bounds := time_of_walks(missing, threads)) is not None:
+            least, most = (_duration(seconds / beside) for seconds in (bounds.straight_s, bounds.lost_s))
+            told = f"; evaluation {least} if all go straight, {most} if all get lost"
+        if wanted := asked(out, left):
+            taken = _duration(time_of_pictures(wanted, threads) / beside)
+            told += f"; {sum(map(len, wanted)):,} perturbed pictures {taken}, less where they are kept"
+    except ClearwayError as error:  # runs that need no pictures are made all the same, or others make them
+        told += f"; not all can be tried here: {error}"
+    return told + (f"; {others:,} episodes of other packages' agents" if (others := of_others(missing)) else "")
 
 
 def frames_per_second(run: PlannedRun, threads: int) -> float:

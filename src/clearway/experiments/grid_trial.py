@@ -12,7 +12,7 @@ from clearway.agents.on_learnt_map import nearest_picture
 from clearway.evaluation.episode_files import write_episodes
 from clearway.evaluation.episodes import EpisodeTable, joined, run_episodes
 from clearway.evaluation.takes import Takes
-from clearway.experiments.plan import NEAREST, PlannedRun, Trial, by_name, told_of
+from clearway.experiments.plan import NEAREST, PlannedRun, Trial, targets_by_scene, told_of
 from clearway.learn.checkpoint import newest_checkpoint
 from clearway.learn.load import load_agent, load_network
 from clearway.learn.run_folder import RunFolder
@@ -33,13 +33,13 @@ def walk_on_grid(path: Path, folder: RunFolder, scenes: Sequence[Scene], run: Pl
     Raises:
         ClearwayError: there is no such agent, or perturbed pictures cannot be taken.
     """
-    targets = by_name(run.scenes, trial.targets)
+    targets = targets_by_scene(run.scenes, trial.targets)
     if trial.perturbed is None:
         world = make_world(scenes, targets)
         table = _walked(world, load_agent(folder.path, _kept(folder, run, trial)).on_poses(world), scenes, trial)
     else:
         table = _on_perturbed(folder, scenes, targets, run, trial)
-    write_episodes(path, table, {**told_of(run, trial.targets, trial), "halfway": trial.halfway})
+    write_episodes(path, table, {**told_of(run, trial), "halfway": trial.halfway})
 
 
 def _kept(folder: RunFolder, run: PlannedRun, trial: Trial) -> Path | None:

@@ -22,9 +22,9 @@ from clearway.world.world import World
 PAIR: tuple[Reward, ...] = (SHORTEST, COLLISION_AWARE)
 """The two rewards that the paper compares."""
 REWARDS: tuple[Reward, ...] = (SHORTEST, BUMP, COLLISION_AWARE, CLEARANCE)
-"""These and two rivals, where pictures are others than in training."""
+"""`PAIR` and two rivals, compared where agents see other pictures than in training: off the grid, and perturbed."""
 REWARD_PAIRS = ((COLLISION_AWARE, SHORTEST), (COLLISION_AWARE, BUMP), (CLEARANCE, SHORTEST))
-"""Of which claims are made there."""
+"""Of which it is claimed there that the first collides less than the second."""
 EXACT = "exact"
 WALKED = "walked"
 """What tables call the learner of figures that are computed, and of those of an agent that learns nothing."""

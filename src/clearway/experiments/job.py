@@ -17,7 +17,7 @@ from clearway.evaluation.episode_files import read_episodes
 from clearway.evaluation.episodes import EpisodeTable
 from clearway.experiments.grid_trial import walk_on_grid
 from clearway.experiments.live_trial import walk_live
-from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial
+from clearway.experiments.plan import Job, LiveTrial, PlannedRun, Trial, targets_by_scene
 from clearway.learn.checkpoint import checkpoints, frames_in
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.train import RunRequest, set_threads, train
@@ -105,7 +105,7 @@ def request_of(run: PlannedRun, scenes: Sequence[Scene] | None = None) -> RunReq
     """
     request = RunRequest(
         scenes=_scenes(run) if scenes is None else scenes,
-        targets={scene.name: targets for scene, targets in zip(run.scenes, run.targets, strict=True)},
+        targets=targets_by_scene(run.scenes, run.targets),
         learner=run.learner,
         reward=run.reward,
         seed=run.seed,

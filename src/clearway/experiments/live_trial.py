@@ -15,7 +15,7 @@ import numpy as np
 from clearway.agents.agent import Agent
 from clearway.agents.by_pose import RandomWalk
 from clearway.agents.on_learnt_map import nearest_picture
-from clearway.experiments.plan import NEAREST, RANDOM_WALK, LiveTrial, PlannedRun, by_name, told_of
+from clearway.experiments.plan import NEAREST, RANDOM_WALK, LiveTrial, PlannedRun, targets_by_scene, told_of
 from clearway.files import read_kept, written_whole
 from clearway.learn.load import load_network
 from clearway.learn.network_agent import NetworkAgent
@@ -45,7 +45,7 @@ def walk_live(path: Path, folder: Path, scenes: Sequence[Scene], run: PlannedRun
     Raises:
         ClearwayError: the agent has no network, a scene is none of our rooms, or its encoder cannot be had again.
     """
-    targets = by_name(run.scenes, run.targets)
+    targets = targets_by_scene(run.scenes, run.targets)
     protocol = LiveProtocol(trial.episodes_per_target, trial.step_limit, trial.seed, "sampled")
     zones = [scene_zones(scene, run.zone_level) for scene in scenes]
     found: dict[str, list[dict[str, list]]] = {}
@@ -59,7 +59,7 @@ def walk_live(path: Path, folder: Path, scenes: Sequence[Scene], run: PlannedRun
             found[setting.label] = [
                 _columns(table, place.live.scene, own) for table, place, own in zip(tables, places, zones, strict=True)
             ]
-    about = told_of(run, run.targets, trial)
+    about = told_of(run, trial)
     content = {"format_version": FORMAT_VERSION, "about": about, "settings": found}
     with written_whole(path) as part:
         part.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")

@@ -57,6 +57,7 @@ def section(setting: Setting) -> Section:
     if why and not any_walked(setting.out, chain(*planned.values())):
         return Section(name=NAME, title="Off the grid", text=f"Nothing was walked. {why}")
     found = {row: _scores(setting, own) for row, own in planned.items()}
+    missing = unfinished(setting.out, chain(*planned.values()))
     return Section(
         name=NAME,
         title="Off the grid",
@@ -65,11 +66,11 @@ def section(setting: Setting) -> Section:
             f"episodes a target, {STEP_LIMIT} steps at most, under each setting of a sweep at full strength. Agents of "
             "one seed have the same starts and chances. Claims are of means over the settings. Who goes by the nearest "
             "picture knows those of the grid as it was built, and where the actions of random walkers led there."
-            + (f" No more can be walked here: {why}" if why else "")
+            + (f" No more can be walked here: {why}" if why and missing else "")
         ),
         tables=(_table(setting, found),),
         claims=further(_claims(setting, found)),
-        missing=unfinished(setting.out, chain(*planned.values())),
+        missing=missing,
     )
 
 
@@ -126,7 +127,7 @@ def _table(setting: Setting, found: Mapping[Row, np.ndarray]) -> ReportTable:
 def _claims(setting: Setting, found: Mapping[Row, np.ndarray]) -> Iterator[Claim]:
     """Two families for each learner: what agents touch or come near to, and how long they stay near."""
     for learner in setting.learners:
-        own = {reward: scores.mean(1) for (name, reward), scores in found.items() if name == learner}
+        own = {agent: scores.mean(1) for (name, agent), scores in found.items() if name == learner}
         for figure in TOUCHING:
             for first, second in REWARD_PAIRS:
                 yield _claim(setting, f"{learner}, touching", figure, first.name, second.name, own)

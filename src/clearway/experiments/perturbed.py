@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from clearway.agents.on_learnt_map import MOST_A_POSE, frames_of
-from clearway.experiments.groups import EXACT, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores_of
+from clearway.experiments.groups import EXACT, PAIR, REWARD_PAIRS, REWARDS, WALKED, Scores, random_walk, scores_of
 from clearway.experiments.hindrance import feasible, hindrance
 from clearway.experiments.job import any_walked, unfinished
 from clearway.experiments.plan import NEAREST, RANDOM_WALK, Job, PerturbedPictures, PlannedRun, WalkerName
@@ -55,6 +55,7 @@ def section(setting: Setting) -> Section:
         return Section(name=NAME, title="Perturbed pictures", text=f"Nothing was walked. {why}")
     count = setting.world().target_count
     found = {row: scores_of(setting.out, own, count) for row, own in planned.items()}
+    missing = unfinished(setting.out, chain(*planned.values()))
     left_out = [name for name in setting.learners if name not in {row[1] for row in planned}]
     return Section(
         name=NAME,
@@ -67,11 +68,11 @@ def section(setting: Setting) -> Section:
             "Targets are seen in their own. Moves stay those of the grid, wherever a picture shows the furniture. "
             "Agents of one seed have the same starts, chances and pictures."
             + (f" {', '.join(left_out)}: learns from no perturbed pictures, and is left out." if left_out else "")
-            + (f" No more can be walked here: {why}" if why else "")
+            + (f" No more can be walked here: {why}" if why and missing else "")
         ),
         tables=(_table(setting, found),),
         claims=further(_claims(setting, found)),
-        missing=unfinished(setting.out, chain(*planned.values())),
+        missing=missing,
     )
 
 
@@ -92,7 +93,7 @@ def _planned(setting: Setting) -> dict[Row, tuple[Job, ...]]:
     for name, learner in setting.learners.items():
         if not learner.sees_takes:
             continue
-        for reward in REWARDS if setting.budget.whole_grid else REWARD_PAIRS[0]:
+        for reward in REWARDS if setting.budget.whole_grid else PAIR:
             runs = setting.runs(learner, reward)
             trained[name, reward.name, TOO] = tuple(replace(run, perturbed=EVERYTHING) for run in runs)
             if reward == COLLISION_AWARE:

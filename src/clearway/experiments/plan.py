@@ -137,6 +137,16 @@ class Trial:
         object.__setattr__(self, "targets", _plain(self.targets))
         assert self.walker == "agent" or (self.walker == NEAREST and self.perturbed is not None), self.walker
 
+    def targets_of(self, run: PlannedRun) -> TargetSets:
+        """Its own, whatever the run was trained on."""
+        del run
+        return self.targets
+
+    @property
+    def episodes(self) -> int:
+        """To each target."""
+        return self.episodes_per_target
+
     @cached_property
     def name(self) -> str:
         """Name of its file in the run's folder."""
@@ -165,6 +175,15 @@ class LiveTrial:
     seed: int = 0
     walker: WalkerName = "agent"
 
+    def targets_of(self, run: PlannedRun) -> TargetSets:
+        """The run's."""
+        return run.targets
+
+    @property
+    def episodes(self) -> int:
+        """To each target, under all settings."""
+        return self.episodes_per_target * len(self.settings)
+
     @cached_property
     def name(self) -> str:
         """Name of its file in the run's folder."""
@@ -182,14 +201,14 @@ class Job:
     trials: tuple[Trial | LiveTrial, ...]
 
 
-def by_name(scenes: Iterable[SceneFile], targets: TargetSets) -> dict[str, list[int]]:
+def targets_by_scene(scenes: Iterable[SceneFile], targets: TargetSets) -> dict[str, list[int]]:
     """Targets by the names of their scenes."""
     return {scene.name: list(own) for scene, own in zip(scenes, targets, strict=True)}
 
 
-def told_of(run: PlannedRun, targets: TargetSets, trial: Trial | LiveTrial) -> dict[str, object]:
+def told_of(run: PlannedRun, trial: Trial | LiveTrial) -> dict[str, object]:
     """What a file of a trial says it is about."""
-    about = {"run": run.name, "targets": by_name(run.scenes, targets), "seed": trial.seed}
+    about = {"run": run.name, "targets": targets_by_scene(run.scenes, trial.targets_of(run)), "seed": trial.seed}
     if trial.walker != "agent":
         about["walker"] = trial.walker
     if isinstance(trial, Trial) and trial.perturbed is not None:
