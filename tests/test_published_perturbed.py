@@ -2,7 +2,9 @@
 
 import json
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from clearway.experiments.reproduce import gather
 from helpers.published import (
     DOCS,
     EVIDENCE,
+    RESULTS,
     assert_judged,
     assert_shown,
     assert_written,
@@ -30,7 +33,7 @@ PAGE = EVIDENCE.partition("\n## Perturbed pictures\n")[2].partition("\n## ")[0]
 ASKED, EARLIER = (section_of(PAGE, title) for title in ("Ten seeds", "Seeds 0 to 4"))
 KINDS = ("shortest", "bump", "collision-aware", "clearance")
 SEEN = {"none": OWN, "geometry": "camera and furniture perturbed", "all": ALL}
-LEARNING = (DOCS / "learning.md").read_text(encoding="utf-8")
+LEARNING, SEEING = ((DOCS / name).read_text(encoding="utf-8") for name in ("learning.md", "seeing.md"))
 FIGURES = ("success_4x", "spl", "collisions")
 EARLIER_ROWS = [
     *(("reactive", 3, kind, seen) for kind in ("own", "perturbed") for seen in ("none", "geometry", "all")),
@@ -65,8 +68,59 @@ def test_perturbed_pictures_are_what_their_record_comes_to(tmp_path: Path) -> No
         assert seen == arm[1]
         assert_written(spl.removesuffix(" %"), 100 * means["collision-aware", *arm]["SPL"], seen)
         assert_written(collisions, means["collision-aware", *arm]["collisions"], seen)
+    check_sentences(means, recorded)
+    check_times(tmp_path / "runs")
     seconds = seconds_of_runs(tmp_path / "runs")
     assert len(seconds) == 50 and f"{min(seconds):.0f} to {max(seconds):.0f} s of training a run" in ASKED
+
+
+def check_sentences(means: Mapping[tuple[str, str, str], Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]) -> None:
+    """What pages say in words has the figures of the table."""
+    collisions = {key: f"{row['collisions']:.3f}" for key, row in means.items() if row["collisions"] is not None}
+    aware, alone = (collisions["collision-aware", own, ALL] for own in (TOO, ALONE))
+    on_own = [collisions["collision-aware", own, OWN] for own in (TOO, ALONE)]
+    bump, shortest = (collisions[agent, TOO, ALL] for agent in ("bump", "shortest"))
+    (nearest,) = [row for row in rows if row["learner"] == NEAREST and row["seen on the way"] == ALL]
+    close = f"{nearest['collisions']:.3f}"
+    told = {
+        ASKED: (
+            f"`collision-aware` has fewer collisions ({aware}, not {alone})",
+            f"on own pictures it has more then ({on_own[0]}, not {on_own[1]})",
+            f"it has more collisions than `bump` ({bump}); whether fewer than `shortest` is undecided",
+            f"where {str(nearest['agent']).removesuffix(' frames')} actions of random walkers led",
+        ),
+        RESULTS: (
+            f"more collisions than `bump` ({aware} against {bump};",
+            f"Not trained on such pictures it has {alone},",
+        ),
+        LEARNING: (
+            f"`bump` has fewer collisions ({bump}) than `collision-aware`; whether `shortest` ({shortest}) has more is",
+            f"The nearest-picture agent has {close} (nothing was asked of it)",
+        ),
+        SEEING: (
+            "SPL {:.0f} % then, not {:.0f} %".format(
+                *(100 * means["collision-aware", own, ALL]["SPL"] for own in (TOO, ALONE))
+            ),
+            f"and {float(aware):.2f} collisions, not {float(alone):.2f} ",
+            f"has {100 * nearest['SPL']:.0f} % and {nearest['collisions']:.2f}.",
+        ),
+    }
+    for page, sentences in told.items():
+        for sentence in sentences:
+            assert sentence in page
+    trained = [row["collisions"] for row in rows if row["trained on"] and row["seen on the way"] == ALL]
+    ends = (nearest["collisions"] / each(trained) for each in (max, min))
+    assert "it has {:.2f} to {:.2f} times the trained agents' collisions".format(*ends) in ASKED
+
+
+def check_times(folder: Path) -> None:
+    """How much longer training on perturbed pictures takes."""
+    seconds: dict[bool, list[float]] = {True: [], False: []}
+    for run in folder.glob("runs/*/run.json"):
+        took = json.loads((run.parent / "metrics.jsonl").read_text(encoding="utf-8").splitlines()[-1])["seconds"]
+        seconds[json.loads(run.read_text(encoding="utf-8"))["takes"] is not None].append(took)
+    assert {f"{took:.0f}" for took in seconds[False]} == {"8"} and "(8 on own pictures alone)" in ASKED
+    assert f"takes {np.mean(seconds[True]) / np.mean(seconds[False]):.1f} times as long" in LEARNING
 
 
 def test_earlier_agents_on_perturbed_pictures_are_what_their_records_come_to() -> None:

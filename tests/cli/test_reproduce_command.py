@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from clearway.choices import BudgetName, LearnerName
-from clearway.errors import SceneError
+from clearway.errors import RenderError, SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
@@ -133,6 +133,7 @@ def test_a_report_says_what_made_its_runs_not_what_wrote_it(clearway, first, out
     assert "threads 7" in facts["hardware"] and "threads 8" in facts["hardware"]
     assert facts["hardware"].count("(1 run)") == 2
     assert "(2 runs)" in facts["versions"] and "torch" in facts["versions"]
+    assert facts["on the grid"].endswith("steps where a section does not say otherwise")
     assert facts["first and last run begun"].count("+00:00") == 2
     assert "say so" not in facts["first and last run begun"]
     first_run = sorted((out / "runs").iterdir())[0] / "run.json"
@@ -212,6 +213,16 @@ def test_a_seed_out_of_range_is_refused_before_anything_is_trained(clearway, dum
     answer = clearway("reproduce", "table1", *words, "--first-seed", 2**31 - 2, "--seeds", 3)
     assert answer.refusal(f"seed is {2**31}", f"0 to {2**31 - 1}")
     assert not (tmp_path / "out" / "runs").exists()
+
+
+@pytest.mark.parametrize("words", [("reproduce", "table1", "--out"), ("report",)])
+def test_graphics_that_are_not_there_are_told_in_one_line(clearway, words: tuple, tmp_path: Path, monkeypatch) -> None:
+    def refuses() -> None:
+        raise RenderError("no pictures can be rendered here with MUJOCO_GL=nonsense. Unset MUJOCO_GL")
+
+    monkeypatch.setattr("clearway.rooms.build.check_mujoco", refuses)
+    assert clearway(*words, tmp_path / "out").refusal("MUJOCO_GL=nonsense")
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_learners_of_the_command_line_are_the_named_ones() -> None:

@@ -58,16 +58,16 @@ def test_before_anything_has_run_there_are_rows_without_figures(setting: Setting
 
 
 CENSORED = 1e6
-Rooms = Sequence[tuple[float, float, float, float]]
-"""Of each room: frames, collisions, steps, and the share of episodes that arrive."""
+Rooms = Sequence[tuple[float, ...]]
+"""Of each room: frames, collisions, steps, the share of episodes that arrive, and how many targets (else five)."""
 
 
 @pytest.fixture
 def judged(setting: Setting, monkeypatch: pytest.MonkeyPatch) -> Callable[[Rooms, Rooms], list[Claim]]:
     """The claims, in their order, where rooms come to such figures, of the collision-aware agents first."""
 
-    def in_room(frames: float, collisions: float, steps: float, arrive: float) -> InRoom:
-        values = np.ones((1, 5, len(METRIC_NAMES)))
+    def in_room(frames: float, collisions: float, steps: float, arrive: float, targets: int = 5) -> InRoom:
+        values = np.ones((1, targets, len(METRIC_NAMES)))
         for name, value in (("collisions", collisions), ("steps", steps), ("success", arrive)):
             values[:, :, METRIC_NAMES.index(name)] = value
         return InRoom(Scores((0,), values), np.array([[frames]]), int(frames < CENSORED), 1)
@@ -122,6 +122,14 @@ def test_agents_that_arrive_less_often_win_nothing(judged) -> None:
     assert settles.verdict == "holds"  # a run that misses a target has not settled: that is counted
     assert [claim.verdict for claim in others] == ["undecided"] * 2
     assert all("97.00%, 100.00%, so that the figures compare different episodes" in claim.evidence for claim in others)
+
+
+def test_rooms_weigh_alike_however_many_targets_they_have(judged) -> None:
+    ours, theirs = ([(*room, 1 if number == 0 else 5) for number, room in enumerate(BASELINE)] for _ in range(2))
+    ours = [(0.7 * frames, 0.1, steps, arrive, targets) for frames, _, steps, arrive, targets in ours]
+    ours[0] = (*ours[0][:3], 0.9, 1)
+    found = judged(ours, theirs)[1]
+    assert found.verdict == "undecided" and "episodes that arrived: 98.75%, 100.00%" in found.evidence
 
 
 def test_one_lost_target_of_many_is_told_and_does_not_decide(judged) -> None:
