@@ -1,6 +1,9 @@
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +17,7 @@ import numpy as np
 import pytest
 
 from clearway.choices import BudgetName, LearnerName
-from clearway.errors import RenderError, SceneError
+from clearway.errors import SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
@@ -216,12 +219,13 @@ def test_a_seed_out_of_range_is_refused_before_anything_is_trained(clearway, dum
 
 
 @pytest.mark.parametrize("words", [("reproduce", "table1", "--out"), ("report",)])
-def test_graphics_that_are_not_there_are_told_in_one_line(clearway, words: tuple, tmp_path: Path, monkeypatch) -> None:
-    def refuses() -> None:
-        raise RenderError("no pictures can be rendered here with MUJOCO_GL=nonsense. Unset MUJOCO_GL")
-
-    monkeypatch.setattr("clearway.rooms.build.check_mujoco", refuses)
-    assert clearway(*words, tmp_path / "out").refusal("MUJOCO_GL=nonsense")
+def test_graphics_that_are_not_there_are_told_in_one_line(words: tuple[str, ...], tmp_path: Path) -> None:
+    """By a process of its own, as MuJoCo looks at it once."""
+    command = [sys.executable, "-m", "clearway", *words, str(tmp_path / "out")]
+    environment = {**os.environ, "MUJOCO_GL": "nonsense"}
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    (line,) = answer.stderr.splitlines()
+    assert answer.returncode and "MUJOCO_GL=nonsense" in line and "Unset MUJOCO_GL" in line
     assert not (tmp_path / "out").exists()
 
 
