@@ -10,18 +10,19 @@ import torch
 
 from clearway.agents.agent import FEATURES, Decisions
 from clearway.agents.by_features import FeatureAgent
-from clearway.errors import RunError
+from clearway.errors import EncoderError, RunError
 from clearway.learn.load import TrainedNetwork
 from clearway.learn.run_record import record_of
 from clearway.live.conditions import Condition, Perturbations
 from clearway.live.episodes import LiveProtocol
 from clearway.live.live_room import LiveRoom
-from clearway.live.walks import LiveScene, check_alike, finish_live, stages, walk_setting
+from clearway.live.walks import LiveScene, check_alike, encoder_of, finish_live, stages, walk_setting
 from clearway.perception import depth_grid
 from clearway.perception.encode import encoder_from_record
 from clearway.rooms.camera import eye_view
 from clearway.rooms.render import studio
 from clearway.scenes.actions import Action
+from clearway.views.seen import encoder_of_takes
 from clearway.world.world import World, make_world
 from helpers.agents import after_poses
 from helpers.made import corridor_scene
@@ -129,7 +130,15 @@ def test_agents_that_differ_in_what_they_walk_to_are_not_compared(agent) -> None
 def test_an_encoder_of_depth_is_refused_before_a_room_is_built(agent) -> None:
     scene = replace(corridor_scene(5), encoder=depth_grid.find_record())
     with (
-        pytest.raises(RunError, match="corridor: its encoder depth-grid sees depth, and live"),
+        pytest.raises(EncoderError, match=r"corridor: its encoder depth-grid sees depth, and .*live walks.*grid"),
         stages([scene], {"corridor": (0,)}, "pose"),
     ):
         pass
+    with pytest.raises(EncoderError, match="corridor has no features by a known encoder, by which those of live walks"):
+        encoder_of(replace(scene, encoder=None))
+
+
+def test_perturbed_takes_are_not_encoded_by_what_sees_depth() -> None:
+    scene = replace(corridor_scene(5), encoder=depth_grid.find_record())
+    with pytest.raises(EncoderError, match=r"sees depth, and perturbed takes are colour pictures. Leave perturb out$"):
+        encoder_of_takes(scene)

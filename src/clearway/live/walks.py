@@ -19,13 +19,12 @@ from clearway.live.live_room import LiveRoom, live_room
 from clearway.live.result_tables import markdown_tables
 from clearway.live.results import Figures, LiveReport, LiveResult, grid_figures, summarise
 from clearway.perception.encode import encoder_from_record
-from clearway.perception.encoder import Encoder, sensor_of
+from clearway.perception.encoder import Encoder, colour_encoder
 from clearway.regular_files import read_bytes
 from clearway.rooms.camera import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from clearway.rooms.detail import taken_fast
 from clearway.rooms.render import Camera, studio
 from clearway.scenes.scene import EncoderRecord, Scene
-from clearway.scenes.sensors import RGB
 from clearway.torch_threads import torch_threads
 from clearway.world.world import World, make_world
 
@@ -81,13 +80,12 @@ def stages(
 
     Raises:
         SceneError: a scene is none of our rooms.
-        EncoderError: an encoder cannot be had again.
-        RunError: an encoder is unknown, or takes no colour pictures.
+        EncoderError: an encoder is unknown, cannot be had again or takes no colour pictures.
     """
     with ExitStack() as opened:
         found = []
         for scene in scenes:
-            made_by = _encoder_record(scene)  # before the seconds that the room takes
+            made_by = _encoder(scene)  # before the seconds that the room takes
             live = live_room(scene)
             encoder = encoder_from_record(made_by)
             world = make_world([scene], {scene.name: targets[scene.name]}, zone_level)
@@ -108,21 +106,13 @@ def encoder_of(scene: Scene) -> Encoder:
     """What made the scene's features of colour pictures.
 
     Raises:
-        RunError: it is unknown, or takes others.
-        EncoderError: it cannot be had again.
+        EncoderError: it is unknown, takes others, or cannot be had again.
     """
-    return encoder_from_record(_encoder_record(scene))
+    return encoder_from_record(_encoder(scene))
 
 
-def _encoder_record(scene: Scene) -> EncoderRecord:
-    """What made the scene's features of colour pictures. Raises RunError where it is unknown, or takes others."""
-    if scene.encoder is None:
-        raise RunError(f"scene {scene.name} has no record of its encoder. Encode it and train again")
-    seen = sensor_of(scene.encoder)
-    if seen != RGB:
-        problem = f"its encoder {scene.encoder.name} sees {seen}, and live walks take colour pictures"
-        raise RunError(f"scene {scene.name}: {problem}. Evaluate on the grid: clearway evaluate")
-    return scene.encoder
+def _encoder(scene: Scene) -> EncoderRecord:
+    return colour_encoder(scene, "those of live walks", "Evaluate on the grid: clearway evaluate")
 
 
 def walk_setting(

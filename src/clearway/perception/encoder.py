@@ -16,7 +16,7 @@ import numpy as np
 
 from clearway.errors import EncoderError
 from clearway.perception.preprocess import Preprocessing, to_pixels
-from clearway.scenes.scene import EncoderRecord
+from clearway.scenes.scene import EncoderRecord, Scene
 from clearway.scenes.sensors import RGB
 
 if TYPE_CHECKING:
@@ -84,6 +84,27 @@ class NetworkEncoder:
 def sensor_of(record: EncoderRecord) -> str:
     """Name of the sensor whose pictures an encoder takes, see `clearway.scenes.sensors`."""
     return str(record.settings.get(SENSOR, RGB))
+
+
+def colour_encoder(scene: Scene, pictures: str, instead: str) -> EncoderRecord:
+    """What made a scene's features of colour pictures, to encode others.
+
+    Args:
+        scene: with features.
+        pictures: what the others are, in the plural.
+        instead: what to do where the scene's encoder takes no colour pictures.
+
+    Raises:
+        EncoderError: the encoder is unknown, or takes no colour pictures.
+    """
+    record = scene.encoder
+    if record is None:
+        problem = f"scene {scene.name} has no features by a known encoder, by which {pictures} could be encoded"
+        raise EncoderError(f"{problem}. Encode it: clearway scenes encode FILES --out FOLDER (and train again)")
+    if (seen := sensor_of(record)) != RGB:
+        problem = f"scene {scene.name}: its encoder {record.name} sees {seen}, and {pictures} are colour pictures"
+        raise EncoderError(f"{problem}. {instead}")
+    return record
 
 
 def identity_of(settings: Mapping[str, object], contents: Iterable[bytes | memoryview]) -> str:

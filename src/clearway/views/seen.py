@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clearway.agents.agent import FEATURES
-from clearway.errors import EncoderError
 from clearway.learn.seeds import SEED_LIMIT
 from clearway.live.conditions import Perturbations, label_of
 from clearway.scenes.scene import EncoderRecord, Scene
@@ -93,18 +92,11 @@ def _encoding(scenes: Sequence[Scene], encoder: Encoder | None) -> Callable[[np.
 
     if encoder is not None:
         return partial(features_of, encoder=encoder)
-    return partial(kept_features, encoder=encoder_from_record(record_seen_by(scenes)))
+    return partial(kept_features, encoder=encoder_from_record(encoder_of_takes(scenes[0])))
 
 
-def record_seen_by(scenes: Sequence[Scene]) -> EncoderRecord:
-    """What made the scenes' features. Raises EncoderError where it is unknown or takes no colour pictures."""
-    from clearway.perception.encoder import sensor_of
+def encoder_of_takes(scene: Scene) -> EncoderRecord:
+    """What encodes perturbed takes of a scene. Raises EncoderError where it is unknown or takes no colour pictures."""
+    from clearway.perception.encoder import colour_encoder
 
-    record = scenes[0].encoder
-    if record is None:
-        problem = f"scene {scenes[0].name} has no features by a known encoder, and the agent sees features"
-        raise EncoderError(f"{problem}. Encode the scenes: clearway scenes encode FILES --out FOLDER")
-    if (seen := sensor_of(record)) != RGB:
-        problem = f"encoder {record.name} sees {seen}, and perturbed takes are colour pictures"
-        raise EncoderError(f"{problem}. Leave perturb out")
-    return record
+    return colour_encoder(scene, "perturbed takes", "Leave perturb out")
