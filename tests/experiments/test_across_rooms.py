@@ -97,6 +97,7 @@ def test_what_every_room_shows_holds_however_rooms_differ(judged) -> None:
     assert found[0].numbers["ratio"].value == pytest.approx(0.7)
     one_more = 1 / (5 * 3)  # episodes of a room
     assert found[1].numbers["ratio"].value == pytest.approx((0.1 + one_more) / (0.2 + one_more))
+    assert [found[1].numbers[name].value for name in ("first", "second")] == pytest.approx([0.1, 0.2])
     assert "it lies below 1 in 8 of 8 rooms" in found[0].evidence and "below 1.02 in 8 of 8" in found[2].evidence
     back = judged(BASELINE, ours)
     assert [claim.verdict for claim in back] == ["does not hold", "does not hold", "holds"]

@@ -29,6 +29,11 @@ def test_p_is_uniform_where_there_is_no_difference() -> None:
     assert 0.4 < np.mean(found) < 0.6
 
 
+def test_p_of_ten_and_ten_runs_is_exact() -> None:
+    ten = column(*range(10))
+    assert permutation_p(ten, ten + 20, ONE) == 2 / 184_756
+
+
 def test_p_of_many_runs_is_drawn() -> None:
     rng = np.random.default_rng(1)
     many = rng.normal(size=(12, 1))

@@ -165,10 +165,9 @@ def _claims(setting: Setting, learner: str, rooms: Sequence[dict[str, InRoom]]) 
             yield Claim(text, "undecided", f"{told}, or by fewer than {LEAST_ROOMS}.")
             continue
         ours, theirs = np.array([_pair(own, figure) for own in complete]).T
-        if figure == "collisions":  # one more in all episodes, so that there is a ratio
-            episodes = setting.budget.episodes_per_target * np.array([_success(own)[0].size for own in complete])
-            ours, theirs = ours + 1 / episodes, theirs + 1 / episodes
-        claim = _judged(text, FIGURES[figure], ours, theirs, 1 + SAME if figure == "steps" else 1.0)
+        episodes = setting.budget.episodes_per_target * np.array([_success(own)[0].size for own in complete])
+        more = 1 / episodes if figure == "collisions" else np.zeros(len(complete))  # so that there is a ratio
+        claim = _judged(text, FIGURES[figure], ours, theirs, more, 1 + SAME if figure == "steps" else 1.0)
         ours, theirs = (np.concatenate([_success(own)[kind].ravel() for own in complete])[None] for kind in (0, 1))
         rooms_of = np.repeat(np.arange(len(complete)), [_success(own)[0].size for own in complete])
         yield claim if figure == "frames" else with_failures(claim, ours, theirs, rooms_of)  # which counts failures
@@ -180,17 +179,19 @@ def _success(own: dict[str, InRoom]) -> tuple[np.ndarray, np.ndarray]:
     return ours, theirs
 
 
-def _judged(text: str, what: str, ours: np.ndarray, theirs: np.ndarray, allowed: float) -> Claim:
+def _judged(text: str, what: str, ours: np.ndarray, theirs: np.ndarray, more: np.ndarray, allowed: float) -> Claim:
     """A claim over rooms.
 
     Args:
         text: the claim.
         what: is compared.
-        ours, theirs: (K,) a figure of each room, above 0.
+        ours, theirs: (K,) a figure of each room.
+        more: (K,) is added to both for their ratio, which asks for figures above 0.
         allowed: the ratio up to which it is no more.
     """
-    ratio = ratio_estimate(ours, theirs)
     means = {name: mean_estimate(own[:, None], ONE_TARGET) for name, own in (("first", ours), ("second", theirs))}
+    ours, theirs = ours + more, theirs + more
+    ratio = ratio_estimate(ours, theirs)
     fewer = int((ours < theirs * allowed).sum())
     evidence = (
         f"{what}: {means['first']} against {means['second']}, ratio {ratio}, geometric mean over rooms (median "

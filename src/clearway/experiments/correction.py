@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from decimal import Decimal
 
 from clearway.experiments.section import Claim, Section
 
@@ -40,7 +41,13 @@ def holm(p: Sequence[float]) -> list[float]:
 
 
 def _judged_again(claim: Claim, p: float, claims: int) -> Claim:
-    told = f"{claim.evidence} Permutation test: p = {claim.p:.2g}, for {claims} claims {p:.2g} (Holm)."
+    assert claim.p is not None, "what has no p is not corrected"
+    told = f"{claim.evidence} Permutation test: p = {_text(claim.p)}, for {claims} claims {_text(p)} (Holm)."
     if claim.verdict == "undecided" or p <= LEVEL:
         return replace(claim, evidence=told)
     return replace(claim, verdict="undecided", evidence=f"{told} By itself: {claim.verdict}.")
+
+
+def _text(p: float) -> str:
+    """To two significant digits, without an exponent."""
+    return f"{Decimal(f'{p:.2g}'):f}"
