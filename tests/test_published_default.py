@@ -82,7 +82,7 @@ def test_the_default_recipe_in_four_rooms_is_what_its_record_comes_to(tmp_path: 
     mark = mark_steps(report.setting, report.setting.targets)
     settled = sorted(settled_row(rows, mark)["seconds"] for rows in of_quality)
     ended = sorted(rows[-1]["seconds"] for rows in of_quality)
-    assert len(ended) == 5 and f"but for time (up to {ended[-1]:.0f} s;" in RESULTS
+    assert len(ended) == 5 and ended[0] > 300 and "in the rooms it was tuned on, but for time ([question 64" in RESULTS
     words = (
         f"settled after {settled[0]:.0f} to {settled[-1]:.0f} s, and\nended after {ended[0]:.0f} to {ended[-1]:.0f} s."
     )
@@ -114,9 +114,7 @@ def check_quality(section: Section, told: list[list[str]]) -> None:
     for text, name in zip(ranges, ("x the shortest path", "worst target", "collisions"), strict=True):
         for end, value in zip(numbers(text), sorted(row[name] for row in own)[::4], strict=True):
             assert_written(end, value, name)
-    told = (
-        "Five trainings of fresh seeds meet them in the rooms it was tuned on, but for time (up to 338 s; [question 64"
-    )
+    told = "Five trainings of fresh seeds meet them in the rooms it was tuned on, but for time ([question 64"
     assert told in RESULTS
     assert "64: yes, all five." in REGISTERED
 

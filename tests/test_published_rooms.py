@@ -117,6 +117,12 @@ def shortened(claim: Claim) -> str:
     return claim.text.removeprefix("paper: ").removeprefix("paper, ").removeprefix("collision-aware, ")
 
 
+OF_THE_SAME_RUNS = re.compile(
+    r"(shortest-path reward|in each run\)|halfway\)|training has settled\)|collision zone than shortest)$"
+)
+"""Ends of claims that compare the two rewards' runs on usual targets."""
+
+
 def check_counts(asked: Sequence[Claim], page: str) -> None:
     """How many of the claims that were asked hold, do not, or are undecided; and what of it would stay together."""
     assert all(claim.p is not None for claim in asked)
@@ -132,6 +138,8 @@ def check_counts(asked: Sequence[Claim], page: str) -> None:
     told = ", ".join(f"{count[verdict]} {word}" for verdict, word in zip(VERDICTS, words, strict=True))
     assert f"Of {len(asked)} claims {told}" in page
     assert f"corrected all together {len(kept)} would hold" in page
+    of_the_same_runs = [claim for claim in asked if claim.verdict == "holds" and OF_THE_SAME_RUNS.search(claim.text)]
+    assert len(of_the_same_runs) == 7 and "seven of the 20 compare the same ten runs" in page
     assert (count["holds"], len(asked), count["does not hold"], count["undecided"]) == (20, 29, 3, 6)
     assert "20 of 29 claims hold, three do not, six are undecided** (corrected by table; overall, three that" in RESULTS
     assert "collisions (0.065 against 0.179) and frames until settled (395,000 against 462,000) are fewer" in RESULTS

@@ -1,6 +1,7 @@
 """What the pages say of agents of the published settings is what their records come to."""
 
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.across_seeds import mean_estimate
-from clearway.experiments import off_grid, table1, zone_time
+from clearway.experiments import hard_tables, off_grid, table1, zone_time
 from clearway.experiments.convergence import (
     ONE_TARGET,
     frames_until_settled,
@@ -24,10 +25,11 @@ from clearway.experiments.job import run_folder
 from clearway.experiments.reproduce import REQUEST_FILE, gather
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting
-from clearway.experiments.verdicts import judged_less
+from clearway.experiments.verdicts import judged_less, judged_no_more
 from clearway.reward import BUMP
 from helpers.published import (
     BESIDE,
+    DOCS,
     EVIDENCE,
     LEARNERS,
     RESULTS,
@@ -45,6 +47,24 @@ from helpers.published import (
     words_of,
 )
 from helpers.report_tables import by_heading
+
+
+@pytest.mark.slow
+def test_hard_targets_after_2_m_frames_are_level_with_usual_ones(tmp_path: Path) -> None:
+    detours = []
+    for record, frames_factor in (("hard-bathroom", 2), ("paper-bathroom", 1)):
+        unpack(record, tmp_path / record)
+        setting = gather(tmp_path / record).setting
+        targets = hard_tables.chosen(setting) if frames_factor == 2 else setting.targets
+        groups = compared(setting, PAIR, targets=targets, frames_factor=frames_factor)
+        assert {run.learner.frames for group in groups for run in group.runs} == {2_000_000}
+        detours.append(hard_tables._detours(setting, groups, "paper", setting.world(targets)))
+        assert len(detours[-1]) == 10
+    claim = judged_no_more("level", "x shortest paths", *detours, ONE_TARGET)
+    hard, usual = (own.mean() for own in detours)
+    told = f"hard ones after 2 M are level: {hard:.3f} against {usual:.3f}, p = {claim.p:.2g}, {claim.verdict} (not reg"
+    assert told in section_of(EVIDENCE, "Hard targets") and claim.verdict == "undecided"
+    assert "no larger than usual ones after 1 M (than those after 2 M: undecided, not registered)" in RESULTS
 
 
 @pytest.mark.slow
@@ -161,6 +181,27 @@ def test_four_rooms_as_published_are_what_their_record_comes_to(
             assert_written(collisions, episodes["collisions"][own].mean(), begin)
             assert_written(arrive, 100 * episodes["reached"][own].mean(), begin)
             assert arrive != "100" or episodes["reached"][own].all(), begin
+    if record == "four-rooms-longer":
+        check_beside_the_eyes(trials)
+
+
+def check_beside_the_eyes(trials: Sequence[tuple[dict[str, Any], int, dict[str, np.ndarray], str]]) -> None:
+    """What the page of the eyes says of a random ResNet-50, halfway to 20 M frames."""
+    part = section_of((DOCS / "seeing.md").read_text(encoding="utf-8"), "The paper's own network on them")
+    walked = set()
+    for run, frames, episodes, lost in trials:
+        if frames != 10:
+            continue
+        room = np.array([number for number, scene in enumerate(run["scenes"]) for _ in scene["targets"]])
+        own = room[episodes["target"]]
+        means = [
+            [episodes[name][own == one].mean() for name in ("steps", "shortest_path_steps")]
+            for one in range(len(run["scenes"]))
+        ]
+        walked.add(sum(steps <= 2 * shortest for steps, shortest in means))
+        (line,) = [cells for cells in rows_of(part) if cells[0] == run["reward"]["name"]]
+        assert f"{line[2].partition(';')[0]} of 20" == lost
+    assert walked == {2} and "on a random ResNet-50 two, after 10 M of [20 M frames]" in part
 
 
 @pytest.mark.slow
@@ -420,9 +461,7 @@ def check_the_agents_of_fresh_seeds(setting: Setting, rows: list[list[str]]) -> 
         (group.learner, group.agent): frames_until_settled(setting.out, group, mark)[0]
         for group in table1.all_groups(setting)
     }
-    early, late = settled["paper, unclipped", "shortest"], settled["paper", "collision-aware"]
-    assert early.max() < late.min()
-    assert f"settles sooner ({early.mean():,.0f} frames)" in RESULTS
+    assert settled["paper, unclipped", "shortest"].max() < settled["paper", "collision-aware"].min()
 
 
 def check_unseen(section: Section, page: str) -> None:
@@ -523,5 +562,6 @@ def test_the_papers_claims_of_fresh_seeds_are_what_their_record_comes_to(tmp_pat
     assert together == [False] * 10 + [True]
     assert (
         f"In the bathroom, of eleven claims asked of fresh seeds {holds} hold (corrected by table; overall, only the "
-        f"last), {fails} do not, {open_} are undecided" in RESULTS
+        f"last: with five runs a reward none against `shortest` can), {fails} do not, {open_} are undecided" in RESULTS
     )
+    assert 2 / math.comb(10, 5) * len(asked) > LEVEL
