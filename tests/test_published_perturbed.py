@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from clearway.evaluation.across_seeds import difference, permutation_p
+from clearway.experiments import perturbed
 from clearway.experiments.correction import LEVEL, holm
+from clearway.experiments.job import trial_path
 from clearway.experiments.perturbed import ALL, ALONE, HEADINGS, OWN, TOO
-from clearway.experiments.plan import NEAREST
+from clearway.experiments.plan import NEAREST, told_of
 from clearway.experiments.reproduce import gather
 from helpers.published import (
     DOCS,
@@ -45,8 +47,14 @@ EARLIER_ROWS = [
 @pytest.mark.slow
 def test_perturbed_pictures_are_what_their_record_comes_to(tmp_path: Path) -> None:
     unpack("perturbed-bathroom", tmp_path / "runs")
-    (section,) = gather(tmp_path / "runs").sections
+    found = gather(tmp_path / "runs")
+    (section,) = found.sections
     assert section.name == "perturbed" and not section.missing
+    for job in perturbed.jobs(found.setting):
+        for trial in job.trials:
+            path = trial_path(found.setting.out, job.run, trial)
+            about = json.loads(path.read_text(encoding="utf-8"))["about"]
+            assert json.loads(json.dumps(told_of(job.run, trial))).items() <= about.items()
     agents, judged = (rows_of(part)[1:] for part in ASKED.split("\n\n") if part.startswith("| "))
     recorded = by_heading(section.tables[0])
     assert len(agents) == len(recorded) == 19
