@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 KINDS = ("bathroom", "bedroom", "living_room", "kitchen")
 AVERAGE = "average"
-THE_PAPER = "the paper"
+THE_PAPER = "printed in the paper"
 
 
 @dataclass(frozen=True)
