@@ -1,6 +1,7 @@
 """What the pages say of the default recipe in four rooms is what its record comes to."""
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -271,3 +272,39 @@ def check_settled(section: Section) -> None:
     told = words_of(r"they take ([\d.]+) and ([\d.]+) steps, with ([\d.]+) and ([\d.]+) collisions", PAGE).groups()
     for text, value in zip(told, (*steps, *collisions), strict=True):
         assert_written(text, value, "halfway")
+
+
+PARTS = {"look-ahead": "without-lookahead", "hindsight": "without-hindsight", "whitening": "without-whitening"}
+
+
+@pytest.mark.slow
+def test_the_default_recipe_without_a_part_is_what_its_records_come_to(tmp_path: Path) -> None:
+    page = section_of(EVIDENCE, "Without three of its parts")
+    shown = {part: cells for part, *cells in rows_of(page)[1:]}
+    assert list(shown) == list(PARTS)
+    met, seconds, steps = {}, [], []
+    for part, record in PARTS.items():
+        folder = tmp_path / record
+        unpack(record, folder, "four-rooms")
+        (section,) = gather(folder).sections
+        rows = [row for row in by_heading(section.tables[0]) if row["learner"] == "default"]
+        assert not section.missing and [row["seed"] for row in rows] == [20, 21, 22, 23, 24]
+        assert {row["targets solved"] for row in rows} == {"20 of 20"}
+        met[part] = sum(row["misses"] == "none" for row in rows)
+        told, *cells, missed = shown[part]
+        assert told == f"{met[part]} of 5"
+        for cell, name in zip(cells, ("x the shortest path", "worst target", "collisions"), strict=True):
+            for written, row in zip(cell.split(", "), rows, strict=True):
+                assert_written(written, row[name], f"{part}, {name}")
+        names = {name for row in rows for name in row["misses"].split(", ")} - {"none"}
+        assert {"steps": "x the shortest path"}.get(missed.split(", ")[0], missed.split(", ")[0]) in names
+        assert len(names) == len(missed.split(", "))
+        seconds += seconds_of_runs(folder)
+        steps += [row["x the shortest path"] for row in rows]
+    assert met == {"look-ahead": 3, "hindsight": 1, "whitening": 0}
+    assert f"p = {2 / math.comb(10, 5):.2g}, for three arms {3 * 2 / math.comb(10, 5):.2g}" in page
+    assert f"{min(seconds):.0f} to {max(seconds):.0f} s a run" in page and len(seconds) == 15
+    (line,) = [row for row in rows_of(RESULTS) if row[0] == "four rooms, seeds 20 to 24"]
+    least, most = line[1].split("-")
+    assert float(most) < min(steps) and f"takes fewer steps ({least} to {most})" in page
+    assert "In the four rooms it needs whitened features" in RESULTS

@@ -53,6 +53,9 @@ ASKED_FIRST = {
     ("perturbed-bathroom", ""): {74},
     ("shuffles-bathroom", ""): {61, 62},
     ("step-size-bathroom", ""): {60},
+    ("without-hindsight", ""): {76},
+    ("without-lookahead", ""): {76},
+    ("without-whitening", ""): {76},
 }
 """Records of which runs tell when they were begun, how names of such runs begin, and the questions written before."""
 REWORDED = {"6e991c2"}
