@@ -16,6 +16,7 @@ ORDER = (
         "files",
         "plugins",
         "markdown",
+        "own_code",
         "colours",
         "progress",
         "regular_files",

@@ -25,6 +25,7 @@ from clearway.reward import (
     reward_named,
 )
 from clearway.world.world import make_world
+from helpers import own_terms
 from helpers.made import corridor_scene
 
 NOT_REACHED, REACHED = 0, 1
@@ -246,6 +247,45 @@ def test_a_term_of_one_s_own_is_told_in_json_and_not_loaded_from_it() -> None:
     assert read.as_known().table(MOVES).max() == 5.0
     with pytest.raises(RewardError, match="Doubled, which is not loaded"):
         read.table(MOVES)
+
+
+def test_the_code_of_a_term_is_told_as_it_was_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = own_terms.imported(tmp_path / "turning.py", monkeypatch)
+    kept, path = module.REWARD.to_json(), f"{own_terms.NAME}:Turning"
+    assert kept["terms"] == {path: {"cost": 0.005}} and list(kept["code"]) == [path]
+    dearer = own_terms.imported(tmp_path / "turning.py", monkeypatch, own_terms.DEARER).REWARD.to_json()
+    assert module.REWARD.to_json() == kept  # of what this program runs, though its file has changed
+    assert dearer == {**kept, "code": dearer["code"]} != kept
+    assert (reward_from_json(kept).to_json(), reward_from_json(dearer).to_json()) == (kept, dearer)
+    del kept["code"]  # as earlier versions wrote it
+    assert reward_from_json(kept).to_json() == kept
+    for wrong in ({"code": 3}, {"code": {path: 3}}):
+        with pytest.raises(TypeError, match="code is"):
+            reward_from_json({**kept, **wrong})
+    assert not any("code" in reward.to_json() for reward in REWARDS.values())
+
+
+def test_a_parameter_may_be_called_as_the_key_of_the_code_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
+    class Coded(Term):
+        code: float = 0.5
+
+    kept = Reward("coded", (Time(), Coded(), Arrival())).to_json()
+    assert list(kept["terms"].values()) == [{"code": 0.5}]
+    assert reward_from_json(kept).to_json() == kept
+
+
+def test_a_term_s_code_is_its_own_where_a_base_keeps_it_from_being_noted() -> None:
+    class Silent:
+        def __init_subclass__(cls) -> None:
+            """Tell nobody."""
+
+    @dataclass(frozen=True)
+    class Quiet(Silent, Doubled):
+        pass
+
+    assert Reward("quiet", (Time(), Quiet(2.0), Arrival())).codes == {}
+    assert MINE.codes
 
 
 def test_rewards_as_runs_of_format_1_hold_them() -> None:

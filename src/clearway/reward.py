@@ -20,6 +20,7 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from clearway.errors import ClearwayError, PluginError, kind_and_reason
+from clearway.own_code import code_of
 from clearway.plugins import find_plugin, imported, load_plugin, offered
 from clearway.spelling import did_you_mean
 
@@ -58,6 +59,13 @@ def parameter(default: float | None, meaning: str) -> Any:
 @dataclass(frozen=True)
 class Term:
     """A part of a reward. One of your own is a frozen dataclass whose fields, numbers or texts, are its parameters."""
+
+    _digest_of_code: ClassVar[str | None] = None
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Keep what the code of one of your own is as it is made: its file may change while it is in use."""
+        super().__init_subclass__(**given)
+        cls._digest_of_code = code_of(cls)
 
     def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
         """What every action earns with this term, (S, A) float64, from what it earned before it."""
@@ -155,6 +163,7 @@ class UnknownTerm(Term):
 
     path: str
     parameters: tuple[tuple[str, Any], ...]
+    code: str | None = None
 
     @property
     def called(self) -> str:
@@ -183,6 +192,7 @@ class Reward:
     clip: bool = False
 
     CLIPPED: ClassVar[str] = "clip"
+    CODES: ClassVar[str] = "code"
 
     def __post_init__(self) -> None:
         """Refuse what is no term.
@@ -309,20 +319,32 @@ class Reward:
             parts.pop()
         return ", ".join(parts), told
 
+    @property
+    def codes(self) -> dict[str, str]:
+        """What the code is of terms that are not ours, by where their class stands: `code_of`, where it can be had."""
+        told = {
+            _path(term): term.code if isinstance(term, UnknownTerm) else vars(type(term)).get("_digest_of_code")
+            for term in self._others()
+        }
+        return {path: code for path, code in told.items() if code is not None}
+
+    def _others(self) -> list[Term]:
+        return [term for term in self.terms if type(term) not in TERMS.values()]
+
     def to_json(self) -> dict[str, object]:
-        """As JSON values: name, parameters, clipping, and terms that are not ours by where their class stands.
+        """As JSON values: name, parameters, clipping; terms that are not ours by where their class stands, and `codes`.
 
         Raises:
             RewardError: a parameter of such a term is no JSON value, nor a number of NumPy's.
         """
-        others = {}
-        for term in self.terms:
-            if isinstance(term, UnknownTerm):
-                others[term.path] = dict(term.parameters)
-            elif type(term) not in TERMS.values():
-                path = f"{type(term).__module__}:{type(term).__qualname__}"
-                others[path] = {own.name: getattr(term, own.name) for own in fields(term)}
-        told = {"name": self.name, **self.parameters, self.CLIPPED: self.clip, **({"terms": others} if others else {})}
+        others = {
+            _path(term): dict(term.parameters)
+            if isinstance(term, UnknownTerm)
+            else {own.name: getattr(term, own.name) for own in fields(term)}
+            for term in self._others()
+        }
+        further = {name: told for name, told in (("terms", others), (self.CODES, self.codes)) if told}
+        told = {"name": self.name, **self.parameters, self.CLIPPED: self.clip, **further}
         try:
             return dict(json.loads(json.dumps(told, default=_as_plain)))  # as it comes back from a file
         except TypeError as fault:
@@ -332,9 +354,13 @@ class Reward:
     def __str__(self) -> str:
         """Its parameters, as tables print them."""
         told = [f"{name} {value:g}" for name, value in self.parameters.items()]
-        others = [term for term in self.terms if type(term) not in TERMS.values()]
-        told += [term.called if isinstance(term, UnknownTerm) else type(term).__name__ for term in others]
+        told += [term.called if isinstance(term, UnknownTerm) else type(term).__name__ for term in self._others()]
         return ", ".join(told) + (", clipped to [-1, 1]" if self.clip else "")
+
+
+def _path(term: Term) -> str:
+    """Where the class of a term that is not ours stands."""
+    return term.path if isinstance(term, UnknownTerm) else f"{type(term).__module__}:{type(term).__qualname__}"
 
 
 def _is_number(value: object) -> bool:

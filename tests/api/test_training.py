@@ -9,7 +9,7 @@ import clearway
 from clearway.api import training
 from clearway.api.perturbations import perturbations_asked
 from clearway.api.training import chosen_learner
-from clearway.errors import ArgumentError, ClearwayError
+from clearway.errors import ArgumentError, ClearwayError, RunError
 from clearway.learn.presets import DEFAULT, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
@@ -18,6 +18,7 @@ from clearway.learn.train import train as train_run
 from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Moves, Reward, RewardError, Term, Time
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views.seen import made_in_training
+from helpers import own_terms
 from helpers.made import corridor_scene, grid_scene
 from helpers.small_runs import CORRIDOR_TARGETS, FEATURES, small_learner, small_scenes, small_targets
 
@@ -50,6 +51,20 @@ def test_nothing_is_printed_or_left_behind(corridor, tmp_path, monkeypatch, capf
     clearway.train(corridor, **SMALL)
     assert list(tmp_path.iterdir()) == []
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_run_of_a_term_whose_code_has_changed_does_not_go_on_but_can_be_tried(
+    corridor, tmp_path, monkeypatch
+) -> None:
+    mine = own_terms.imported(tmp_path / "turning.py", monkeypatch).REWARD
+    clearway.train(corridor, reward=mine, out=tmp_path / "run", **SMALL)
+    clearway.train(corridor, reward=mine, out=tmp_path / "run", resume=True, **SMALL)
+    dearer = own_terms.imported(tmp_path / "turning.py", monkeypatch, own_terms.DEARER).REWARD
+    with pytest.raises(RunError, match="own_turning:Turning, a term of its reward, has changed since the run began"):
+        clearway.train(corridor, reward=dearer, out=tmp_path / "run", resume=True, **SMALL)
+    monkeypatch.delitem(own_terms.sys.modules, own_terms.NAME)
+    found = clearway.evaluate(tmp_path / "run", scenes=corridor, episodes=1, step_limit=5).evaluations
+    assert {str(one.trained.reward) for one in found if one.trained} == {str(mine)}
 
 
 def test_a_run_folder_is_one_like_any_other_and_goes_on(corridor, tmp_path) -> None:

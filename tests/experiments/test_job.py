@@ -15,7 +15,9 @@ from clearway.learn.figures import Figures
 from clearway.learn.run_folder import RunFolder
 from clearway.learn.trainer import Trainer
 from clearway.reward import COLLISION_AWARE
+from clearway.spread.messages import from_message, to_message
 from clearway.world.world import World
+from helpers import own_terms
 from helpers.agents import Spy
 from helpers.small_setting import small_setting
 
@@ -47,6 +49,20 @@ def test_a_job_that_is_done_is_left_alone(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(Trainer, "update", lambda self: pytest.fail("trains again"))
     do(tmp_path, job, threads=1)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json*")} == before
+
+
+def test_a_job_whose_reward_is_another_here_than_where_it_was_planned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a process that was started after the module had been edited."""
+    job, module = made_job(tmp_path), own_terms.imported(tmp_path / "turning.py", monkeypatch)
+    job = replace(job, run=replace(job.run, reward=module.REWARD))
+    name, message = job.run.name, to_message(job)
+    assert from_message(message).run.name == name
+    own_terms.imported(tmp_path / "turning.py", monkeypatch, own_terms.DEARER)
+    with pytest.raises(RunError, match=f"run {name}: the code of its reward's terms has changed since it was planned"):
+        do(tmp_path, from_message(message), threads=1)
+    assert not run_folder(tmp_path, job.run).path.exists()
 
 
 def test_a_run_whose_weights_are_gone_begins_anew_with_all_its_trials(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from clearway.errors import RunError
 from clearway.experiments import plan
 from clearway.experiments.plan import Job, PlannedRun, SceneFile, Trial, merged
 from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Reward, Term, Time
+from helpers import own_terms
 from helpers.small_runs import small_learner
 
 RUN = PlannedRun((SceneFile("room", Path("a/room.h5"), "digest"),), ((1, 2),), SHORTEST, small_learner(), 0)
@@ -68,6 +69,13 @@ def test_terms_of_one_s_own_are_told_apart_by_their_class() -> None:
     assert replace(RUN, seed=np.int64(7)).name == replace(RUN, seed=7).name
     numpy = Reward("shortest", (Time(np.float32(-0.5)), Arrival()))
     assert replace(RUN, reward=numpy).name == replace(RUN, reward=Reward("shortest", (Time(-0.5), Arrival()))).name
+
+
+def test_the_code_of_terms_of_one_s_own_is_part_of_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def name(*edits: tuple[str, str]) -> str:
+        return replace(RUN, reward=own_terms.imported(tmp_path / "turning.py", monkeypatch, *edits).REWARD).name
+
+    assert name() == name(("return UNUSED", "return 7")) != name(own_terms.DEARER)
 
 
 @pytest.mark.parametrize(("frames", "half"), [(1, 1), (2, 1), (3, 1), (10, 5)])

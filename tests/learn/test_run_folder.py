@@ -15,8 +15,9 @@ from clearway.learn.run_record import RunRecord, record_of
 from clearway.learn.train import check_can_begin
 from clearway.reward import BUMP
 from clearway.scenes.digest import scene_digest
+from helpers import own_terms
 from helpers.made import corridor_scene
-from helpers.small_runs import small_request
+from helpers.small_runs import small_learner, small_request
 
 
 def made_record() -> RunRecord:
@@ -57,6 +58,33 @@ def test_the_same_experiment_may_run_elsewhere_but_not_with_other_settings() -> 
         replace(record, scenes=(replace(scenes[0], targets=(0, 8)), scenes[1])),
     ]
     assert not any(record.same_experiment(other) for other in others)
+
+
+def test_a_run_whose_term_s_code_has_changed_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def record(*edits: tuple[str, str], **changes: object) -> RunRecord:
+        reward = own_terms.imported(tmp_path / "turning.py", monkeypatch, *edits).REWARD
+        return record_of(small_request(reward=reward, **changes))
+
+    folder = RunFolder(tmp_path / "run")
+    folder.path.mkdir()
+    folder.write_record(record())
+    assert folder.check_begin(record(), resume=True) == folder.read_record()
+    told = (
+        "run: the code of own_turning:Turning, a term of its reward, has changed since the run began. "
+        "Undo the change, or give another --out"
+    )
+    for dearer in (record(own_terms.DEARER), record(own_terms.DEARER, learner=small_learner(frames=1600))):
+        assert not folder.read_record().same_experiment(dearer)
+        with pytest.raises(RunError, match=f"{told}$") as caught:
+            folder.check_begin(dearer, resume=True)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(RunError, match="another experiment"):
+        folder.check_begin(record(("Turning(), Arr", "Turning(0.006), Arr")), resume=True)
+    content = json.loads((folder.path / "run.json").read_text())
+    del content["reward"]["code"]  # as earlier versions wrote it
+    (folder.path / "run.json").write_text(json.dumps(content))
+    before = folder.check_begin(record(own_terms.DEARER), resume=True)
+    assert before is not None and record(own_terms.DEARER).same_experiment(before)
 
 
 def test_digest_changes_with_what_training_sees() -> None:

@@ -66,10 +66,13 @@ def do(out: Path, job: Job, threads: int) -> None:
     """Train the run, or what is left of it, and walk its missing trials; of a run that begins anew, all.
 
     Raises:
-        ClearwayError: a scene is missing or has changed, or training failed.
+        ClearwayError: a scene is missing or has changed, or the code of the reward's terms; or training failed.
     """
     set_threads(threads)
     run, scenes = job.run, _scenes(job.run)
+    if replace(run).name != run.name:  # as this process has it; the name has come along
+        problem = f"run {run.name}: the code of its reward's terms has changed since it was planned"
+        raise RunError(f"{problem}. Run the command again")
     folder = run_folder(out, run)
     if folder.trained_frames() < run.learner.frames:
         _train(folder, run, scenes)

@@ -16,7 +16,7 @@ def reward_from_json(content: Mapping[str, Any]) -> Reward:
         KeyError, TypeError: it is none.
     """
     name, clip = content["name"], content["clip"]
-    values = {key: value for key, value in content.items() if key not in ("name", "clip", "terms")}
+    values = {key: value for key, value in content.items() if key not in ("name", "clip", "terms", Reward.CODES)}
     for key, value in values.items():
         if key not in TERM_OF:
             raise KeyError(key)
@@ -33,7 +33,12 @@ def reward_from_json(content: Mapping[str, Any]) -> Reward:
         if value is not None:
             kind = TERM_OF[key]
             terms[kind] = replace(terms.get(kind, kind()), **{key: value})
-    others = [UnknownTerm(path, tuple(sorted(own.items()))) for path, own in content.get("terms", {}).items()]
+    codes = content.get(Reward.CODES, {})  # earlier versions wrote none
+    if not isinstance(codes, dict) or not all(isinstance(code, str) for code in codes.values()):
+        raise TypeError(f"{Reward.CODES} is {codes!r:.40}")
+    others = [
+        UnknownTerm(path, tuple(sorted(own.items())), codes.get(path)) for path, own in content.get("terms", {}).items()
+    ]
     arrival = terms.pop(Arrival, None)
     if arrival is None:
         raise KeyError("terminal")

@@ -283,10 +283,13 @@ def check_goes_on(before: RunRecord, record: RunRecord, trained: Callable[[], in
         option: names another place.
 
     Raises:
-        RunError: it is another experiment; or it was to have other frames, and is not finished or has trained so many
-            already.
+        RunError: it is another experiment, if only by the code of its reward's terms; or it was to have other frames,
+            and is not finished or has trained so many already.
     """
     begun, frames = before.learner.frames, record.learner.frames
+    if changed := before.changed_terms(record):
+        problem = f"{place}: the code of {changed[0]}, a term of its reward, has changed since the run began"
+        raise RunError(f"{problem}. Undo the change, or give another {option}")
     if not before.with_frames(frames).same_experiment(record):
         problem = f"{place}: holds another experiment (see its {RUN_FILE})"
         raise RunError(f"{problem}. Give the same settings, or another {option}")

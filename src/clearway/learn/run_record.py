@@ -97,15 +97,21 @@ class RunRecord:
             if name in then and then[name] != here.get(name)
         ]
 
+    def changed_terms(self, other: RunRecord) -> list[str]:
+        """Terms of the reward whose code is another one in the other run; a run that does not tell it may be of any."""
+        codes = other.reward.codes
+        return [path for path, code in self.reward.codes.items() if codes.get(path, code) != code]
+
     def same_experiment(self, other: RunRecord) -> bool:
         """Both would give the same agent: all but versions, hardware, paths, command and time agree."""
 
         def essence(run: RunRecord) -> tuple:
             scenes = tuple((s.name, s.digest, s.targets) for s in run.scenes)
             learner = run.learner.algorithm, asdict(run.learner)  # a class may be compared in another way
-            return learner, run.reward.to_json(), run.seed, run.zone_level, scenes, run.takes
+            reward = {**run.reward.to_json(), Reward.CODES: None}
+            return learner, reward, run.seed, run.zone_level, scenes, run.takes
 
-        return essence(self) == essence(other)
+        return essence(self) == essence(other) and not self.changed_terms(other)
 
 
 def record_of(request: RunRequest) -> RunRecord:

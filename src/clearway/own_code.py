@@ -1,0 +1,89 @@
+"""Classes of somebody's own, such as terms of a reward: what their code is."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import inspect
+import linecache
+import sys
+from collections.abc import Iterator
+
+DIGEST_LENGTH = 16
+DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+
+
+def code_of(kind: type) -> str | None:
+    """Digest of the source of a class and its bases, as it stands in their files now.
+
+    To it belong the parts of the same files that the class names: functions, constants, imports, and what these name.
+    The rest of the file may change, and so does what is imported without being told of.
+
+    Returns:
+        None for a class of clearway's or Python's, and where no source can be had.
+    """
+    parts = [part for own in kind.__mro__ if not _has_a_version(own) for part in _parts(own)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:DIGEST_LENGTH] if parts else None
+
+
+def _has_a_version(kind: type) -> bool:
+    """It is clearway's or Python's, of which records tell by the version."""
+    package = kind.__module__.partition(".")[0]
+    return package == "clearway" or package in sys.stdlib_module_names
+
+
+def _parts(kind: type) -> list[str]:
+    """The class and what it names in its file, in the file's order; empty where its source cannot be had."""
+    text = _text_around(kind)
+    try:
+        found = list(_definitions(text))
+    except (SyntaxError, ValueError):
+        return []
+    wanted, taken = {kind.__qualname__.partition(".")[0]}, set[int]()
+    while new := {place for place, (bound, _, _) in enumerate(found) if bound & wanted} - taken:
+        taken |= new
+        wanted = wanted.union(*(found[place][1] for place in new))
+    return [found[place][2] for place in sorted(taken)]
+
+
+def _definitions(text: str) -> Iterator[tuple[set[str], set[str], str]]:
+    """Every statement of a module, each import alone: the names that it binds or changes, those it uses, its text."""
+    lines = text.splitlines()
+    for statement in ast.parse(text).body:
+        if isinstance(statement, ast.Import | ast.ImportFrom):
+            for alias in statement.names:
+                yield _bound(alias), set(), f"{getattr(statement, 'module', '')}:{alias.name}"
+        else:
+            first = min([statement.lineno, *(each.lineno for each in getattr(statement, "decorator_list", ()))])
+            yield _bound(statement), _names(statement), "\n".join(lines[first - 1 : statement.end_lineno])
+
+
+def _bound(statement: ast.AST) -> set[str]:
+    """Names that a statement binds, or changes something of: `TABLE["turn"] = 3` changes TABLE."""
+    if isinstance(statement, DEFINITIONS):
+        return {statement.name}
+    found = set[str]()
+    for node in ast.walk(statement):
+        if isinstance(node, DEFINITIONS):
+            found.add(node.name)
+        elif isinstance(node, ast.alias):
+            found.add(node.asname or node.name.partition(".")[0])
+        elif isinstance(getattr(node, "ctx", None), ast.Store):
+            found |= _names(node)
+    return found
+
+
+def _names(tree: ast.AST) -> set[str]:
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+
+
+def _text_around(kind: type) -> str:
+    """What the file, or the cell of a notebook, holds in which a class stands; empty where it cannot be had."""
+    module = vars(sys.modules[kind.__module__]) if kind.__module__ in sys.modules else {}
+    cells = [own.__code__.co_filename for own in vars(kind).values() if inspect.isfunction(own)]
+    for name in (module.get("__file__"), *cells):
+        if isinstance(name, str):
+            linecache.checkcache(name)
+            if lines := linecache.getlines(name, module):
+                return "".join(lines)
+    return ""

@@ -1,0 +1,96 @@
+import linecache
+import sys
+from abc import ABC
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from clearway.own_code import code_of
+from clearway.reward import Term, Zones
+from helpers.own_terms import DEARER, NAME, SOURCE, imported
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        DEARER,
+        ("cost: float = 0.005", "cost: float = 0.006"),
+        ("@dataclass(frozen=True)", "@dataclass(frozen=True, repr=False)"),
+        ("SHARE = 0.5", "SHARE = 0.6"),
+        ("earned * SHARE", "earned / SHARE"),
+        ('ACTIONS["right"] = 1', 'ACTIONS["right"] = 2'),
+        ("return share(earned)", "return share(earned) / 2"),
+        ("floor as rounded", "trunc as rounded"),
+        ("from math import floor", "from numpy import floor"),
+        ("import numpy as np", "import torch as np"),
+        ("SHARE = 0.5", "if np.pi > 3:\n    SHARE = 0.6\nelse:\n    SHARE = 0.5"),
+        ("SHARE = 0.5", "try:\n    from os import sep as SHARE\nexcept ImportError:\n    SHARE = 0.5"),
+        ("UNUSED = 1\n", "UNUSED = 1\nif UNUSED:\n    def rounded(x):\n        return x\n"),
+    ],
+)
+def test_what_a_class_uses_of_its_file_is_its_code(edit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = code_of(imported(tmp_path / "before.py", monkeypatch).Turning)
+    after = code_of(imported(tmp_path / "after.py", monkeypatch, edit).Turning)
+    assert before is not None and after is not None
+    assert before != after
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        ("UNUSED = 1\n", "UNUSED = 2\n"),
+        ("return UNUSED", "return 7"),
+        ("return UNUSED", "rounded = UNUSED\n    return rounded"),
+        ('"few-turns"', '"fewer"'),
+        (", ceil", ""),
+        ("import Arrival, Reward", "import Arrival, Bump, Reward"),
+        ("print(REWARD)", "print(7)"),
+        ("\n\n\nclass Base", "\n\n\n# so that halves are told\n\n\nclass Base"),
+    ],
+)
+def test_the_rest_of_the_file_is_not(edit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = code_of(imported(tmp_path / "before.py", monkeypatch).Turning)
+    assert before == code_of(imported(tmp_path / "after.py", monkeypatch, edit).Turning) is not None
+
+
+def test_ends_of_lines_do_not_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = imported(tmp_path / "turning.py", monkeypatch)
+    before = code_of(module.Turning)
+    (tmp_path / "turning.py").write_bytes(SOURCE.replace("\n", "\r\n").encode())
+    assert code_of(module.Turning) == before
+
+
+def test_a_base_in_another_file_is_part_of_the_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    codes = set()
+    for number, edits in enumerate(([], [DEARER])):
+        base = imported(tmp_path / f"{number}.py", monkeypatch, *edits).Turning
+        codes.add(code_of(type("Derived", (base,), {"__module__": "somewhere"})))
+    assert len(codes) == 2 and None not in codes
+
+
+def test_code_that_cannot_be_had_or_is_ours_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert code_of(Zones) is None
+    assert code_of(type("Abstract", (Term, ABC), {"__module__": "clearway.reward"})) is None
+    assert code_of(type("Made", (Term,), {})) is None
+    assert code_of(type("Made", (Term,), {"__module__": "not_imported"})) is None
+    module = imported(tmp_path / "turning.py", monkeypatch)
+    (tmp_path / "turning.py").write_text("def broken(:")
+    assert code_of(module.Turning) is None
+    (tmp_path / "turning.py").write_bytes(b"\xff\x00")
+    assert code_of(module.Turning) is None
+    (tmp_path / "turning.py").unlink()
+    assert code_of(module.Turning) is None
+
+
+def test_a_cell_of_a_notebook_is_a_file_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its module has no file, but the lines of every cell are kept."""
+    codes = []
+    for number, source in enumerate((SOURCE, SOURCE.replace(*DEARER), SOURCE.replace("print", "repr"))):
+        module, cell = ModuleType(NAME), f"<cell {number}>"
+        monkeypatch.setitem(sys.modules, NAME, module)
+        monkeypatch.setitem(linecache.cache, cell, (len(source), None, source.splitlines(keepends=True), cell))
+        exec(compile(source, cell, "exec"), vars(module))
+        codes.append(code_of(module.Turning))
+    assert None not in codes
+    assert codes[0] != codes[1] and codes[0] == codes[2]
