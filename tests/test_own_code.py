@@ -1,12 +1,13 @@
 import linecache
 import sys
 from abc import ABC
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-from clearway.own_code import code_of
+from clearway.own_code import code_of, not_importable
 from clearway.reward import Term, Zones
 from helpers.own_terms import DEARER, NAME, SOURCE, imported
 
@@ -94,3 +95,14 @@ def test_a_cell_of_a_notebook_is_a_file_too(monkeypatch: pytest.MonkeyPatch) -> 
         codes.append(code_of(module.Turning))
     assert None not in codes
     assert codes[0] != codes[1] and codes[0] == codes[2]
+
+
+def test_where_no_process_can_import_a_class_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
+    class Inner(Term):
+        pass
+
+    started = type("Started", (Term,), {"__module__": "__main__"})
+    assert not_importable(Inner) == not_importable(Inner, main_too=True) == "inside a function"
+    assert not_importable(started) == "in the program that was started"
+    assert not_importable(started, main_too=True) == not_importable(Zones) == ""

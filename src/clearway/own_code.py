@@ -1,4 +1,4 @@
-"""Classes of somebody's own, such as terms of a reward: what their code is."""
+"""Classes of somebody's own, such as terms of a reward: their code, and whether other processes can import them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 
 DIGEST_LENGTH = 16
+MAIN = "__main__"
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
@@ -24,6 +25,18 @@ def code_of(kind: type) -> str | None:
     """
     parts = [part for own in kind.__mro__ if not _has_a_version(own) for part in _parts(own)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:DIGEST_LENGTH] if parts else None
+
+
+def not_importable(kind: type, main_too: bool = False) -> str:
+    """Where a class stands, if other processes cannot import it from there; else empty.
+
+    Args:
+        kind: the class.
+        main_too: they import the program that was started, too.
+    """
+    if "<locals>" in kind.__qualname__:
+        return "inside a function"
+    return "in the program that was started" if kind.__module__ == MAIN and not main_too else ""
 
 
 def _has_a_version(kind: type) -> bool:

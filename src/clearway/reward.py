@@ -20,7 +20,7 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from clearway.errors import ClearwayError, PluginError, kind_and_reason
-from clearway.own_code import code_of
+from clearway.own_code import code_of, not_importable
 from clearway.plugins import find_plugin, imported, load_plugin, offered
 from clearway.spelling import did_you_mean
 
@@ -327,6 +327,18 @@ class Reward:
             for term in self._others()
         }
         return {path: code for path, code in told.items() if code is not None}
+
+    def check_sent(self, main_too: bool = False) -> None:
+        """Refuse a reward with a term that other processes cannot import; `main_too`: they import our program, too.
+
+        Raises:
+            RewardError: there is one.
+        """
+        for kind in map(type, self._others()):
+            if where := not_importable(kind, main_too):
+                problem = f"its term {kind.__name__} stands {where}, which worker processes cannot import"
+                remedy = f"Put it into a module of its own, such as {kind.__name__.lower()}.py, and import it"
+                raise RewardError(f"reward {self.name}: {problem}. {remedy}")
 
     def _others(self) -> list[Term]:
         return [term for term in self.terms if type(term) not in TERMS.values()]

@@ -15,6 +15,7 @@ from clearway.learn.run_folder import RunFolder
 from clearway.learn.run_record import record_of
 from clearway.learn.train import RunRequest
 from clearway.learn.train import train as train_run
+from clearway.learn.workers import train_by_workers
 from clearway.reward import COLLISION_AWARE, SHORTEST, Arrival, Moves, Reward, RewardError, Term, Time
 from clearway.scenes.thor_v1 import write_scene
 from clearway.views.seen import made_in_training
@@ -65,6 +66,35 @@ def test_a_run_of_a_term_whose_code_has_changed_does_not_go_on_but_can_be_tried(
     monkeypatch.delitem(own_terms.sys.modules, own_terms.NAME)
     found = clearway.evaluate(tmp_path / "run", scenes=corridor, episodes=1, step_limit=5).evaluations
     assert {str(one.trained.reward) for one in found if one.trained} == {str(mine)}
+
+
+def test_workers_import_the_terms_of_a_reward(corridor, tmp_path, monkeypatch) -> None:
+    """Those of this machine import the program, too, where it is a file."""
+
+    @dataclass(frozen=True)
+    class Inner(Term):
+        def __call__(self, earned: np.ndarray, moves: Moves) -> np.ndarray:
+            return earned
+
+    rooms, two = [corridor, replace(corridor, name="other")], {"workers": 2, "out": tmp_path / "run", **SMALL}
+    with pytest.raises(RewardError, match="its term Inner stands inside a function, which worker processes cannot"):
+        clearway.train(rooms, reward=Reward("inner", (Inner(), Arrival())), **two)
+    turning = own_terms.imported(tmp_path / "turning.py", monkeypatch)
+    monkeypatch.setattr(turning.Turning, "__module__", "__main__")
+    request = RunRequest(rooms, {room.name: [8] for room in rooms}, small_learner(), turning.REWARD)
+    request.check(workers=1, ray="local")
+    request.check(workers=2)
+    with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
+        request.check(workers=2, ray="local")
+    monkeypatch.setattr(training, "train_by_workers", lambda *_, **__: pytest.fail("asked for workers"))
+    with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
+        clearway.train(rooms, reward=turning.REWARD, ray="local", **two)
+    with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
+        train_by_workers(request, tmp_path / "run", 2, ray="local")
+    monkeypatch.delattr(own_terms.sys.modules["__main__"], "__file__")
+    with pytest.raises(RewardError, match="its term Turning stands in the program that was started"):
+        request.check(workers=2)
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_run_folder_is_one_like_any_other_and_goes_on(corridor, tmp_path) -> None:

@@ -21,12 +21,15 @@ from clearway.errors import SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
+from clearway.experiments.groups import all_jobs, compared
 from clearway.experiments.plan import Job
 from clearway.experiments.reproduce import ReproduceRequest
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
+from clearway.reward import RewardError
 from clearway.scenes.scene import Scene
 from clearway.scenes.thor_v1 import write_scene
+from helpers import own_terms
 from helpers.plugin_package import write_package
 from helpers.small_runs import small_learner
 from helpers.small_setting import BUDGET, do_here, small_rooms
@@ -366,6 +369,31 @@ def test_what_cannot_be_asked_of_the_scenes_is_refused_and_not_kept(
         reproduce.reproduce(request)
     found = reproduce.reproduce(replace(request, names=("fig3",)))
     assert [section.name for section in found.sections] == ["fig3"]
+
+
+def test_a_reward_that_no_worker_could_import_is_refused_before_anything_is_trained(
+    dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A reproduction that is complete needs no worker."""
+    reward = own_terms.imported(tmp_path / "turning.py", monkeypatch).REWARD
+    monkeypatch.setitem(
+        EXPERIMENTS, "fig3", replace(EXPERIMENTS["fig3"], jobs=lambda found: all_jobs(compared(found, (reward,))))
+    )
+    request = ReproduceRequest(("fig3",), tmp_path / "out", "smoke", sorted(dumps.iterdir()), seeds=1)
+    monkeypatch.setattr(own_terms.sys.modules[own_terms.NAME].Turning, "__module__", "__main__")
+    monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: pytest.fail("asked for workers"))
+    told = (
+        "^reward few-turns: its term Turning stands in the program that was started, which worker processes cannot "
+        "import. Put it into a module of its own, such as turning.py, and import it$"
+    )
+    for ray in (None, "local"):
+        with pytest.raises(RewardError, match=told):
+            reproduce.reproduce(replace(request, ray=ray))
+    assert not (tmp_path / "out" / "runs").exists()
+    assert not (tmp_path / "out" / reproduce.REQUEST_FILE).exists()
+    monkeypatch.setattr(reproduce, "is_done", lambda out, job: True)
+    monkeypatch.setattr(reproduce, "run_jobs", lambda out, jobs, **_: jobs and pytest.fail("asked for workers"))
+    assert reproduce.reproduce(request).jobs
 
 
 def test_the_command_that_ends_last_reports_what_others_asked_for_meanwhile(

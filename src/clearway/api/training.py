@@ -197,7 +197,7 @@ def train(
     perturbations = perturbations_asked(perturb)
     if (count := _takes_asked(perturbations, takes)) is not None:  # none yet, to be refused before they are taken
         request = replace(request, takes=(), takes_made=made_in_training(perturbations, count, number))
-    _check(request, kept, workers=processes, resume=resume, track=track, copy_to=copied)
+    _check(request, kept, workers=processes, ray=ray, resume=resume, track=track, copy_to=copied)
     if count is not None:
         request = replace(request, takes=_takes(request, perturbations, count, show_progress))
 
@@ -276,13 +276,14 @@ def _check(
     folder: Path | None,
     *,
     workers: int,
+    ray: str | None,
     resume: bool,
     track: TrackerName | None,
     copy_to: str | None,
 ) -> None:
     """Refuse, before pictures are taken, most of what training would refuse after it. Raises ClearwayError."""
     check_tracker(track)
-    request.check(workers)
+    request.check(workers, ray)
     if folder is None:
         return
     if request.takes is not None:

@@ -101,15 +101,18 @@ def reproduce(
         tell: told in a line, before the first run, how long all will take on this machine; None: nobody asks.
 
     Raises:
-        ClearwayError: a scene cannot be had, or a run failed; what is complete stays.
+        ClearwayError: a scene cannot be had, no process could import a reward's terms, or a run failed; what is
+            complete stays.
         KeyboardInterrupt: the user interrupted; the same command goes on.
     """
     setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
+    left = [job for job in jobs if not is_done(request.out, job)]
+    for job in left:
+        job.run.reward.check_sent()
     kept = request.out / REQUEST_FILE
     with locked(kept), written_whole(kept) as part:  # none of two that begin together is lost
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
-    left = [job for job in jobs if not is_done(request.out, job)]
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
     if tell is not None:
         tell(told_time(request.out, jobs, left, workers, request.threads))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -90,17 +91,20 @@ class RunRequest:
         """The reward as training pays it, see `paid_by`."""
         return paid_by(self.learner, self.reward)
 
-    def check(self, workers: int) -> None:
-        """Refuse what so many workers cannot train, before anything that takes long.
+    def check(self, workers: int, ray: str | None = None) -> None:
+        """Refuse what so many workers, here or on a Ray cluster, cannot train, before anything that takes long.
 
         Raises:
             RunError: the learner, its settings or the scenes are not for so many workers, or there is no such device.
+            RewardError: workers cannot import a term of the reward.
             ClearwayError: the learner cannot be paid so.
         """
         usable_device(self.device)
         _ = self.paid
         if workers == 1:
             return
+        main_too = ray is None and hasattr(sys.modules["__main__"], "__file__")  # workers here run a program's file
+        self.reward.check_sent(main_too)
         states = [scene.state_count for scene in self.scenes]
         check_scenes(len(states), workers)
         with faults_of(self.learner, "check_workers"):

@@ -102,9 +102,10 @@ def train_by_workers(
 
     Raises:
         RunError, KeyboardInterrupt: as of `train.train`; or workers were lost again and again.
+        RewardError: no worker could import a term of the reward.
     """
     check_tracker(track)
-    request.check(workers)
+    request.check(workers, ray)
     if ray is None:
         check_gpus(request.device, workers)
     folder = RunFolder(out)
