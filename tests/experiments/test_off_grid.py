@@ -158,7 +158,7 @@ def test_scenes_that_are_no_rooms_are_left_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("encoder", "why"), [(None, "no record of its encoder"), (depth_grid.find_record(), "sees depth")]
+    ("encoder", "why"), [(None, "no features by a known encoder"), (depth_grid.find_record(), "sees depth")]
 )
 def test_rooms_whose_pictures_cannot_be_encoded_again_are_left_out(
     setting: Setting, encoder: EncoderRecord | None, why: str
@@ -196,7 +196,7 @@ def test_what_was_walked_is_told_where_no_more_could_be(setting: Setting) -> Non
     assert off_grid.jobs(gone) == others
     lacking = off_grid.section(gone)
     assert lacking.missing == (job.run.name,)
-    assert "No more can be walked here: scene walkable has no record" in lacking.text
+    assert "No more can be walked here: scene walkable has no features by a known encoder" in lacking.text
     (told,) = _gathered(ReproduceRequest(["off-grid"], setting.out, "smoke"), gone).sections
     assert told.missing == (job.run.name,)  # though it is no job here
 
