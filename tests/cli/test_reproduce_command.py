@@ -342,6 +342,35 @@ def test_requests_agree_after_a_trip_through_their_file(tmp_path: Path) -> None:
     assert list(reproduce._with_earlier(respelt).names) == ["table1", "fig3"]
 
 
+def test_a_report_that_takes_another_s_place_is_told(
+    clearway, small, first, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
+    words = *first.words, "--learners", "default", "--out", out
+    told = f"warning: {out} held a reproduction of fig5, seed 0; this one takes its place in the report. Its runs stay;"
+    same = clearway("reproduce", "fig3", *words)
+    assert same.code == 0 and "takes its place" not in same.err
+    named = told.replace("fig5", "fig3, fig5")
+    other = clearway("reproduce", "fig3", *words, "--seeds", 2, "--first-seed", 1)
+    assert f"{named} use another --out to keep both" in other.err.splitlines()
+    back = clearway("reproduce", "fig5", *words)
+    assert told.replace("fig5, seed 0", "fig3, seeds 1 to 2") in back.err
+
+
+def test_a_request_that_may_not_warn_leaves_the_one_before(
+    dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduce, "run_jobs", lambda *_, **__: None)
+    request = ReproduceRequest(
+        names=("fig3",), out=tmp_path / "out", budget="smoke", dumps=sorted(dumps.iterdir()), seeds=1
+    )
+    reproduce.reproduce(request)
+    before = (tmp_path / "out" / reproduce.REQUEST_FILE).read_bytes()
+    with pytest.raises(UserWarning, match="held a reproduction of fig3, seed 0; this one takes its place"):
+        reproduce.reproduce(replace(request, seeds=2))
+    assert (tmp_path / "out" / reproduce.REQUEST_FILE).read_bytes() == before
+
+
 def test_seeds_begin_where_they_are_told_to(dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Job] = []
     monkeypatch.setattr(reproduce, "run_jobs", lambda _, jobs, **__: asked.extend(jobs))

@@ -104,6 +104,9 @@ def reproduce(
         ClearwayError: a scene cannot be had, no process could import a reward's terms, or a run failed; what is
             complete stays.
         KeyboardInterrupt: the user interrupted; the same command goes on.
+
+    Warns:
+        UserWarning: the folder holds another reproduction, whose report this one's replaces.
     """
     setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
@@ -112,6 +115,7 @@ def reproduce(
         job.run.reward.check_sent()
     kept = request.out / REQUEST_FILE
     with locked(kept), written_whole(kept) as part:  # none of two that begin together is lost
+        _warn_of_another(request)
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
     if tell is not None:
@@ -172,16 +176,32 @@ def _checked(request: ReproduceRequest) -> ReproduceRequest:
 
 def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
     """The request, and the experiments that the folder's last one asked for where all else is alike."""
-    try:
-        earlier = _read_request(request.out)
-        same = _question(request) == _question(earlier)
-    except RunError:  # there is none, or none that could be gone on with: this one takes its place
-        return request
-    if not same:
+    earlier, same = _earlier(request)
+    if earlier is None or not same:
         return request
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
     return replace(request, names=in_order(names), commands=tuple(commands))
+
+
+def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
+    """The folder's last request, None where there is none that could be gone on with; and whether it asks the same."""
+    try:
+        earlier = _read_request(request.out)
+        return earlier, _question(request) == _question(earlier)
+    except RunError:
+        return None, False
+
+
+def _warn_of_another(request: ReproduceRequest) -> None:
+    """Warn where the folder's last request asks something else, so that its report is replaced."""
+    earlier, same = _earlier(request)
+    if earlier is None or same:
+        return
+    first, count = earlier.first_seed, earlier.seeds or BUDGETS[earlier.budget].seeds
+    seeds = f"seed {first}" if count == 1 else f"seeds {first} to {first + count - 1}"
+    told = f"{request.out} held a reproduction of {', '.join(earlier.names)}, {seeds}; this one takes its place"
+    warnings.warn(f"{told} in the report. Its runs stay; use another --out to keep both", stacklevel=3)
 
 
 def _question(request: ReproduceRequest) -> str:
