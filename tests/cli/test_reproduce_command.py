@@ -371,6 +371,25 @@ def test_a_request_that_may_not_warn_leaves_the_one_before(
     assert (tmp_path / "out" / reproduce.REQUEST_FILE).read_bytes() == before
 
 
+@pytest.mark.parametrize("stopped", ["run_jobs", "told_time", "_gathered"])
+def test_who_interrupts_it_is_told_how_to_go_on(
+    clearway, first, out: Path, stopped: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reproduce, stopped, interrupted)
+    gone, _ = sorted((out / "runs").iterdir())
+    if stopped != "_gathered":
+        shutil.rmtree(gone)
+    answer = clearway("reproduce", "fig5", *first.words, "--learners", "default", "--out", out)
+    done = 2 if stopped == "_gathered" else 1
+    assert (answer.code, answer.out) == (130, "")
+    *_, told, last = answer.err.splitlines()
+    assert told == f"{out}: interrupted; {done} of 2 runs are complete. The same command goes on"
+    assert last == "interrupted"
+
+
 def test_seeds_begin_where_they_are_told_to(dumps: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Job] = []
     monkeypatch.setattr(reproduce, "run_jobs", lambda _, jobs, **__: asked.extend(jobs))

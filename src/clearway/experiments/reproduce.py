@@ -98,7 +98,8 @@ def reproduce(
     Args:
         request: see there.
         show_progress: draw progress bars.
-        tell: told in a line, before the first run, how long all will take on this machine; None: nobody asks.
+        tell: told in a line, before the first run, how long all will take on this machine, and where the user
+            interrupts it, how to go on; None: nobody asks.
 
     Raises:
         ClearwayError: a scene cannot be had, no process could import a reward's terms, or a run failed; what is
@@ -117,12 +118,29 @@ def reproduce(
     with locked(kept), written_whole(kept) as part:  # none of two that begin together is lost
         _warn_of_another(request)
         part.write_text(json.dumps(_request_json(_with_earlier(request)), indent=2) + "\n", encoding="utf-8")
+    try:
+        _run_left(request, jobs, left, show_progress, tell)
+        return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
+    except KeyboardInterrupt:
+        if tell is not None:
+            done = sum(is_done(request.out, job) for job in jobs)
+            tell(f"{request.out}: interrupted; {done} of {len(jobs)} runs are complete. The same command goes on")
+        raise
+
+
+def _run_left(
+    request: ReproduceRequest,
+    jobs: Sequence[Job],
+    left: Sequence[Job],
+    show_progress: bool,
+    tell: Callable[[str], None] | None,
+) -> None:
+    """Do what is left of the jobs; other arguments as of `reproduce`."""
     workers = request.workers if request.ray else affordable_workers(request.workers, request.threads)
     if tell is not None:
         tell(told_time(request.out, jobs, left, workers, request.threads))
     with board(request.out, jobs, show_progress) as show:
         run_jobs(request.out, left, workers=workers, threads=request.threads, show=show, ray=request.ray)
-    return _gathered(_with_earlier(request), setting)  # others may have been asked for meanwhile
 
 
 def gather(out: Path) -> Reproduction:
