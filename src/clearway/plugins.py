@@ -13,6 +13,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Collection
 from dataclasses import dataclass
+from traceback import walk_tb
 from typing import Literal, get_args
 
 from clearway.errors import PluginError, kind_and_reason
@@ -111,6 +112,16 @@ def find_plugin(kind: Kind, name: str) -> Plugin | None:
     return plugin
 
 
+def place_in(plugin: Plugin, fault: BaseException) -> str:
+    """Where in a plugin's package something was raised, " at FILE:LINE"; empty where it was not raised there."""
+    package = plugin.target.partition(":")[0].partition(".")[0]
+    found = ""
+    for frame, line in walk_tb(fault.__traceback__):
+        if str(frame.f_globals.get("__name__")).partition(".")[0] == package:  # the last one is the innermost
+            found = f" at {frame.f_code.co_filename}:{line}"
+    return found
+
+
 def load_plugin(plugin: Plugin) -> object:
     """What a plugin is, imported.
 
@@ -123,8 +134,8 @@ def load_plugin(plugin: Plugin) -> object:
         return EntryPoint(plugin.name, plugin.target, f"clearway.{plugin.kind}").load()
     except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
         remedy = f"Ask its authors, or uninstall {plugin.package}"
-        reason = kind_and_reason(fault)
-        raise PluginError(f"{plugin}: {plugin.target} cannot be imported ({reason}). {remedy}") from fault
+        told = f"cannot be imported ({kind_and_reason(fault)}){place_in(plugin, fault)}"
+        raise PluginError(f"{plugin}: {plugin.target} {told}. {remedy}") from fault
 
 
 def plugin_of(kind: Kind, name: str) -> Plugin:

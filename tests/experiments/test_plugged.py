@@ -1,5 +1,6 @@
 """Experiments of other packages: what they give is checked, what they raise is told as their fault."""
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -100,11 +101,33 @@ def test_what_cannot_be_used_is_told_with_the_package(offered, tmp_path: Path, m
     assert "\n" not in str(caught.value)
 
 
+def test_a_fault_is_told_with_its_innermost_line_in_the_package(offered, tmp_path: Path) -> None:
+    """Not the line of the standard library that raises it, nor the one further out that called."""
+    calls = "(lambda text:\n__import__('json').loads(text))"  # the second line calls
+    found = offered(f"Experiment(lambda setting: [], lambda setting:\n{calls}(''))")
+    line = MADE.count("\n") + 3
+    file = re.escape(str(tmp_path / "site" / "others.py"))
+    with pytest.raises(
+        PluginError, match=rf"section failed \(JSONDecodeError: .*\) at {file}:{line}\. Ask its authors"
+    ):
+        found.section(small_setting(tmp_path, seeds=1))
+    sys.modules.pop("others")
+    with pytest.raises(PluginError, match=rf"cannot be imported \(NameError: .*\) at {file}:{line - 2}\. Ask its"):
+        (tmp_path / "site" / "others.py").write_text("\n" * (line - 3) + "Made = nothing\n")
+        experiment("odd")
+
+
+def test_a_fault_that_is_not_raised_in_the_package_names_no_line(offered, tmp_path: Path) -> None:
+    found = offered("Experiment(lambda setting: None, None)")
+    with pytest.raises(PluginError, match=r"jobs failed \(TypeError: .*\)\. Ask its authors"):
+        found.jobs(small_setting(tmp_path, seeds=1))
+
+
 def test_a_learner_of_a_package_that_fails_at_its_reward_is_told_of_by_the_tables(tmp_path: Path, monkeypatch) -> None:
     offer_algorithm(tmp_path, monkeypatch, with_body("def paid(self, reward): 1 / 0"))
     setting = replace(small_setting(tmp_path, seeds=1), learners={"odd": chosen_learner("odd")})
     groups = compared(setting, (COLLISION_AWARE,))
-    with pytest.raises(PluginError, match=rf"^{SOURCE}: paid failed \(ZeroDivisionError: division by zero\)\. Ask"):
+    with pytest.raises(PluginError, match=rf"^{SOURCE}: paid failed \(ZeroDivisionError: division by zero\) at "):
         navigation_tables("odd", "Odd", setting, setting.targets, groups, {})
 
 

@@ -284,7 +284,10 @@ def test_interruptions_pass_and_faults_of_ours_keep_their_traceback(tmp_path, mo
 @pytest.mark.parametrize(
     ("gives", "told"),
     [
-        ("1 / 0", rf"{SOURCE}: on_poses failed \(ZeroDivisionError: division by zero\)\. Ask its authors"),
+        (
+            "1 / 0",
+            rf"{SOURCE}: on_poses failed \(ZeroDivisionError: division by zero\) at .*/odd_learner\.py:\d+\. Ask its",
+        ),
         ("None", f"{SOURCE}: gives None, expected an object with sees, reset and act"),
         (
             "clearway.agents.by_pose.PoseAgent(world, lambda history, target: 1 / 0)",

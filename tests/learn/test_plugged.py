@@ -17,7 +17,7 @@ from clearway.learn.plugged import ARGUMENTS, faults_of
 from clearway.learn.ppo import PPO
 from clearway.learn.settings import with_settings
 from helpers.made import corridor_scene
-from helpers.own_algorithm import CLASS, OPTIONAL, SMALL, SOURCE, offer_algorithm, with_body
+from helpers.own_algorithm import CLASS, HEAD, OPTIONAL, SMALL, SOURCE, offer_algorithm, with_body
 from helpers.small_runs import CORRIDOR_TARGETS
 
 UNDECORATED = CLASS.replace("@dataclass(frozen=True)\n", "")
@@ -161,7 +161,8 @@ def test_from_python_settings_go_by_their_types_too(optional) -> None:
 def test_what_a_class_raises_of_values_is_told_as_its_fault(tmp_path, monkeypatch) -> None:
     body = "heat: int = 1\ndef __post_init__(self):\n    if self.heat > 1:\n        raise ValueError('too\\nhot')"
     offer_algorithm(tmp_path, monkeypatch, with_body(body))
-    told = rf"^{SOURCE}: settings failed \(ValueError: too hot\)\. Ask its authors"
+    line = f"{HEAD}{with_body(body)}".partition("raise")[0].count("\n") + 1
+    told = rf"^{SOURCE}: settings failed \(ValueError: too hot\) at .*/odd_learner\.py:{line}\. Ask its authors"
     for set_hot in (
         lambda: chosen_learner("odd", settings={"heat": 2}),
         lambda: with_settings(algorithm("odd")(), ["heat=2"]),

@@ -14,7 +14,7 @@ from clearway.experiments.experiment import Experiment
 from clearway.experiments.plan import Job
 from clearway.experiments.section import Claim, ReportFigure, ReportMap, ReportTable, Section, Verdict
 from clearway.experiments.setting import Setting
-from clearway.plugins import Plugin, load_plugin
+from clearway.plugins import Plugin, load_plugin, place_in
 from clearway.scenes.parts import is_name
 
 PARTS = {"tables": ReportTable, "figures": ReportFigure, "maps": ReportMap, "claims": Claim}
@@ -89,4 +89,5 @@ def _faults_of(plugin: Plugin, what: str) -> Iterator[None]:
     except ClearwayError:
         raise
     except (Exception, SystemExit) as fault:  # another's code: anything can come of it; the user is told whose
-        raise PluginError(f"{plugin}: {what} failed ({kind_and_reason(fault)}). Ask its authors") from fault
+        told = f"{what} failed ({kind_and_reason(fault)}){place_in(plugin, fault)}"
+        raise PluginError(f"{plugin}: {told}. Ask its authors") from fault

@@ -14,7 +14,7 @@ from clearway.errors import ClearwayError, PluginError, RunError, is_out_of_memo
 from clearway.learn.kinds import field_types
 from clearway.learn.learner import Learner
 from clearway.learn.peers import LostPeer
-from clearway.plugins import Plugin, find_plugin, load_plugin
+from clearway.plugins import Plugin, find_plugin, load_plugin, place_in
 from clearway.reward import Reward
 
 CONSTANTS = {"algorithm": "ClassVar[str]", "acts_on": "ClassVar[str]", "sees_takes": "ClassVar[bool]"}
@@ -88,8 +88,8 @@ def faults_of(learner: Learner | type[Learner], what: str, passing: tuple[type[E
         plugin = None if passes else find_plugin("algorithms", learner.algorithm)
         if plugin is None:
             raise
-        reason = kind_and_reason(fault)
-        raise PluginError(f"{plugin}: {what} failed ({reason}). Ask its authors") from fault
+        told = f"{what} failed ({kind_and_reason(fault)}){place_in(plugin, fault)}"
+        raise PluginError(f"{plugin}: {told}. Ask its authors") from fault
 
 
 def paid_by(learner: Learner, reward: Reward) -> Reward:
