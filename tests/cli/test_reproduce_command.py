@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from clearway.choices import BudgetName, LearnerName
-from clearway.errors import SceneError
+from clearway.errors import ClearwayError, SceneError
 from clearway.experiments import reproduce, setting
 from clearway.experiments.budget import BUDGETS
 from clearway.experiments.catalogue import EXPERIMENTS
@@ -399,8 +399,61 @@ def test_seeds_begin_where_they_are_told_to(dumps: Path, tmp_path: Path, monkeyp
     assert reproduce.reproduce(request).setting.seeds == (5, 6)
     assert {job.run.seed for job in asked} == {5, 6}
     assert reproduce.gather(tmp_path).setting.seeds == (5, 6)
-    with pytest.raises(ValueError, match="-1 where a number of at least 0 is expected"):
-        reproduce._checked(replace(request, first_seed=-1))
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({"budget": "papr"}, "budget='papr': expected one of smoke, paper. Did you mean paper?"),
+        ({"learners": ["defualt"]}, "learners='defualt': expected one of paper, .*. Did you mean default?"),
+        ({"learners": "default"}, "learners='default': expected a list"),
+        ({"learners": []}, r"learners=\[\]: expected some of paper, "),
+        ({"rooms": ()}, r"rooms=\(\): expected some of bathroom, "),
+        ({"names": "fig3"}, "names='fig3': expected a list"),
+        ({"names": []}, "names: no experiment is named"),
+        ({"names": ["fig3", 3]}, "names: holds 3, expected texts"),
+        ({"names": ["fig8"]}, "experiment 'fig8': no such experiment. Did you mean fig"),
+        ({"changes": "lr_start=0.002"}, "changes='lr_start=0.002': expected a list"),
+        ({"dumps": "hall.h5"}, "dumps='hall.h5': expected a list"),
+        ({"dumps": [3]}, "dumps: holds 3, expected a path"),
+        ({"out": None}, "out: holds None, expected a path"),
+        ({"encoder": 7}, "encoder=7: expected a text"),
+        ({"ray": True}, "ray=True: expected a text"),
+        ({"seeds": 0}, "seeds=0: expected a whole number of at least 1"),
+        ({"seeds": True}, "seeds=True: expected a whole number"),
+        ({"first_seed": -1}, "first_seed=-1: expected a whole number of at least 0"),
+        ({"first_seed": None}, "first_seed=None: expected a whole number"),
+        ({"frames": 1.5}, "frames=1.5: expected a whole number"),
+        ({"workers": 0}, "workers=0: expected a whole number of at least 1"),
+        ({"threads": 0}, "threads=0: expected a whole number of at least 1"),
+    ],
+)
+def test_python_is_told_what_is_wrong_and_the_folder_stays_as_it_was(
+    first, out: Path, asked: dict[str, object], told: str
+) -> None:
+    def files() -> dict[Path, bytes]:
+        return {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+    before = files()
+    scenes = sorted(first.words[1].iterdir())
+    request = {"names": ["fig5"], "out": out, "budget": "smoke", "dumps": scenes, "seeds": 1, "learners": ["default"]}
+    with pytest.raises(ClearwayError, match=told) as caught:
+        reproduce.reproduce(ReproduceRequest(**request | asked))
+    assert "\n" not in str(caught.value)
+    assert files() == before
+
+
+def test_an_experiment_that_nobody_offers_is_told_before_the_scenes_are_had(tmp_path: Path) -> None:
+    request = ReproduceRequest(["fig5", "fig9"], tmp_path, "smoke", dumps=[tmp_path / "nowhere.h5"])
+    with pytest.raises(ClearwayError, match="experiment 'fig9': no such experiment"):
+        reproduce.reproduce(request)
+
+
+def test_python_takes_paths_as_texts(first, out: Path) -> None:
+    scenes = sorted(map(str, first.words[1].iterdir()))
+    found = reproduce.reproduce(ReproduceRequest(["fig5"], str(out), "smoke", scenes, seeds=1, learners=["default"]))
+    assert not found.sections[0].missing
+    assert reproduce.gather(str(out)).sections == found.sections
 
 
 def test_what_cannot_be_asked_of_the_scenes_is_refused_and_not_kept(

@@ -67,7 +67,7 @@ class Reproduce:
         from clearway.rooms.build import check_mujoco
 
         check_mujoco()
-        from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
+        from clearway.experiments.catalogue import EXPERIMENTS, in_order
         from clearway.experiments.reproduce import ReproduceRequest, reproduce
 
         check_at_least(1, threads=self.threads, seeds=self.seeds, workers=self.workers, frames=self.frames)
@@ -81,8 +81,6 @@ class Reproduce:
         if self.workers is not None and self.ray not in (None, "local"):
             raise ClearwayError(f"--workers are this machine's, and --ray {self.ray} says how many fit. Leave one out")
         names = in_order({*self.names, *(EXPERIMENTS if "all" in self.names else ())} - {"all"})
-        for name in names:
-            experiment(name)
         request = ReproduceRequest(
             names=names,
             out=self.out,

@@ -7,9 +7,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import get_args
 
-from clearway.choices import BudgetName, LearnerName, RoomName
 from clearway.errors import ClearwayError, RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
@@ -19,49 +17,11 @@ from clearway.experiments.expected_time import told_time
 from clearway.experiments.job import is_done, unfinished
 from clearway.experiments.jobs import affordable_workers, run_jobs
 from clearway.experiments.plan import Job, merged
+from clearway.experiments.request import ReproduceRequest
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting, changed_learners, prepare
 from clearway.files import locked, read_json, written_whole
 from clearway.torch_threads import torch_threads
-
-
-@dataclass(frozen=True)
-class ReproduceRequest:
-    """What to reproduce.
-
-    Attributes:
-        names: of the experiments.
-        out: folder of everything; what is complete there is kept.
-        budget: name of the budget.
-        dumps: scene files; none: the default rooms.
-        rooms: which of the default rooms; None: as the budget says.
-        frames: of every learner; None: as the budget says.
-        encoder: for the default rooms.
-        seeds: how many; None: as the budget says.
-        first_seed: of them; the others follow it.
-        learners: names among `setting.LEARNERS`.
-        changes: of settings of every learner, such as "lr_start=0.002".
-        workers: jobs side by side; None: as many as cores and memory allow.
-        threads: of each job.
-        commands: that asked for it, for the report.
-        ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
-    """
-
-    names: Sequence[str]
-    out: Path
-    budget: BudgetName
-    dumps: Sequence[Path] = ()
-    rooms: Sequence[RoomName] | None = None
-    frames: int | None = None
-    encoder: str = "auto"
-    seeds: int | None = None
-    first_seed: int = 0
-    learners: Sequence[LearnerName] = ("paper", "default")
-    changes: Sequence[str] = ()
-    workers: int | None = None
-    threads: int = 1
-    ray: str | None = None
-    commands: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -109,6 +69,8 @@ def reproduce(
     Warns:
         UserWarning: the folder holds another reproduction, whose report this one's replaces.
     """
+    for name in request.names:
+        experiment(name)  # who mistypes one need not wait for the scenes
     setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
     left = [job for job in jobs if not is_done(request.out, job)]
@@ -143,13 +105,13 @@ def _run_left(
         run_jobs(request.out, left, workers=workers, threads=request.threads, show=show, ray=request.ray)
 
 
-def gather(out: Path) -> Reproduction:
+def gather(out: Path | str) -> Reproduction:
     """The sections of a reproduction from what is complete by now; trains nothing.
 
     Raises:
         ClearwayError: the folder holds no reproduction, or its scenes cannot be read.
     """
-    request = _read_request(out)
+    request = _read_request(Path(out))
     return _gathered(request, _setting(request, build=False))
 
 
@@ -158,38 +120,11 @@ def _read_request(out: Path) -> ReproduceRequest:
     try:
         content = read_json(path)
         dumps = [out / dump for dump in content.pop("dumps")]  # a record's lie in the folder
-        return _checked(ReproduceRequest(out=out, dumps=dumps, **content))
+        return ReproduceRequest(out=out, dumps=dumps, **content)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise RunError(f"{out}: no reproduction here. Name a folder that clearway reproduce made") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RunError(f"{path}: not readable ({error}). Run clearway reproduce on the folder again") from error
-
-
-def _checked(request: ReproduceRequest) -> ReproduceRequest:
-    """The request, if it is one that a command could make.
-
-    Names of experiments may be unknown here: packages come and go.
-
-    Raises:
-        ValueError: another name is unknown, or a number is none.
-    """
-    choices: tuple[tuple[Sequence[str], Sequence[str]], ...] = (
-        ([request.budget], get_args(BudgetName)),
-        (request.rooms or (), get_args(RoomName)),
-        (request.learners, get_args(LearnerName)),
-    )
-    for given, known in choices:
-        unknown = [name for name in given if name not in known]
-        if unknown:
-            raise ValueError(f"{unknown[0]!r:.40} is none of {', '.join(known)}")
-    for count, least in ((request.frames, 1), (request.seeds, 1), (request.first_seed, 0)):
-        if count is not None and (type(count) is not int or count < least):
-            raise ValueError(f"{count!r:.40} where a number of at least {least} is expected")
-    if not isinstance(request.names, list | tuple) or not request.names:
-        raise ValueError(f"names is {request.names!r:.40}, expected a list of experiments")
-    if not all(isinstance(t, str) for t in (*request.names, request.encoder, *request.changes, *request.commands)):
-        raise ValueError("an experiment's name, the encoder, a change or a command is no text")
-    return request
 
 
 def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:

@@ -1,0 +1,105 @@
+"""What `clearway reproduce` is asked for, checked once for the command line, Python, and what a folder's file says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+from clearway.choices import BudgetName, LearnerName, RoomName
+from clearway.errors import ArgumentError
+from clearway.spelling import did_you_mean
+
+
+@dataclass(frozen=True)
+class ReproduceRequest:
+    """What to reproduce.
+
+    Attributes:
+        names: of the experiments.
+        out: folder of everything, a path or a text; what is complete there is kept.
+        budget: name of the budget.
+        dumps: scene files, paths or texts; none: the default rooms.
+        rooms: which of the default rooms; None: as the budget says.
+        frames: of every learner; None: as the budget says.
+        encoder: for the default rooms.
+        seeds: how many; None: as the budget says.
+        first_seed: of them; the others follow it.
+        learners: names among `setting.LEARNERS`.
+        changes: of settings of every learner, such as "lr_start=0.002".
+        workers: jobs side by side; None: as many as cores and memory allow.
+        threads: of each job.
+        ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
+        commands: that asked for it, for the report.
+
+    Raises:
+        ArgumentError: something of it is of the wrong kind, out of range, or unknown; but names of experiments may be
+            unknown here: packages come and go.
+    """
+
+    names: Sequence[str]
+    out: Path
+    budget: BudgetName
+    dumps: Sequence[Path] = ()
+    rooms: Sequence[RoomName] | None = None
+    frames: int | None = None
+    encoder: str = "auto"
+    seeds: int | None = None
+    first_seed: int = 0
+    learners: Sequence[LearnerName] = ("paper", "default")
+    changes: Sequence[str] = ()
+    workers: int | None = None
+    threads: int = 1
+    ray: str | None = None
+    commands: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        """Texts that name folders and files become paths; all else is checked."""
+        object.__setattr__(self, "out", _path("out", self.out))
+        object.__setattr__(self, "dumps", tuple(_path("dumps", path) for path in _listed("dumps", self.dumps)))
+        _check_words("budget", [self.budget], get_args(BudgetName))
+        _check_words("learners", self.learners, get_args(LearnerName))
+        if self.rooms is not None:
+            _check_words("rooms", self.rooms, get_args(RoomName))
+        for name in ("names", "changes", "commands"):
+            if others := [text for text in _listed(name, getattr(self, name)) if not isinstance(text, str)]:
+                raise ArgumentError(f"{name}: holds {others[0]!r:.40}, expected texts. Correct it")
+        if not self.names:
+            raise ArgumentError("names: no experiment is named. Name some")
+        for name, least in (("frames", 1), ("seeds", 1), ("first_seed", 0), ("workers", 1), ("threads", 1)):
+            _check_number(name, getattr(self, name), least, optional=name not in ("first_seed", "threads"))
+        for name, text in (("encoder", self.encoder), ("ray", self.ray or "")):
+            if not isinstance(text, str):
+                raise ArgumentError(f"{name}={text!r:.40}: expected a text. Correct it")
+
+
+def _path(name: str, given: object) -> Path:
+    if not isinstance(given, str | Path):
+        raise ArgumentError(f"{name}: holds {given!r:.40}, expected a path. Correct it")
+    return Path(given)
+
+
+def _listed(name: str, given: object) -> Sequence[object]:
+    """What is given, a list; a text alone would be taken letter by letter."""
+    if not isinstance(given, list | tuple):
+        raise ArgumentError(f"{name}={given!r:.40}: expected a list. Correct it")
+    return given
+
+
+def _check_words(name: str, given: object, known: Sequence[str]) -> None:
+    """Raise ArgumentError where it is no list of known words, or an empty one."""
+    words = _listed(name, given)
+    unknown = [word for word in words if word not in known]
+    if unknown or not words:
+        one = f"{name}={unknown[0] if unknown else words!r:.40}"
+        told = did_you_mean(unknown[0], known) if unknown else ""
+        raise ArgumentError(f"{one}: expected {'one' if unknown else 'some'} of {', '.join(known)}.{told} Correct it")
+
+
+def _check_number(name: str, given: object, least: int, *, optional: bool) -> None:
+    """Raise ArgumentError where it is no whole number of at least that; None is one where it is optional."""
+    if given is None and optional:
+        return
+    if type(given) is not int or given < least:
+        raise ArgumentError(f"{name}={given!r:.40}: expected a whole number of at least {least}. Correct it")
