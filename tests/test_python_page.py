@@ -132,5 +132,5 @@ def test_runs_and_experiments_of_one_s_own(tmp_path: Path, monkeypatch, capsys) 
     assert claim.text in Path("mine/report.md").read_text()
     assert len(list(Path("mine/runs").iterdir())) == 8
     monkeypatch.undo()
-    with pytest.raises(RunError, match=r"experiment 'mine': no such experiment\..* Use one of table1"):
+    with pytest.raises(RunError, match=r"asks for experiment 'mine', which nothing .* run the program that made this"):
         reproduce.gather(tmp_path / "mine")

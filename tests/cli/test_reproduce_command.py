@@ -1,3 +1,4 @@
+import importlib
 import json
 import os
 import re
@@ -24,6 +25,7 @@ from clearway.experiments.catalogue import EXPERIMENTS
 from clearway.experiments.groups import all_jobs, compared
 from clearway.experiments.plan import Job
 from clearway.experiments.reproduce import ReproduceRequest
+from clearway.experiments.section import Section
 from clearway.learn.presets import DEFAULT, PAPER_A2C, PAPER_A3C
 from clearway.learn.run_folder import RunFolder
 from clearway.reward import RewardError
@@ -167,6 +169,8 @@ FOREIGN = (
     ("frames", 1.5),
     ("encoder", 7),
     ("commands", [3]),
+    ("packages", ["tiny-plugins"]),
+    ("packages", {"fig5": 3}),
 )
 
 
@@ -269,11 +273,32 @@ def test_another_package_s_experiment_stands_after_ours_in_the_report(
     shutil.rmtree(tmp_path / "site")  # uninstalled
     without = clearway("report", out, "--json")
     assert [section["name"] for section in without.json["sections"]] == ["fig5"]
-    assert "the report leaves out what is not known here. experiment 'twice'" in without.err
-    (request,) = json.loads((out / "reproduction.json").read_text())["names"][1:]
-    assert request == "twice"  # it comes back with its package
+    gone = "experiment 'twice' of the package tiny-plugins 1.2, which is not installed here. Install it"
+    assert f"reproduction.json: the report leaves out {gone}" in without.err
+    again = clearway("reproduce", "fig5", *first.words, "--learners", "default", "--out", out)
+    assert gone in again.err  # what others asked for, and whose it was, is kept
     (out / "reproduction.json").write_text((out / "reproduction.json").read_text().replace('"fig5",', ""))
-    assert clearway("report", out).refusal("clearway reproduce", "experiment 'twice': no such experiment")
+    assert clearway("report", out).refusal(f"reproduction.json: asks for {gone}")
+    request = json.loads((out / "reproduction.json").read_text())
+    assert (request["names"], request.pop("packages")) == (["twice"], {"twice": "tiny-plugins 1.2"})
+    (out / "reproduction.json").write_text(json.dumps(request))  # as it was written before, or by a program
+    told = "asks for experiment 'twice', which nothing that is installed here offers. Install the package that does, or"
+    assert clearway("report", out).refusal(told, "run the program that made this folder")
+    write_package(tmp_path / "site", module="1 / 0")
+    importlib.invalidate_caches()
+    sys.modules.pop("tiny_plugins", None)
+    assert clearway("report", out).refusal("asks for experiment twice of the package tiny-plugins 1.2: tiny_plugins:")
+
+
+def test_a_program_s_own_experiment_is_of_no_package(first, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = replace(EXPERIMENTS["fig3"], section=lambda setting: Section("mine", "", ""), jobs=lambda setting: [])
+    scenes = sorted(first.words[1].iterdir())
+    with monkeypatch.context() as program:
+        program.setitem(EXPERIMENTS, "mine", own)
+        reproduce.reproduce(ReproduceRequest(["mine"], out, "smoke", scenes, seeds=1, learners=["default"]))
+    assert json.loads((out / "reproduction.json").read_text())["packages"] == {}
+    with pytest.warns(UserWarning, match="leaves out experiment 'mine', which nothing .* run the program that made"):
+        reproduce.gather(out)
 
 
 def test_two_tables_of_one_name_are_refused(clearway, first, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:

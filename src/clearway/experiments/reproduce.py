@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from clearway.errors import ClearwayError, RunError
+from clearway.errors import PluginError, RunError
 from clearway.experiments.board import board
 from clearway.experiments.budget import BUDGETS
-from clearway.experiments.catalogue import experiment, in_order
+from clearway.experiments.catalogue import EXPERIMENTS, experiment, in_order
 from clearway.experiments.correction import corrected
 from clearway.experiments.expected_time import told_time
 from clearway.experiments.job import is_done, unfinished
@@ -21,6 +21,7 @@ from clearway.experiments.request import ReproduceRequest
 from clearway.experiments.section import Section
 from clearway.experiments.setting import Setting, changed_learners, prepare
 from clearway.files import locked, read_json, written_whole
+from clearway.plugins import find_plugin
 from clearway.torch_threads import torch_threads
 
 
@@ -45,7 +46,7 @@ class Reproduction:
 
 REQUEST_FILE = "reproduction.json"
 HOW_NOT_WHAT = ("out", "workers", "threads", "ray")  # parts of a request that a report does not depend on
-WHO_ASKED = ("names", "commands")  # parts that may differ between requests of one report
+WHO_ASKED = ("names", "commands", "packages")  # parts that may differ between requests of one report
 
 
 def reproduce(
@@ -69,8 +70,7 @@ def reproduce(
     Warns:
         UserWarning: the folder holds another reproduction, whose report this one's replaces.
     """
-    for name in request.names:
-        experiment(name)  # who mistypes one need not wait for the scenes
+    request = replace(request, packages=_packages(request.names))  # who mistypes one need not wait for the scenes
     setting = _setting(request, show_progress=show_progress)
     jobs = planned(setting, request.names)  # before it is kept: what cannot be asked of these scenes is refused
     left = [job for job in jobs if not is_done(request.out, job)]
@@ -134,7 +134,22 @@ def _with_earlier(request: ReproduceRequest) -> ReproduceRequest:
         return request
     names = {*earlier.names, *request.names}
     commands = dict.fromkeys((*earlier.commands, *request.commands))
-    return replace(request, names=in_order(names), commands=tuple(commands))
+    packages = {**earlier.packages, **request.packages}
+    return replace(request, names=in_order(names), commands=tuple(commands), packages=packages)
+
+
+def _packages(names: Sequence[str]) -> dict[str, str]:
+    """The package and its version, by name, of experiments that a package offers.
+
+    Raises:
+        ClearwayError: nobody offers one, or it cannot be used.
+    """
+    found = {}
+    for name in names:
+        experiment(name)
+        if name not in EXPERIMENTS and (plugin := find_plugin("experiments", name)):
+            found[name] = f"{plugin.package} {plugin.version}"
+    return found
 
 
 def _earlier(request: ReproduceRequest) -> tuple[ReproduceRequest | None, bool]:
@@ -203,19 +218,29 @@ def _known(request: ReproduceRequest) -> list[str]:
     Raises:
         ClearwayError: none is left.
     """
-    known, faults = list[str](), list[ClearwayError]()
+    known, faults = list[str](), list[str]()
     for name in request.names:
         try:
             experiment(name)
             known.append(name)
-        except ClearwayError as fault:
-            faults.append(fault)
+        except PluginError as fault:
+            faults.append(str(fault))
+        except RunError:
+            faults.append(_told_gone(name, request.packages.get(name)))
     path = request.out / REQUEST_FILE
     if not known:
-        raise RunError(f"{path}: names nothing that clearway reproduce knows here. {faults[0]}") from faults[0]
-    for unknown in faults:
-        warnings.warn(f"{path}: the report leaves out what is not known here. {unknown}", stacklevel=4)
+        raise RunError(f"{path}: asks for {faults[0]}")
+    for told in faults:
+        warnings.warn(f"{path}: the report leaves out {told}", stacklevel=4)
     return known
+
+
+def _told_gone(name: str, package: str | None) -> str:
+    """What is said of an experiment that nothing here offers, with the remedy."""
+    if package:
+        return f"experiment {name!r:.40} of the package {package:.80}, which is not installed here. Install it"
+    remedy = "Install the package that does, or run the program that made this folder"
+    return f"experiment {name!r:.40}, which nothing that is installed here offers. {remedy}"
 
 
 def _setting(request: ReproduceRequest, *, build: bool = True, show_progress: bool = False) -> Setting:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
@@ -32,6 +32,8 @@ class ReproduceRequest:
         threads: of each job.
         ray: do the jobs on a Ray cluster: "local", "auto" or an address; None: in processes of this machine.
         commands: that asked for it, for the report.
+        packages: that offer experiments among the names, "NAME VERSION" by the experiment's name; `reproduce` fills it
+            in. A program's own experiments, and ours, are of none.
 
     Raises:
         ArgumentError: something of it is of the wrong kind, out of range, or unknown; but names of experiments may be
@@ -53,6 +55,7 @@ class ReproduceRequest:
     threads: int = 1
     ray: str | None = None
     commands: Sequence[str] = ()
+    packages: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Texts that name folders and files become paths; all else is checked."""
@@ -72,6 +75,8 @@ class ReproduceRequest:
         for name, text in (("encoder", self.encoder), ("ray", self.ray or "")):
             if not isinstance(text, str):
                 raise ArgumentError(f"{name}={text!r:.40}: expected a text. Correct it")
+        if not isinstance(self.packages, dict) or not all(isinstance(t, str) for t in self.packages.values()):
+            raise ArgumentError(f"packages={self.packages!r:.40}: expected texts by name. Correct it")
 
 
 def _path(name: str, given: object) -> Path:
